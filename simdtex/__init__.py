@@ -50,7 +50,7 @@ _NAMES = {
     "simdtex.run": ("Output", "Progress"),
     "simdtex.synthesis": ("explain", "lcpdf", "replay", "synthesize", "synthesize_solid"),
 }
-"""The public names by their modules; each is loaded when it is asked for first: the command line starts at once."""
+"""The public names by their modules, each of which is loaded at its first use, so that the command line starts fast."""
 
 __all__ = sorted(name for names in _NAMES.values() for name in names)
 

@@ -29,16 +29,16 @@ from simdtex.options import real
 from simdtex.random import as_seed
 
 FORMAT = 3
-"""Format of the file; another one is refused."""
+"""Format of the file; all other formats are rejected."""
 
 FIRST = 1.0
-"""Seconds before the first state is written, at least."""
+"""The least seconds before the first state is written."""
 
 SHARE = 75
-"""Seconds between two writes over the seconds that the last one took: writing takes at most 1/76 of the time."""
+"""Time between two writes in units of the duration of the last one: writing takes at most 1/76 of the time."""
 
 LOST = 300.0
-"""Seconds between two writes, at most, also where writing then takes more of the time."""
+"""The most seconds between two writes, even if writing then takes a larger share of the time."""
 
 NAMES = {"job": "call", "shape": "shape of the output"}
 """Names of inputs in messages, if they differ from the input's own."""
@@ -46,10 +46,10 @@ NAMES = {"job": "call", "shape": "shape of the output"}
 
 @dataclass(frozen=True)
 class Checkpointing:
-    """The state that a run goes on from, and the function that is offered every later one.
+    """The state from which a run continues, and the function that receives every later state.
 
-    ``found`` is None if the run begins at its beginning. ``offer(info, tree)`` is called after every step; ``tree()``
-    returns the state, to be passed as `found`, and ``now=True`` asks for it to be written in any case.
+    ``found`` is None for a new run. ``offer(info, tree)`` is called after every step; ``tree()`` returns the state, for
+    a later `found`, and ``now=True`` requires that it is written.
     """
 
     found: Any = None
@@ -107,7 +107,7 @@ class Checkpoint:
         self._next = time.perf_counter() + (FIRST if every is None else every)
 
     def stop(self) -> None:
-        """Write the state after the present step, and raise KeyboardInterrupt there.
+        """Write the state after the current step, and raise KeyboardInterrupt there.
 
         A callback or a signal handler may call it.
         """
@@ -121,9 +121,9 @@ class Checkpoint:
     def opened(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
     ) -> Iterator[tuple[int, Checkpointing]]:
-        """Lock the file, and begin a run or resume the run in the file; yield its seed and its checkpointing.
+        """Lock the file, and start a run or resume the run in the file; yield its seed and its checkpointing.
 
-        ``job`` is the public function, ``inputs()`` returns everything that determines the result but the seed, by
+        ``job`` is the public function; ``inputs()`` returns everything but the seed that determines the result, by
         name; ``rng`` None takes the seed of the run in the file. Raises ValueError if the file is of another run,
         version or format, is damaged or in use, or cannot be written.
         """
@@ -143,7 +143,7 @@ class Checkpoint:
                 self.running = False
 
     def _open(self, job: str, rng: Any, inputs: dict[str, Any], device: str) -> tuple[int, Any]:
-        """Return the seed and the state to go on from; write the file if it is new."""
+        """Return the seed and the state to continue from; write the file if it is new."""
         about, found = read(self.path) if self.path.exists() else (None, None)
         now = {"job": job, **{name: identity(value) for name, value in inputs.items()}}
         seed = None if rng is None else as_seed(rng)
@@ -163,7 +163,7 @@ class Checkpoint:
         return seed, found
 
     def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
-        """Raise if the file is of another run; the sentence says how they differ."""
+        """Raise if the file belongs to another run; the message gives the difference."""
         before = about["inputs"]
         for name in {**before, **now}:
             old, new = before.get(name), now.get(name)
@@ -182,7 +182,7 @@ class Checkpoint:
         )
 
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
-        """Write the state ``tree()`` if it is time, ``now`` is true, or the run is to stop; return whether it was.
+        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop; return whether it did.
 
         Raises KeyboardInterrupt if the run is to stop here.
         """
@@ -221,7 +221,7 @@ def opened(
     inputs: Callable[[], dict[str, Any]],
     device: str,
 ) -> Iterator[tuple[int, Checkpointing]]:
-    """Open the checkpoint that a public function was given, see `Checkpoint.opened`; use a `Checkpointing` as it is."""
+    """Open the checkpoint of a public function, see `Checkpoint.opened`; a `Checkpointing` is used unchanged."""
     if checkpoint is None or isinstance(checkpoint, Checkpointing):
         yield as_seed(rng), checkpoint or Checkpointing()
         return
@@ -249,7 +249,7 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
 
 
 def check_version(name: str, about: dict[str, Any], known: int) -> None:
-    """Raise unless a state of this description is of a known format and of this version."""
+    """Raise unless a state with the description ``about`` has a known format and this version."""
     wrote, own = about.get("version"), version("simdtex")
     wrong = f"format {about.get('format')} and this simdtex reads {known}" if about.get("format") != known else ""
     if not wrong and wrote != own:
@@ -259,7 +259,7 @@ def check_version(name: str, about: dict[str, Any], known: int) -> None:
 
 
 def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
-    """Write a description, which JSON holds, and a tree into a file with a checksum, atomically."""
+    """Write a description of JSON types and a tree into a file with a checksum, atomically."""
     text, arrays = pack(tree)
 
     def write(file: BinaryIO) -> None:
@@ -271,7 +271,7 @@ def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
 
 
 def read_state(path: Path) -> tuple[dict[str, Any], Any]:
-    """Return what `write_state` was given; raise Damaged unless the file has that content, and OSError."""
+    """Return the arguments of `write_state`; raise Damaged if the content of the file has changed, and OSError."""
     try:
         with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
             arrays = {name: found[name] for name in found.files}
@@ -315,7 +315,7 @@ def pack(tree: Any) -> tuple[str, list[NDArray[Any]]]:
 
 
 def unpack(text: str, arrays: Sequence[NDArray[Any]]) -> Any:
-    """Return what `pack` was given; tuples come back as lists (see `like`)."""
+    """Return the tree that `pack` packed, with lists for tuples (see `like`)."""
 
     def kept(node: dict[str, Any]) -> Any:
         match node:
@@ -329,7 +329,7 @@ def unpack(text: str, arrays: Sequence[NDArray[Any]]) -> Any:
 
 
 def like(template: Any, node: Any) -> Any:
-    """Return a tree with tuples of the types that they have in another tree of the same form."""
+    """Return the tree ``node`` with the tuple types of ``template``, a tree of the same form."""
     if not (isinstance(node, (list, tuple)) and isinstance(template, tuple) and len(node) == len(template)):
         return node
     inside = [like(one, value) for one, value in zip(template, node, strict=True)]
@@ -338,7 +338,7 @@ def like(template: Any, node: Any) -> Any:
 
 
 def digest(*arrays: NDArray[Any]) -> str:
-    """Return the SHA-256 over types, shapes and bytes in C order."""
+    """Return the SHA-256 of the types, shapes and bytes, in C order, of arrays."""
     found = hashlib.sha256()
     for array in arrays:
         found.update(f"{array.dtype.str}{array.shape}".encode())
@@ -357,7 +357,7 @@ def identity(thing: Any) -> Any:
     if isinstance(thing, Integral) and abs(int(thing)) >= 2**53:
         return str(int(thing))
     if isinstance(thing, Real):
-        return float(thing)  # 1 and 1.0 say the same
+        return float(thing)  # 1 and 1.0 are equal
     if isinstance(thing, (list, tuple)):
         return [identity(one) for one in thing]
     if isinstance(thing, dict):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one loop that runs every method, and what a public function does around it.
+"""The one loop that runs every method, and the common part of all public functions around it.
 
-A `Plan` is validated input. On a machine it is a `Run`, which `drive` begins, steps and ends. All that must survive
-between two steps is in the state, a tree of plain arrays and numbers; everything else watches from outside.
+A `Plan` is validated input. On a machine it is a `Run`, which `drive` begins, steps and ends. Everything that must
+survive between two steps is in the state, a tree of plain arrays and numbers. An `Observer` only watches the run.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ Tree = Any
 
 
 class Observer(Protocol):
-    """What watches a run: it reports progress, counts the work, and keeps the stages."""
+    """The observer of a run: it reports progress, counts the work, and keeps the stages."""
 
     def part(self, *seen: Any) -> None:
-        """See a part of a step that takes long."""
+        """Receive a part of a long step."""
 
     def step(self, state: Any, info: Any) -> None:
-        """See a step: the state after it, and what it did."""
+        """Receive a step: the state after it, and a description of its work."""
 
     def save(self) -> Tree:
-        """Return what has been seen so far."""
+        """Return everything received so far."""
 
     def load(self, saved: Tree) -> None:
-        """Go on from what `save` returned."""
+        """Continue from the tree that `save` returned."""
 
 
 class Run(Protocol):
@@ -50,10 +50,10 @@ class Run(Protocol):
         """Return the state before the first step."""
 
     def step(self, state: Any, watch: Callable[..., None]) -> tuple[Any, Any]:
-        """Return the state after the next step, and what the step did; ``watch`` sees parts of a long step."""
+        """Return the state after the next step, and a description of the step; ``watch`` gets parts of a long step."""
 
     def ended(self, state: Any) -> bool:
-        """Return whether there is no further step."""
+        """Return whether the run has ended: there is no further step."""
 
     def result(self, state: Any, observer: Any) -> tuple[NDArray[Any], Output]:
         """Return the picture, channels last, and the rest of the output."""
@@ -65,14 +65,14 @@ class Run(Protocol):
         """Return the state that `save` copied, on this machine."""
 
     def observer(self, callback: Callback | None) -> Observer:
-        """Return what watches this run."""
+        """Return the observer of this run."""
 
 
 class Plan(Protocol):
     """Validated input of a run, as plain data."""
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Lay the plan out on a machine; ``seed`` is the key of every random number."""
+        """Return the run of the plan on a machine; ``seed`` is the key of every random number."""
 
 
 def drive(
@@ -82,7 +82,7 @@ def drive(
     callback: Callback | None = None,
     checkpointing: Checkpointing | None = None,
 ) -> tuple[NDArray[Any], Output]:
-    """Run a plan to its end.
+    """Run a plan to its end, and return its result.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def drive(
     callback : callable, optional
         Called with a `simdtex.run.Progress` after every part of a step.
     checkpointing : Checkpointing, optional
-        The state to go on from, and the function that is offered every later one.
+        The state to continue from, and the function that receives every later state.
 
     Returns
     -------
     image : (rows, cols, channels) array
-        In the sample's type; a block is (depth, rows, cols, channels).
+        The picture in the sample's type; a block is (depth, rows, cols, channels).
     output : simdtex.run.Output
     """
     began, worked = time.perf_counter(), machine.seconds
@@ -138,11 +138,11 @@ def execute(
     full_output: bool,
     checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Run a validated call on a device: what every public function does once its input is validated.
+    """Run a public function whose input is validated on a device, and return its result.
 
     ``name`` is the public function; ``run`` is `drive` with its plan, or a function that drives several plans in turn;
-    ``inputs()`` returns all that determines the result but the seed, by the names that users give it; and
-    ``channel_axis`` is that of the returned picture. The others are the arguments that all public functions share; a
+    ``inputs()`` returns everything but the seed that determines the result, by the parameters' names; and
+    ``channel_axis`` is that of the returned picture. All other parameters are those that all public functions share; a
     `Checkpointing` as ``checkpoint`` keeps states in memory.
     """
     machine = open_machine(device)
@@ -158,7 +158,7 @@ def execute(
 
 
 def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:
-    """Return the callback, made to see pictures with the sample's own axes."""
+    """Return a callback that calls ``callback`` with pictures whose axes are those of the sample."""
     if callback is None:
         return None
 
@@ -170,12 +170,12 @@ def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | No
 
 
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
-    """Return a picture (rows, cols, channels) with the axes that the sample has."""
+    """Return a picture (rows, cols, channels) with the axes of the sample."""
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
 
 
 def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
-    """Return the options; the channels of a picture to start from are moved to the last axis."""
+    """Return the options, with the channels of the picture ``start`` moved to the last axis."""
     start = options.get("start")
     if start is None or channel_axis is None or real_array("start", start).ndim < 3:
         return options
@@ -183,13 +183,13 @@ def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dic
 
 
 def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
-    """Return the rows and columns of an output; raise unless they are two integers of at least `least`."""
+    """Return the rows and columns of an output; raise unless they are two integers of at least ``least``."""
     rows, cols = check_sides(shape, ("rows", "columns"), least)
     return rows, cols
 
 
 def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
-    """Return the sides of an output, which have these names; raise unless they are integers of at least `least`."""
+    """Return the sides of an output, called ``names``; raise unless they are integers of at least ``least``."""
     try:
         sides = tuple(shape)
     except TypeError:

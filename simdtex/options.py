@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of options: what a field of a method's `Options` declares, and the checks of values.
+"""The table of options: the declarations in the fields of a method's `Options`, and the checks of values.
 
-An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. From there come
-its check, its place in the docstring, its type in ``simdtex/methods/typed_options.py``, and its places on the command
-line, on the live page and in the reference pages.
+An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. The declaration
+gives its check, its entry in the docstring, its type in ``simdtex/methods/typed_options.py``, and its entries on the
+command line, on the live page and in the reference pages.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from numpy.typing import NDArray
 T = TypeVar("T")
 
 MOST = 2**31 - 1
-"""The largest integer of an option that names no other: kernels count in 32 bits."""
+"""The default maximum of an integer option, since kernels count in 32 bits."""
 
 GREATEST = 1e6
-"""The largest number of an option that names no other: beyond it a weight is the only one that counts."""
+"""The default maximum of a number option: a larger weight would make all others negligible."""
 
 UNSET = object()
-"""Stands for a value that is not given, since None is one."""
+"""Marks a value that is not given, since None is a value."""
 
 LONGEST = 100
-"""Characters of a value that an error message repeats, at most."""
+"""The most characters of a value in an error message."""
 
 
 @dataclass(frozen=True)
@@ -155,20 +155,20 @@ class Option:
     more : str
         Further sentences for the docstring and the reference pages.
     none : str
-        What the default None stands for.
+        Meaning of the default None.
     symbol : str
         Symbol and equation in the paper.
     paper : object
         The paper's value, if it differs from the default.
     jobs : mapping
-        Job -> the default there, if it differs. Jobs are named as their commands.
+        Job -> its default, if that differs. The name of a job is that of its command.
     shown : tuple of str
         The commands that have the option.
     group : str
         The heading under which commands and the live page list it.
     unit : str
     slider : (least, largest, step), optional
-        Of the control on the live page. A number without a slider has no control.
+        The slider on the live page. A number without a slider has no control.
     label : str
         The name on the live page; by default that of the field.
     """
@@ -188,11 +188,11 @@ class Option:
     label: str = ""
 
     def default_of(self, job: str) -> Any:
-        """Return the default value in a job; ``"simulate 3-D"`` has those of ``"simulate"`` that it has not itself."""
+        """Return the default value in a job; ``"simulate 3-D"`` falls back on ``"simulate"``."""
         return self.jobs.get(job, self.jobs.get(job.partition(" ")[0], self.default))
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless the value is valid; None is if it is the default."""
+        """Raise unless the value is valid; None is valid if it is the default."""
         if value is not None or self.default is not None:
             self.kind.check(name, value)
 
@@ -209,7 +209,7 @@ PRESET = Option(
 
 
 def option(default: Any, kind: Kind, help: str, **more: Any) -> Any:
-    """Declare a field of `Options`; the arguments are those of `Option`."""
+    """Return a field of `Options` that declares an option; the arguments are those of `Option`."""
     return field(default=default, metadata={"option": Option(default, kind, help, **more)})
 
 
@@ -237,7 +237,7 @@ def preset_values(options: Any, preset: str) -> dict[str, Any]:
 
 
 def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
-    """Return the options of a job: the method's defaults < the job's < the preset's values < what the user gave.
+    """Return the options of a job: the method's defaults < the job's < the preset's < the user's values.
 
     ``job`` is the name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``... Lists become tuples.
     Raises TypeError if a name is unknown; the message lists the valid ones; ValueError or TypeError if a value is not
@@ -289,11 +289,11 @@ def quoted(value: Any) -> str:
 
 
 SMALLER = "give a smaller size"
-"""What helps where an output is too large."""
+"""The remedy for a too large output."""
 
 
 def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
-    """Raise ValueError unless the value is one of the valid ones, and list them."""
+    """Raise ValueError, which lists the valid values, unless the value is one of them."""
     valid = list(valid)
     if not isinstance(value, str) or value not in valid:
         raise ValueError(f"unknown {name} {shown(value)}; choose one of: {', '.join(valid)}")
@@ -330,7 +330,7 @@ def real(
 
 
 def require(extra: str, *libraries: str) -> None:
-    """Raise unless the libraries are installed, which an extra of the package brings."""
+    """Raise unless the libraries of an extra of the package are installed."""
     for library in libraries:
         if find_spec(library) is None:
             raise ValueError(f"{library} is not installed; pip install 'simdtex[{extra}]'")
@@ -352,7 +352,7 @@ def check_real(name: str, array: NDArray[Any]) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:
-    """Return the value as an array of finite real numbers; raise if it is none."""
+    """Return the value as an array of finite real numbers; raise if it is not one."""
     unmasked(name, value)
     try:
         array = np.asarray(value)
@@ -381,7 +381,7 @@ def _finite(value: Real) -> bool:
 
 
 def within_32_bits(shape: tuple[int, ...], values: int, remedy: str = SMALLER) -> None:
-    """Raise unless so many values for each pixel of an output, or voxel of a block, can be counted in 32 bits."""
+    """Raise unless ``values`` values for each pixel of an output, or voxel of a block, can be counted in 32 bits."""
     if prod(shape) * values < 2**31:
         return
     size = " x ".join(str(side) for side in shape)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Counter-based random numbers: a pure function of the seed and of what, where and when they are for.
+"""Counter-based random numbers: a pure function of the seed, and of the purpose, the site and the time of a draw.
 
 The twin of ``kernels/common/philox.h``.
 """
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# What a draw is for; the same numbers stand in kernels/common/philox.h.
+# The purposes of draws, with the numbers of kernels/common/philox.h.
 START, DRAW, COLOR, SCHEDULE = 1, 2, 3, 4
 NOISE, SEARCH = 5, 6
 
@@ -39,7 +39,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
 def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
     """Return four random 32-bit numbers per site; the counter is (site, turn, site and level and purpose, attempt).
 
-    A site's place has 48 bits: the lower 32 are the first word, the upper 16 stand above level and purpose in the
+    A site's place has 48 bits: the lower 32 are the first word, the upper 16 are above level and purpose in the
     third.
     """
     site, attempt = np.broadcast_arrays(np.asarray(site, np.uint64), np.asarray(attempt))
@@ -64,9 +64,9 @@ def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.
 
 
 def as_seed(rng: Any = None) -> int:
-    """Return a seed, 0 <= seed < 2**64, from what scikit-image calls `rng`.
+    """Return a seed, 0 <= seed < 2**64, from an argument ``rng`` as in scikit-image.
 
-    None takes a fresh seed from the system; an integer is itself; a generator is asked for one.
+    None gives a random seed from the system, an integer itself, and a generator an integer drawn from it.
     """
     if rng is None:
         return secrets.randbits(64)

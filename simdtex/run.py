@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Progress of a run for callbacks, and the rest of its output: stages, source map and statistics."""
+"""The progress that callbacks receive, and the additional output of a run: stages, source map and statistics."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ class Progress:
     fraction : float
         Estimated share of the work that is done, 0 to 1.
     image : callable
-        ``image()`` reads back a picture, (rows, cols[, channels]) in the sample's type: that of the level, or of the
-        level before if this one has none before its end.
+        ``image()`` reads back the picture of the level, (rows, cols[, channels]) in the sample's type; that of the
+        previous level if the method has no picture before the end of a level.
     doing : str
         Description of the current work.
     stage : str or None
-        The name of the picture that is complete now: the end of a sweep, of a level that has none, or of an iteration.
+        The name of the picture that is now complete: at the end of a sweep, of a level without sweeps, or of an
+        iteration. None otherwise.
     """
 
     level: int
@@ -47,11 +48,11 @@ class Progress:
         return None
 
     def picture(self) -> NDArray[Any]:
-        """Return the picture of the stage: the image."""
+        """Return the picture of the stage, which is the image."""
         return self.image()
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
-        """Return further pictures of the stage: arrays (rows, cols), 0 to 1, by name."""
+        """Return further pictures of the stage by name: arrays (rows, cols), 0 to 1."""
         return {}
 
 
@@ -62,24 +63,24 @@ class Relaxing(Progress):
     Attributes
     ----------
     sweep : int
-        The present sweep of the level, from 1.
+        The current sweep of the level, from 1.
     step : int
-        The present step of the level, from 1: sites that relax together.
+        The current step of the level, from 1. The sites of a step relax together.
     phase : str
         ``"relax"`` while some temperature is above 0, then ``"free"``.
     temperature_left : float
         Mean temperature of the level, 0 to 1, at the beginning of the sweep.
     end_of_sweep : bool
-        Whether the sweep ends with this piece.
+        Whether the sweep ends with this part.
     temperature : callable
         ``temperature()`` reads back the level's temperatures, (rows, cols), 0 to 1.
     source : callable
-        ``source()`` reads back where in the sample each site of the level is from, (rows, cols, 2) or, of several
-        samples, (rows, cols, 3) int32, as `Output.source`.
+        ``source()`` reads back the position in the sample of each site of the level, as `Output.source`: int32,
+        (rows, cols, 2) or, with several samples, (rows, cols, 3).
     explain : callable
-        ``explain(row, col)``, of a volume ``explain(layer, row, col)``, returns a
-        `simdtex.model.explanation.Explanation`: how that site of the level would relax now, with the random numbers of
-        the present step. Called after the callback has returned, it uses the state that the run has then. It changes
+        ``explain(row, col)``, or ``explain(layer, row, col)`` in a volume, returns a
+        `simdtex.model.explanation.Explanation` of how that site of the level would relax now, with the random numbers
+        of the current step. A call after the callback has returned uses the state of the run at that time. It changes
         nothing.
     """
 
@@ -112,10 +113,10 @@ class Sampling(Progress):
     Attributes
     ----------
     end_of_level : bool
-        Whether the level ends with this piece.
+        Whether the level ends with this part.
     candidates : callable
-        ``candidates()`` reads back among how many candidates each pixel of the level was drawn, (rows, cols) whole
-        numbers, at the level's end.
+        ``candidates()`` reads back the number of candidates that each pixel of the level was drawn from, (rows, cols)
+        integers, at the end of the level.
     """
 
     end_of_level: bool
@@ -126,24 +127,24 @@ class Sampling(Progress):
         return f"level{self.level}" if self.end_of_level else None
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
-        """Return the candidates, on a logarithmic scale from 1 to the most that a pixel of the level has."""
+        """Return the number of candidates of each pixel, on a logarithmic scale from 1 to the maximum of the level."""
         counts = self.candidates()
         return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Iterating(Progress):
-    """The progress of the method ``pyramid``, after every channel's turn; of a solid, after every part of it.
+    """The progress of the method ``pyramid``, after every channel or, for a solid, after every part of a channel.
 
-    All is at level 0. The picture has the channels that have had their turn as of this iteration, the others as of the
-    one before; of a solid it is the block, (depth, rows, cols[, channels]).
+    The level is always 0. In the picture, channels that are not yet done in this iteration are those of the previous
+    one. The picture of a solid is the block, (depth, rows, cols[, channels]).
 
     Attributes
     ----------
     iteration, iterations : int
-        The present one, from 1, and their number.
+        The current iteration, from 1, and the number of iterations.
     end_of_iteration : bool
-        Whether the iteration ends here.
+        Whether the iteration ends with this part.
     solid : bool
         Whether the image is a block.
     """
@@ -162,7 +163,7 @@ class Iterating(Progress):
         return f"iteration{self.iteration:02d}" if self.end_of_iteration else None
 
     def picture(self) -> NDArray[Any]:
-        """Return the image; of a block the middle x-y slice."""
+        """Return the image, or the middle x-y slice of a block."""
         image = self.image()
         return image[len(image) // 2] if self.solid else image
 
@@ -171,14 +172,14 @@ class Iterating(Progress):
 class Simulating(Progress):
     """The progress of `simdtex.simulate`, after every realisation.
 
-    All is at level 0; the picture is the realisation.
+    The level is always 0; the picture is the realisation.
 
     Attributes
     ----------
     realisation : int
-        Its number.
+        The number of the realisation.
     finished, realisations : int
-        How many are finished, and how many are asked for.
+        The number of finished realisations, and of all.
     """
 
     realisation: int
@@ -198,17 +199,17 @@ class Simulating(Progress):
 class Tiling(Progress):
     """The progress of `simdtex.distributed.synthesize`, after every tile.
 
-    The image is every n-th site of the level as it was before the turn, about 1000 to the side: reading it takes long.
+    The image has every n-th site of the level before the turn, about 1000 on a side. Reading it is slow.
 
     Attributes
     ----------
     phase : str
-        What is being done to every tile: ``"begin"`` a level; ``"whole"``, all of a level that is one tile;
-        ``"sweep"``; or ``"show"``, write the picture.
+        The current turn: ``"begin"`` a level; ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or
+        ``"show"``, write the picture.
     sweep : int
-        The present sweep of the level, from 1.
+        The current sweep of the level, from 1.
     tile, tiles : int
-        How many are done, and how many there are.
+        The number of finished tiles, and of all.
     """
 
     phase: str
@@ -227,12 +228,12 @@ class Tiling(Progress):
 class Labelling(Progress):
     """The progress of `simdtex.classify`, after every step.
 
-    All is at level 0; the picture has the labels so far, 1 the first class; 0 where nothing was compared yet.
+    The level is always 0. The picture has the labels so far: 1 is the first class, and 0 a pixel not yet compared.
 
     Attributes
     ----------
     work : str
-        What was done last: rows compared with the classes, or a sweep of the field.
+        The last work done, in words: rows compared with the classes, or a sweep of the field.
     """
 
     work: str
@@ -247,7 +248,7 @@ Callback = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Stage:
-    """A level at its end.
+    """The result of a level.
 
     Attributes
     ----------
@@ -256,10 +257,10 @@ class Stage:
     image : (rows, cols[, channels]) array
         In the sample's type.
     source : (rows, cols, 2) int32 array or None
-        ``multires``: for every pixel of the level, the (row, column) of the sample's level that it was copied from; on
-        the levels above the finest, of the sample with its edges mended.
+        ``multires``: for every pixel of the level, the (row, column) in the sample's level that it was copied from;
+        above the finest level, in that of the sample with repaired edges.
     candidates : (rows, cols) int32 array or None
-        ``multires``: among how many candidates each pixel was drawn.
+        ``multires``: the number of candidates that each pixel was drawn from.
     """
 
     level: int
@@ -275,50 +276,51 @@ class Output:
     Attributes
     ----------
     source : (rows, cols, 2) int32 array or None
-        For every output pixel the (row, column) of its source pixel in the sample; with ``multires``, of the source of
-        its highest frequencies. With ``mrf`` and a finish, pixels near seams are means of that pixel and of the pixels
-        that continue their neighbours' sources. None with ``pyramid``, which takes no pixel from the sample.
+        For every output pixel the (row, column) of its source pixel in the sample; with ``multires``, the source of
+        its highest frequencies. With ``mrf`` and a finish, a pixel near a seam is the mean of its source pixel and of
+        the pixels that continue its neighbours' sources. None with ``pyramid``, which takes no pixel from the sample.
     temperature : (rows, cols) float64 array or None
         ``mrf``: the remaining pixel temperatures, 0 to 1.
     stages : list of Stage
-        Each level's picture at its end, the coarsest first; of ``mrf`` without the finish. None with ``pyramid``; its
-        callback sees every iteration.
+        The picture of each level at its end, the coarsest first; with ``mrf`` without the finish. ``pyramid`` has none;
+        its callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``; then there are ``kernels`` too, as of `simdtex.machine.log.Log.take`), and
-        ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates``, ``seconds``, and what is
-        particular to the method. If there is a source map, ``use`` says how
-        evenly the sample is used, as in `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and
-        ``most_used``, the piece of the sample of which most is taken: ``times_fair_share``, its first pixel
-        (``row``, ``col``) and its size (``rows``, ``cols``), pixels. ``lattice`` of ``mrf`` is None unless the sample
-        repeats: the two ``vectors`` of the output's lattice, (row, column) in pixels, the ``deformation`` that fits the
-        sample's to the output, 0 if it is none, and ``fitting``, the rows and columns of an output that needs less.
+        opened with ``profile=True``, which also adds ``kernels``, see `simdtex.machine.log.Log.take`), and
+        ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates``, ``seconds``, and the entries
+        of the method below. If there is a source map, ``use`` shows how evenly the sample is used, as
+        `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and ``most_used``, the most used piece of
+        the sample: ``times_fair_share``, its first pixel (``row``, ``col``) and its size (``rows``, ``cols``), pixels.
+        ``lattice`` of ``mrf`` is None unless the sample repeats. It has the two ``vectors`` of the output's lattice,
+        (row, column) in pixels, the ``deformation`` that fits the sample's lattice to the output, 0 if none, and
+        ``fitting``, the rows and columns of an output that needs less deformation.
     fit : (rows, cols, classes) float32 array or None
         `simdtex.classify`: the probability that a texture of each class differs from its samples as much as the picture
         does around each pixel, within its segment.
     probability : (rows, cols, classes) float32 array or None
-        `simdtex.classify`: of each class by the field of labels, given the labels around; the sum is 1.
+        `simdtex.classify`: the probability of each class in the field of labels, given the labels around the pixel;
+        the sum is 1.
     made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
-        The result, channels last whatever axes the sample has; notebooks show it.
+        The result with channels last, whatever the axes of the sample; notebooks show it.
 
     Notes
     -----
-    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
-    them that a bound made needless; docs/concepts/search.rst), and ``equilibrium``: the ``sweeps``, ``steps`` and
-    ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics also have ``accounting`` if
-    the option ``array`` is given, what the run costs on that processor array: ``array``, ``mapping``; ``layers``,
+    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (the fma that
+    a bound made unnecessary; docs/concepts/search.rst), and ``equilibrium``: the ``sweeps``, ``steps`` and
+    ``relaxations`` until all temperatures were 0, without free sweeps. With the option ``array`` the statistics also
+    have ``accounting``, the cost of the run on that processor array: ``array``, ``mapping``; ``layers``,
     virtual layers; ``shifts``, X-Net shifts of a word that bring every pixel of the finest level all its neighbours,
     for either mapping; ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site;
-    ``active``, the mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations;
+    ``active``, the mean number of active PEs per pass; ``utilisation``, its ratio to all PEs; ``sites``, relaxations;
     ``moved``, words that each PE shifted; ``flop``, 32-bit operations in the distances; ``model_seconds``, the time of
     a MasPar MP-1 by the model of `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
 
-    A level of ``multires`` has the mean number of ``candidates`` of a pixel and ``most`` of them; ``nodes``, pixels of
-    the levels above in the sample's pyramid, and ``compared``, the mean number of them that a pixel was compared with
-    until all its candidates were found.
+    A level of ``multires`` has the mean number of ``candidates`` of a pixel, and the largest, ``most``; ``nodes``, the
+    pixels of the levels above in the sample's pyramid, and ``compared``, the mean number of nodes that a pixel was
+    compared with until all its candidates were found.
 
     ``pyramid`` has ``iterations`` in place of ``levels``: one dict per iteration with ``iteration``, ``seconds`` and
-    ``distances``: by name of the subband (and ``pixels``), how far the values were moved on average to match the
+    ``distances``: by name of the subband (and ``pixels``), the mean distance by which values were moved to match the
     histogram, in standard deviations of the sample's subband, which is the Wasserstein distance of the two histograms;
     the mean over orientations and channels.
     """
@@ -332,7 +334,7 @@ class Output:
     made: NDArray[Any] | None = None
 
     def __repr__(self) -> str:
-        """Return a line on the contents; arrays and figures would fill pages."""
+        """Return a line of text about the contents, since all arrays and figures would fill pages."""
         rows_cols = "x".join(map(str, self.made.shape[:-1])) if self.made is not None else ""
         has = [name for name in ("source", "temperature") if getattr(self, name) is not None]
         has += [f"{len(self.stages)} stages"] if self.stages else []
@@ -341,16 +343,16 @@ class Output:
         return f"Output({', '.join([rows_cols] * bool(rows_cols) + has)})"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the picture and its arrangement."""
+        """Return HTML for a notebook: the picture and its source map."""
         from simdtex.model.display import as_html
 
         return as_html(self.made, self.source, self.statistics)
 
 
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
-    """Yield ranges (first, end) of first..count, for each of which the loop's body takes about a tenth of a second.
+    """Yield ranges (first, end) that cover first..count; the loop's body takes about 0.1 s for each.
 
-    `least` is the size of the first, and of the smallest.
+    ``least`` is the size of the first range, and the smallest size of the others.
     """
     size = least
     while first < count:

@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from simdtex.methods.typed_options import SolidOptions, SynthOptions
 
 GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
-"""The arrays of a synthesis, and their axis, beside sample and shape."""
+"""The parameters of a synthesis, other than sample and shape, that ``check_inputs`` takes."""
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
 
 METHODS = ("mrf", "multires", "pyramid")
-"""The packages of `simdtex.methods`; each is loaded when it is asked for first."""
+"""The packages of `simdtex.methods` for synthesis; each is loaded at its first use."""
 
 
 @overload
@@ -89,7 +89,7 @@ def synthesize(
     channel_axis : int, optional
         The axis of the sample that holds channels; None for a grey sample.
     mask : (rows, cols) bool array, or a list of such, optional
-        ``mrf``: True for pixels of the sample that may be taken; the others are still neighbours.
+        ``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.
     known : array of `shape` (and the channel axis), HardData or path, optional
         ``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN
         for unknown values, a table (`simdtex.read_hard_data`) or its file. Some variables (channels) of a pixel may be
@@ -114,7 +114,7 @@ def synthesize(
         A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
         run continues from it, to the same bytes. The file is removed when the function returns.
     **options
-        Of the method, and ``preset``: see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.Options` and
+        Options of the method, and ``preset``: see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.Options` and
         `simdtex.methods.pyramid.Options`.
 
     Returns
@@ -269,7 +269,7 @@ def explain(
     device: str | Machine | None = None,
     **arguments: Any,
 ) -> Explanation:
-    """Explain why a site takes its candidate, in a synthesis by the method ``mrf``.
+    """Return an explanation of why a site takes its candidate, in a synthesis by the method ``mrf``.
 
     The run is that of `synthesize` with the same arguments, up to the step of the sweep in which the site relaxes. The
     explanation describes that relaxation, with the field just before it.
@@ -283,7 +283,7 @@ def explain(
     level : int
         0 is the finest.
     sweep : int, optional
-        A sweep of the level, from 1, in which the site relaxes. None: the last one, which made the pixel.
+        A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
     rng, device
         As in `synthesize`; give the seed of the run to explain.
     **arguments
@@ -331,7 +331,7 @@ def replay(
     device: str | Machine | None = None,
     **arguments: Any,
 ) -> Replay:
-    """Return a synthesis by the method ``mrf`` that can be looked at after any set of sites that relax together.
+    """Return a replay of a synthesis by the method ``mrf``, with its field after any set of sites that relax together.
 
     Parameters
     ----------
@@ -341,17 +341,15 @@ def replay(
     Returns
     -------
     simdtex.methods.mrf.replay.Replay
-        ``sweeps`` lists the sweeps of all levels, ``at(sweep, sets)`` returns the field after so many sets of sites of
-        a sweep, and ``explain(site, level, sweep)`` and ``explain_pixel(row, col, sweep, sets)`` explain a relaxation.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
-    Cost: the run, and 6 bytes of the host for each site and sweep and 2 for each of its channels, 256 MiB at most.
+    Cost: the run, and memory of the host, see `simdtex.methods.mrf.replay.Replay`.
 
     Examples
     --------
@@ -396,18 +394,18 @@ def lcpdf(
     sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int
-        o of equation (3).
+        The order o of the neighbourhood, equation (3).
     bandwidth : float
         h in units of h_opt, equation (8). 1.0 is the paper's.
     temperature : (rows, cols) array, 0 to 1, optional
-        t of equation (12), taken in steps of 1/1024; None is 0 everywhere.
+        t of equation (12), rounded to multiples of 1/1024; None is 0 everywhere.
     greys : int
         Number of grey levels, 2 to 4096.
     estimator : {"parzen", "histogram"}
         Equations (6) to (8), or counts of exact matches, (4) and (5); the latter disregards `bandwidth`, and
         neighbours with a temperature of 1 need not match.
     boundary : {"torus", "open"}
-        Of the image. Neighbours outside an open one have no weight.
+        Boundary of the image. Neighbours outside an open boundary have no weight.
     device : str, optional
         As in `synthesize`.
 
@@ -420,11 +418,12 @@ def lcpdf(
     Raises
     ------
     ValueError
-        A neighbourhood that does not fit the sample, grey levels out of range, or no exact match at a site.
+        The neighbourhood does not fit the sample, a grey level is out of range, or a site has no exact match.
 
     Notes
     -----
-    Cost: S x sample pixels x neighbours x 2 fma, and 12 S x greys bytes for a piece of the sites.
+    Cost: S x sample pixels x neighbours x 2 fma, and 12 x greys bytes for each of the sites computed together, 4096 at
+    most.
     """
     from simdtex.methods.mrf.density import lcpdf_at
     from simdtex.ops.neighbourhood import Field

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Benchmarks: how long the methods take on each device, and how many times longer in NumPy."""
+"""Benchmarks: the time of the methods on each device, and the factor by which NumPy takes longer."""

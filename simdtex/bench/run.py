@@ -19,14 +19,14 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 
 REPEATS, BUDGET = 3, 2.0
-"""Timed runs of a case at most, and seconds after which no other run begins."""
+"""The most timed runs of a case, and the seconds after which no further run starts."""
 
 
 class Case(NamedTuple):
     """A synthesis from gravel, a grey picture of scikit-image.
 
-    ``method`` is ``"solid"`` or one of `simdtex.synthesize`; ``sample`` and ``output`` are pixels a side, of a solid
-    voxels; ``order`` and ``search`` are those of ``mrf``.
+    ``method`` is ``"solid"`` or a method of `simdtex.synthesize`; ``sample`` and ``output`` are sides in pixels, of a
+    solid in voxels; ``order`` and ``search`` are those of ``mrf``.
     """
 
     method: str
@@ -43,7 +43,7 @@ class Case(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """The cases of a benchmark: those of the devices alone, and those that the NumPy reference does too."""
+    """The cases of a benchmark: those for devices only, and those also for the NumPy reference."""
 
     devices: tuple[Case, ...]
     reference: tuple[Case, ...]
@@ -67,7 +67,7 @@ FULL = Sizes(
 
 
 def chosen(device: str | None = None) -> list[DeviceInfo]:
-    """Return the devices to measure: the one of a text, or all usable ones except simulators.
+    """Return the devices to measure: the one named by ``device``, or all usable ones except simulators.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def chosen(device: str | None = None) -> list[DeviceInfo]:
 
 
 def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
-    """Measure the reference and devices.
+    """Return measurements of the reference and of devices.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     dict
         ``simdtex`` (version), ``date``, ``seconds``, ``host``, and ``devices``, a dict for each with ``device``, its
         description, and ``cases``: dicts with ``name``; ``seconds`` of the fastest run; ``busy``, seconds of that run
-        in kernels; and ``reference``, how many times longer the reference took, None if it did not run the case.
+        in kernels; and ``reference``, the factor by which the reference took longer, None if it did not run the case.
     """
     began, date = perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
     plain = {}
@@ -146,7 +146,7 @@ def fastest(machine: Machine, case: Case) -> tuple[float, float]:
 
 
 def once(machine: Machine, case: Case) -> tuple[float, float]:
-    """Run a case and return its seconds, and those of them in kernels."""
+    """Run a case, and return its seconds and its seconds in kernels."""
     from skimage import data
 
     gravel: Any = data.gravel

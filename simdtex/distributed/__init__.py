@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Outputs larger than one machine: in tiles, by any number of workers, with the bytes of one.
+"""Outputs larger than one machine: in tiles, by any number of workers, with the bytes of an output without tiles.
 
 The extra ``distributed`` brings the libraries: ``pip install 'simdtex[distributed]'``.
 """

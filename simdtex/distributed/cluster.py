@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where tiles are done: in this process, or by the workers of a Dask cluster."""
+"""The execution of tasks: in this process, or by the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from distributed import Client
 
 AHEAD = 3
-"""Tasks for each worker that the scheduler knows of: one is always ready, and the scheduler's memory is bounded."""
+"""Tasks per worker that the scheduler holds: one is always ready, and the scheduler's memory is bounded."""
 
 WAIT = 10.0
-"""Seconds between two looks at whether there are workers."""
+"""Seconds between two checks for workers."""
 
 
 def here(store: Store, device: str | Machine | None) -> Execute:
-    """Return what does tasks in this process, one after another."""
+    """Return a function that executes tasks in this process, one after another."""
     name = store.about["name"]
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:
@@ -41,7 +41,7 @@ def here(store: Store, device: str | Machine | None) -> Execute:
 
 
 def across(client: Client, store: Store, device: str | Machine | None, note: Callable[[str], None]) -> Execute:
-    """Return what has the workers of a cluster do tasks; a task that is lost with its worker is done by another.
+    """Return a function that executes tasks on the workers of a cluster; if a worker is lost, another does its task.
 
     ``note`` receives a sentence when there are no workers.
     """
@@ -84,7 +84,7 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
 
 @contextmanager
 def _waiting(client: Client, note: Callable[[str], None]) -> Iterator[None]:
-    """Note during the block when there are no workers, for which the run then waits."""
+    """Call ``note`` if there are no workers during the block, since the run then waits for them."""
     over = Event()
 
     def watch() -> None:
@@ -112,7 +112,7 @@ def _address(client: Client) -> str:
 
 
 def check_workers(workers: Any, device: Any) -> None:
-    """Raise unless workers of a valid number can open the device."""
+    """Raise unless the number of workers is valid and each can open the device."""
     if workers is None:
         return
     if isinstance(workers, (int, float)):
@@ -123,7 +123,10 @@ def check_workers(workers: Any, device: Any) -> None:
 
 @contextmanager
 def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
-    """Yield a client of so many processes on this machine, of the scheduler at an address, the one given, or None."""
+    """Yield a client: of a number of processes on this machine, of the scheduler at an address, or the given one.
+
+    None yields None.
+    """
     if workers is None or not isinstance(workers, (int, str)):
         yield workers
         return
@@ -132,7 +135,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     from simdtex.distributed.cores import Cores
 
     if isinstance(workers, str):
-        getLogger("distributed.client").setLevel(CRITICAL)  # what ends a run is said in one sentence
+        getLogger("distributed.client").setLevel(CRITICAL)  # one sentence reports the end of a run
         try:
             client = distributed.Client(workers, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -147,7 +150,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
-            memory_limit=0,  # the plan says what a worker needs; a tile that is stopped at a limit is only begun again
+            memory_limit=0,  # `plan` gives the need; a tile stopped at a limit would only restart
             env={**limits, "OMP_NUM_THREADS": str(each)},
             plugins=(Cores(each),),
             silence_logs=50,

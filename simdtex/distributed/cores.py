@@ -21,7 +21,7 @@ class Cores(WorkerPlugin):
     def setup(self, worker: Worker) -> None:
         """Set the cores of the worker, which its threads and those of its device inherit."""
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has the workers
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that starts the workers
         if not hasattr(os, "sched_setaffinity"):
             return  # workers compete for cores on this system
         free = sorted(os.sched_getaffinity(0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A plan as a tree of plain arrays and numbers, from which a worker or a later process lays out the same run."""
+"""A plan as a tree of plain arrays and numbers, from which a worker or a later process restores the plan."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from simdtex.options import resolve
 
 @dataclass(frozen=True)
 class Ready:
-    """The sample's side of a guide, in working levels (G, rows, cols) for each picture."""
+    """The planes of a guide for the sample, in working levels (G, rows, cols) for each picture."""
 
     samples: list[NDArray[np.uint16]]
 
@@ -33,12 +33,12 @@ class Ready:
         return len(self.samples[0])
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """Return them as they are, and nothing of the output."""
+        """Return the planes unchanged, and no planes of the output."""
         return Planes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
 
 
 def described(plan: Plan) -> dict[str, Any]:
-    """Return what `restored` needs, for `simdtex.checkpoint.pack`; conditioning data of the output are not in it."""
+    """Return a plan as a tree for `simdtex.checkpoint.pack`, without conditioning data of the output."""
     pictures = plan.sample.pictures
     arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
     sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided), "phases": plan.sample.phases}
@@ -46,7 +46,7 @@ def described(plan: Plan) -> dict[str, Any]:
 
 
 def restored(tree: dict[str, Any]) -> Plan:
-    """Return the plan that was described, without conditioning data of the output."""
+    """Return the plan of a tree from `described`, without conditioning data of the output."""
     options = resolve(Options, "synth", tree["options"])
     unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
     pictures = options.of(Pictures(tuple(tree["pixels"]), unknown, usable))

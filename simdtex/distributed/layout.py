@@ -19,13 +19,13 @@ from simdtex.options import whole
 from simdtex.schedules.schedule import Windowed
 
 CHUNK = 512
-"""Sites to the side of a chunk in the store, at most, if the tile's side has such a divisor."""
+"""The largest side of a chunk in the store, sites, if the tile's side has such a divisor."""
 
 TILES = 2**22
-"""Tiles of a level, at most: one process counts them."""
+"""The most tiles of a level, since one process counts them."""
 
 TASKS = 2**14
-"""Tasks of a turn, at most: one process hands them out, and reads what each has noted."""
+"""The most tasks of a turn, since one process distributes them and reads their notes."""
 
 PROCESS = 2**30
 """Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
@@ -33,24 +33,24 @@ PROCESS = 2**30
 Once they are compiled it is 400 MiB (``benchmarks/tiles.py``)."""
 
 SITE = 110, 12
-"""Bytes of a worker for each site of a window, and for each channel of the site (measured; see the docs)."""
+"""Bytes of a worker for each site of a window, and for each channel of a site (measured; see the docs)."""
 
 PIXEL = 400, 40
 """The same for each pixel of the sample with its margin."""
 
 Maps = dict[str, list[NDArray[Any]]]
-"""Further maps of the material, (rows, cols[, channels]), for each picture of the sample one, by their names."""
+"""Further maps of the material by name: (rows, cols[, channels]), one for each picture of the sample."""
 
 Arrays = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
-"""The axes after rows and columns, and the types, of arrays of the output by their names."""
+"""The axes after rows and columns, and the types, of arrays of the output, by name."""
 
 
 @dataclass(frozen=True)
 class LevelLayout:
     """A level in tiles of ``side`` x ``side`` sites; the last row and column of tiles may be smaller.
 
-    ``number`` 0 is the finest level. A sweep of a tile also needs ``halo`` sites around it: groups of the schedule
-    times the neighbourhood's radius.
+    ``number`` 0 is the finest level. A sweep of a tile also reads ``halo`` sites around it: the number of groups of the
+    schedule times the radius of the neighbourhood.
     """
 
     number: int
@@ -77,7 +77,7 @@ class LevelLayout:
 
     @property
     def together(self) -> int:
-        """Number of tiles of a task, of which the last one may have fewer."""
+        """Number of tiles of a task; the last task may have fewer."""
         return ceil(self.count / TASKS)
 
     @property
@@ -106,7 +106,7 @@ class LevelLayout:
 
     @property
     def chunk(self) -> int:
-        """Sites to the side of a chunk in the store: no two tiles share a chunk."""
+        """Side of a chunk in the store, sites; no two tiles share a chunk."""
         fitting = [n for n in range(CHUNK // 4, CHUNK + 1) if self.side % n == 0]
         return max(fitting, default=self.side)
 
@@ -119,7 +119,7 @@ class LevelLayout:
 
     @property
     def redundant(self) -> float:
-        """Relaxations that several tiles repeat, over those that are needed, at a tile that touches no edge.
+        """Repeated relaxations of a tile that touches no edge, divided by its required ones.
 
         A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
         """
@@ -139,11 +139,11 @@ class Layout:
     levels : tuple of LevelLayout
         The finest first.
     channels : int
-        Of the sites' values.
+        Number of channels of the sites' values.
     memory : int
-        Bytes that a worker needs at most, whatever the output's size.
+        The most bytes that a worker needs, whatever the size of the output.
     disk : int
-        Bytes that the store needs at most, uncompressed: two states of the finest level, one of each
+        The most bytes that the store needs, uncompressed: two states of the finest level, one of each
         other level, and the output with its source map and further maps.
     """
 
@@ -165,15 +165,15 @@ class Layout:
 
 
 def further(plan: Plan, source: bool, maps: Maps) -> Arrays:
-    """Return the arrays that the output has beside the picture: the source map if it is wanted, and other maps."""
+    """Return the arrays of the output in addition to the picture: the source map if ``source``, and ``maps``."""
     found: Arrays = {"source": ((2 + (len(plan.sample.boxes) > 1),), np.dtype(np.int32))} if source else {}
     return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in maps.items()}
 
 
 def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Layout:
-    """Return the layout of an output in tiles of at most ``tile`` sites to the side, with ``more`` arrays.
+    """Return the layout of an output in tiles of at most ``tile`` sites on a side, with ``more`` arrays.
 
-    Raises ValueError if the schedule does not relax a window as it does the whole, or if there are too many tiles.
+    Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
     """
     whole("tiles", tile, 1)
     options, schedule = plan.options, plan.schedule
@@ -196,7 +196,7 @@ def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Lay
 
 
 def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
-    """Return a level; a sweep reaches as far as a neighbourhood with each step."""
+    """Return the layout of a level; each step of a sweep reaches the radius of the neighbourhood farther."""
     lattice, torus = Grid.of(plan.shape, 2**number), plan.options.boundary == "torus"
     assert isinstance(plan.schedule, Windowed)
     steps = plan.schedule.count(Grid(lattice.rows, lattice.cols, 1, torus), plan.options.order, seed)

@@ -1,24 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Zarr store of an output in tiles: what is made, how far it is, and what a worker needs to go on with it.
+"""The Zarr store of an output in tiles: the output, the state of the run, and the input of a worker.
 
     image, source    the output and its source map, and further maps by their names, written tile by tile at the end
     checksums        the checksum of each chunk of those, in the order of the attribute ``arrays`` of ``simdtex``
     work/            removed at the end
         run          the plan (`simdtex.distributed.description`), conditioning data between sites of levels, and maps
-        turn         the present turn, and the penalty of each candidate during it
-        begun0       the turn that began level 0; the same of each coarser level
+        turn         the current turn, and the penalty of each candidate during it
+        begun0       the turn that began level 0; likewise for each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
         level0/0, 1  values, source, temperature: before a sweep and after it, in turn; of a coarser level the last one
         tally7       a row for each task that has finished turn 7: active, sum of temperatures, use of each candidate
 
-A turn is one thing done to every tile: begin a level, a sweep, write the picture. Nothing that is written in a turn is
-read in it, so an interrupted turn is completed by its missing tasks. The file ``turn`` changes when a turn is complete,
-in one write.
+A turn is one operation on every tile: begin a level, a sweep, write the picture. No data written in a turn are read in
+it, so its missing tasks complete an interrupted turn. The file ``turn`` changes when a turn is complete, in one write.
 
-Every chunk that is read must be there and have its checksum, and the three files have theirs; a chunk is on the disk
-before its task has a row. A file of an array of ``work`` ends with a checksum of its content and its place. A chunk of
-another array has that of Zarr, of its content alone, and ``checksums`` has the checksum of each place. A level whose
-state is damaged begins again, from the state of the level above.
+Every chunk that is read must exist and have its checksum, and the three files have checksums, too; a chunk is on the
+disk before its task has a row. A file of an array of ``work`` ends with a checksum of its content and its place. A
+chunk of another array has the checksum of Zarr, of its content alone, and ``checksums`` has the checksum of each place.
+A level whose state is damaged restarts from the state of the level above.
 """
 
 from __future__ import annotations
@@ -54,23 +53,23 @@ from simdtex.model.sample import Sample
 from simdtex.ops.neighbourhood import Confidences, Field
 
 FORMAT = 7
-"""Format of the store; another one is refused."""
+"""Format of the store; all other formats are rejected."""
 
 TOGETHER = 2**22
-"""Numbers of tallies that are read at a time."""
+"""The most numbers of tallies that are read together."""
 
 NODES = ("zarr.json", ".zarray", ".zgroup", ".zattrs", ".zmetadata")
-"""Files that Zarr looks for; every other one is a chunk."""
+"""The metadata files of Zarr; every other file is a chunk."""
 
 PLANES = ("values", "source", "temperature")
 
 
 class Turn(NamedTuple):
-    """What is to be done to every tile.
+    """An operation on every tile.
 
-    ``number`` from 1; ``phase`` ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or ``"done"``;
-    ``level``; ``read``, ``write`` 0 or 1, the state before and after; the level's ``cooling`` and ``free`` sweeps so
-    far; its ``active`` sites now, and their ``temperature_sum``.
+    ``number``, from 1; ``phase``: ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or
+    ``"done"``; ``level``; ``read`` and ``write``, 0 or 1, the state before and after; the level's ``cooling`` and
+    ``free`` sweeps so far; its current ``active`` sites, and their ``temperature_sum``.
     """
 
     number: int
@@ -87,10 +86,10 @@ class Turn(NamedTuple):
 class Work(NamedTuple):
     """The ``plan`` of a store, without conditioning data, its ``seed``, and the ``layout`` of its tiles.
 
-    ``confidences``: which channels are guides; ``held``: whether there are conditioning data or guides; ``given``:
-    whether there are data; ``scattered``: those between the sites of each level that has such; ``channels``: whether
-    the image has a channel axis; ``source``: whether the source map is written too; ``maps``: further maps of the
-    material, for each picture of the sample one.
+    ``confidences``: those of the conditions; ``held``: whether there are conditioning data or guides; ``given``:
+    whether there are data; ``scattered``: the data between the sites, for each level that has such; ``channels``:
+    whether the image has a channel axis; ``source``: whether the source map is written, too; ``maps``: further maps of
+    the material, one for each picture of the sample.
     """
 
     plan: Plan
@@ -106,7 +105,7 @@ class Work(NamedTuple):
 
     @property
     def outputs(self) -> Arrays:
-        """The axes after rows and columns, and the types, of the arrays that the output has."""
+        """The axes after rows and columns, and the types, of the arrays of the output."""
         sample = self.plan.sample
         return {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)} | further(
             self.plan, self.source, self.maps
@@ -114,7 +113,7 @@ class Work(NamedTuple):
 
 
 class Files(zarr.storage.LocalStore):
-    """The files of a store: what is written is on the disk, and a chunk that is read is there, and is no other one."""
+    """The files of a store: a written file is on the disk, and a chunk that is read exists and is the right one."""
 
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
         """Return the content of a file; if it is missing or damaged, None, but Damaged for a chunk."""
@@ -172,7 +171,7 @@ class Checked:
 
 
 class Sources:
-    """The source map of a state, (rows, cols, 2 or 3), a part of which is read when it is sliced."""
+    """The source map of a state, (rows, cols, 2 or 3); slicing it reads a part."""
 
     def __init__(self, array: Checked, sample: Sample) -> None:
         self._array, self._sample = array, sample
@@ -210,10 +209,10 @@ class Store:
         maps: Maps,
         command: Any = None,
     ) -> Store:
-        """Make a store, ready for its first turn.
+        """Make a store, ready for its first turn, and return it.
 
-        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too, and
-        ``maps`` likewise, for each picture of the sample one; ``command``: what is kept for who began the run.
+        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written, too;
+        ``maps``: further maps to write, one for each picture of the sample; ``command``: kept for ``ended``.
         """
         root: Any = zarr.open_group(Files(where), mode="w")
         root.create_group("work")
@@ -244,11 +243,11 @@ class Store:
 
     @property
     def about(self) -> dict[str, Any]:
-        """The description of the run, as JSON holds it."""
+        """The description of the run, as JSON types."""
         return self._state("run")[0]
 
     def work(self) -> Work:
-        """Return the plan and all that belongs to it, which is read once."""
+        """Return the plan and its data, which are read once."""
         if self._work is not None:
             return self._work
         about, (tree, scattered, maps) = self._state("run")
@@ -268,17 +267,17 @@ class Store:
 
     @property
     def turn(self) -> Turn:
-        """The present turn."""
+        """The current turn."""
         return Turn(*self._state("turn")[1][0])
 
     def penalty(self, turn: Turn) -> NDArray[np.float32]:
-        """Return the penalty of each candidate during the present turn."""
+        """Return the penalty of each candidate during the current turn."""
         present, penalty = self._state("turn")[1]
         assert present[0] == turn.number, "a turn that is over"
         return np.asarray(penalty)
 
     def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> Turn:
-        """Go on to a turn, and return it."""
+        """Make a turn the current one, and return it."""
         state = [list(turn), penalty]
         if turn.phase in ("begin", "whole"):
             self._keep(f"begun{turn.level}", {}, state)
@@ -287,7 +286,7 @@ class Store:
         return turn
 
     def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
-        """Make the arrays that a turn writes to; of those that are there only the description is written again."""
+        """Make the arrays that a turn writes to; for existing ones only the description is rewritten."""
         level = work.layout.levels[turn.level]
         if turn.phase == "show":
             for name, (after, dtype) in work.outputs.items():
@@ -308,7 +307,7 @@ class Store:
         self._remove(f"level{level}/{which}/")
 
     def picture(self, turn: Turn, work: Work) -> tuple[Any, Any]:
-        """Return the picture of an output that is written, and its source map, whether that is written or not."""
+        """Return the picture of a written output, and its source map, even if that is not written."""
         return self._at("image"), Sources(self._at(f"work/level0/{turn.read}/source"), work.plan.sample)
 
     def samples(self) -> list[NDArray[Any]]:
@@ -317,12 +316,12 @@ class Store:
         return [one if self.work().channels else one[..., 0] for one in pixels]
 
     def finish(self, work: Work) -> None:
-        """Note that the output is complete, and what it is."""
+        """Note that the output is complete, with its description."""
         about = {"version": version("simdtex"), "seed": work.seed, "options": asdict(work.plan.options)}
         self.root.attrs["simdtex"] = about | {"arrays": {name: self._description(name) for name in work.outputs}}
 
     def check(self) -> None:
-        """Raise Damaged if a chunk of a complete output is missing or is another one; its content is not read."""
+        """Raise Damaged if a chunk of a complete output is missing or in the wrong place; its content is not read."""
         try:
             arrays = dict(self.root.attrs["simdtex"]["arrays"])
         except (KeyError, TypeError, ValueError):
@@ -344,11 +343,11 @@ class Store:
             path.unlink(missing_ok=True)
 
     def back(self, part: str) -> str | None:
-        """Go back to where a damaged part is made, and return what happens then in words; None if nothing makes it."""
+        """Go back to the turn that makes a damaged part; return the consequence in words, None if there is no turn."""
         if self.finished or part == "work/run" or part.startswith("work/given/"):
             return None
         level = re.match(r"work/level(\d+)/", part)
-        if not (level or part == "work/turn"):  # the present turn finds out what is missing
+        if not (level or part == "work/turn"):  # the current turn finds the missing parts
             return "it is made again"
         first = int(level[1]) if level else 0
         for number in range(first, len(self.work().layout.levels)):
@@ -370,7 +369,7 @@ class Store:
         self._at(f"work/tally{turn.number}")[task] = row
 
     def done(self, turn: Turn, work: Work, task: int) -> bool:
-        """Return whether a task has finished a turn, and all that it wrote can be read."""
+        """Return whether a task has finished a turn, and everything that it wrote can be read."""
         level = work.layout.levels[turn.level]
         try:
             self._at(f"work/tally{turn.number}")[task]
@@ -388,7 +387,7 @@ class Store:
         return True
 
     def total(self, turn: Turn) -> Tally:
-        """Return the sum of what was noted of all tasks; many rows are read at a time, one by one they take longer."""
+        """Return the sum of the tallies of all tasks; many rows are read together, which is faster."""
         tally = self._at(f"work/tally{turn.number}")
         some = max(1, TOGETHER // tally.shape[1])
         rows = (tally[first : first + some] for first in range(0, tally.shape[0], some))
@@ -412,7 +411,7 @@ class Store:
         return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Return the known values of the output in a tile, and where they are known."""
+        """Return the known values of the output in a tile, and their mask."""
         values, known = (self._at(f"work/given/{name}")[spans(tile)] for name in ("values", "known"))
         return values, known
 
@@ -424,7 +423,7 @@ class Store:
         self._at("checksums")[where] = found
 
     def _checksums(self, names: list[str], tile: Tile) -> tuple[tuple[slice, ...], NDArray[np.uint32]]:
-        """Return where the checksums of a tile of the output are, and what they are in its chunks."""
+        """Return the position of the checksums of an output tile, and the checksums in its chunks."""
         sides = self._at("image").chunks
         rows, cols = (
             slice(one.start // side, -(-one.stop // side)) for one, side in zip(spans(tile), sides, strict=False)
@@ -444,7 +443,7 @@ class Store:
             raise Damaged(part) from None
 
     def _description(self, name: str) -> int:
-        """Return a checksum of what the description of an array says of its pixels; a user may change the rest."""
+        """Return a checksum of the part of an array's description that concerns its pixels; the rest may change."""
         try:
             about = json.loads(Path(self.where, name, "zarr.json").read_bytes())
             parts = [about[key] for key in ("shape", "data_type", "chunk_grid", "chunk_key_encoding")]
@@ -459,7 +458,7 @@ class Store:
         return Path(self.where, "work", name)
 
     def _keep(self, name: str, about: dict[str, Any], state: Any) -> None:
-        """Write a checked file of ``work``, which has its name in it."""
+        """Write a checked file of ``work``, which contains its name."""
         write_state(self._file(name), {"file": name, **about}, state)
 
     def _state(self, name: str) -> tuple[dict[str, Any], Any]:
@@ -473,7 +472,7 @@ class Store:
         return about, state
 
     def _remove(self, name: str) -> None:
-        """Remove arrays of ``work``, whatever is left of them."""
+        """Remove arrays of ``work``, complete or not."""
         shutil.rmtree(self._file(name), ignore_errors=True)
         self._arrays = {path: one for path, one in self._arrays.items() if not path.startswith(f"work/{name}")}
 
@@ -483,7 +482,7 @@ class Store:
             if len(self._arrays) >= 64:  # of turns that are complete
                 self._arrays.clear()
             try:
-                with zarr.config.set({"array.write_empty_chunks": True}):  # one that is missing is damage
+                with zarr.config.set({"array.write_empty_chunks": True}):  # a missing chunk is damage
                     self._arrays[name] = Checked(self.root[name], name)
             except Exception:  # of JSON, of its members, of the files
                 raise Damaged(f"{name}/zarr.json") from None
@@ -500,7 +499,7 @@ class Store:
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
     ) -> Checked:
-        """Make an array, or write its description again, unless this process has it open; return it."""
+        """Return an array; unless this process has it open, make it or rewrite its description."""
         if name in self._arrays:
             return self._arrays[name]
         fast = zarr.codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
@@ -517,7 +516,7 @@ class Store:
 
 
 class Stored(Conditions):
-    """Conditioning data and guides of an output, window by window out of a store."""
+    """Conditioning data and guides of an output, read from a store window by window."""
 
     def __init__(self, store: Store, work: Work) -> None:
         super().__init__(work.confidences)

@@ -37,12 +37,12 @@ TILES = 2048
 """Sites to the side of a tile by default."""
 
 TAKEN = ("image", "source", "checksums", "work")
-"""Names in a store that no map has."""
+"""Reserved names in a store, which no map may have."""
 
 PathLike = str | os.PathLike[str]
 
 Ended = Callable[[list[Any], Any, Output, Any], object]
-"""Is called with the samples, the image, the rest of the output, and what the store keeps for it."""
+"""A function of the samples, the image, the rest of the output, and the ``command`` that the store keeps."""
 
 
 def synthesize(
@@ -67,7 +67,7 @@ def synthesize(
     command: Any = None,
     **options: Any,
 ) -> Any:
-    """Synthesise an output larger than one machine: the bytes of `simdtex.synthesize` with ``method="mrf"``.
+    """Synthesise an output larger than one machine, with the bytes of `simdtex.synthesize` with ``method="mrf"``.
 
     Parameters
     ----------
@@ -78,15 +78,16 @@ def synthesize(
     store : path
         Folder of the Zarr store to make, which every worker can reach. `resume` continues an interrupted run.
     tiles : int
-        Sites on a side of a tile. They determine the memory of a worker and not the result.
+        Sites on a side of a tile. The size determines the memory of a worker, and not the result.
     workers : int, str or distributed.Client, optional
         The workers that make the tiles: a number of processes on this machine, which share its cores; the address of a
         Dask scheduler; or a client. Each worker opens its own device. None: this process makes the tiles one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
     maps : dict, optional
-        Further maps of the material, of the sample's size: written in the same arrangement into arrays of these names.
-        Of several samples a list of such for each name, as in `simdtex.model.source_map.apply_source_map`.
+        Further maps of the material, of the sample's size, which are written in the same arrangement into arrays of
+        these names. With several samples a list of maps for each name, as in
+        `simdtex.model.source_map.apply_source_map`.
     mask, known, known_source, guide, rng
         As in `simdtex.synthesize`. This process copies known values and guides into the store.
     device : str, optional
@@ -96,13 +97,13 @@ def synthesize(
     note : callable, optional
         Receives a sentence while the run waits for workers. None: a warning.
     ended : callable, optional
-        ``ended(samples, image, output, command)`` is called when the output is written. ``samples`` are a list; image
-        and source map of the `simdtex.run.Output` are arrays of the store, a part of which is read when it is sliced.
-        If it raises an error, the run is not finished, and `resume` calls it again.
+        ``ended(samples, image, output, command)`` is called when the output is written. ``samples`` are a list; the
+        image, and the source map of the `simdtex.run.Output`, are arrays of the store; slicing reads a part. If it
+        raises an error, the run is not finished, and `resume` calls it again.
     command : optional
-        What the store keeps for ``ended``, of texts, numbers, lists and dicts.
+        Texts, numbers, lists and dicts that the store keeps for ``ended``.
     **options
-        Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
+        Options of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window like the whole.
 
     Returns
     -------
@@ -112,9 +113,9 @@ def synthesize(
     Raises
     ------
     ValueError, TypeError
-        An argument is wrong; the sentence says how.
+        An argument is invalid; the message names the remedy.
     DeviceError
-        Workers end one after another over the same tile.
+        One worker after another ends at the same tile.
 
     Notes
     -----
@@ -150,27 +151,27 @@ def resume(
     note: Callable[[str], None] | None = None,
     ended: Ended | None = None,
 ) -> Any:
-    """Resume an output that was stopped; the bytes are those of a run that was never stopped.
+    """Resume an interrupted output, and return it; the bytes are those of a run without an interruption.
 
     Parameters
     ----------
     store : path
-        As of `synthesize`.
+        As in `synthesize`.
     workers, device, callback, note, ended
-        As of `synthesize`; they may be others than before.
+        As in `synthesize`; they may differ from those of the first run.
     channel_axis : int, optional
-        Where the channels of the array that is returned are, if it has any.
+        The axis of the channels of the result, if it has any.
 
     Returns
     -------
     dask.array.Array, (rows, cols[, channels])
-        As of `synthesize`; also of an output that was finished before.
+        As in `synthesize`; also if the output is already finished.
 
     Raises
     ------
     ValueError
-        There is no such store, or one of another version, another process is at work in it, or a part of it is
-        damaged; the sentence says how to go on.
+        There is no such store, it has another version, another process is using it, or a part of it is damaged; the
+        message names the remedy.
     """
     opened = _opened(store)
     from simdtex.distributed.cluster import across, check_workers, connected, here
@@ -186,7 +187,7 @@ def resume(
                 each = here(opened, device) if client is None else across(client, opened, device, note or warn)
                 with _mending(opened):
                     image, output = drive(Tiles(opened, each), Reference(), opened.about["seed"], callback)
-                    for name in ("device", "device_seconds"):  # of the process that leads
+                    for name in ("device", "device_seconds"):  # of the leading process
                         del output.statistics[name]
                     if ended:
                         ended(opened.samples(), image, output, opened.about["command"])
@@ -215,7 +216,7 @@ def plan(
     Parameters
     ----------
     sample, shape, tiles, channel_axis, source_map, maps, **options
-        As of `synthesize`; ``mask``, ``known`` and the like may be among the options.
+        As in `synthesize`; the options may include ``mask``, ``known``, ``known_source`` and ``guide``.
 
     Returns
     -------
@@ -236,7 +237,7 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
 
 
 def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
-    """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
+    """Return further maps as lists, with one map for each picture of the sample; raise if they do not fit."""
     found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:
         raise ValueError("the maps have no values for known pixels, which are not from the sample; leave the maps out")
@@ -253,7 +254,7 @@ def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
 
 @contextmanager
 def _made(store: PathLike) -> Iterator[str]:
-    """Yield where to make a store, so that it exists completely or not at all."""
+    """Yield a path for making a store, so that it exists completely or not at all."""
     path = Path(store)
     if path.exists():
         raise ValueError(
@@ -266,7 +267,7 @@ def _made(store: PathLike) -> Iterator[str]:
 
 
 def _opened(path: PathLike) -> Any:
-    """Open a store; raise ValueError unless this version can go on with it."""
+    """Return the store at a path; raise ValueError unless this version can continue it."""
     require("distributed", "zarr", "dask")
     from simdtex.distributed.store import FORMAT, Store
 
@@ -289,9 +290,9 @@ def _opened(path: PathLike) -> Any:
 
 @contextmanager
 def _mending(store: Any) -> Iterator[None]:
-    """Raise a sentence that says how to go on if a part of a store is damaged or cannot be written.
+    """Raise an error that names the remedy if a part of a store is damaged or cannot be written.
 
-    The store then has gone back to where a damaged part is not needed.
+    The store has then returned to a turn that does not need the damaged part.
     """
     try:
         yield

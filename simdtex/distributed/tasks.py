@@ -21,7 +21,7 @@ from simdtex.ops.neighbourhood import Field
 
 @dataclass(frozen=True)
 class Context:
-    """What a process keeps from one tile to the next."""
+    """The data that a process keeps from one tile to the next."""
 
     store: Store
     work: Work
@@ -34,7 +34,7 @@ _one = Lock()
 
 
 def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """Return the context of a store, laid out on a device once."""
+    """Return the context of a store, which is put on a device once."""
     key = (where, name, device)
     if key not in _contexts:
         _contexts.clear()  # one at a time, which bounds the memory
@@ -46,14 +46,14 @@ def context(where: str, name: str, device: str | Machine | None) -> Context:
 
 
 def forget() -> None:
-    """Drop what is kept."""
+    """Drop the kept context."""
     _contexts.clear()
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
-    """Do a turn of a task's tiles, unless it is done and what it wrote is whole; return the number of the task.
+    """Execute a turn of a task's tiles, unless it is done and its data are undamaged; return the number of the task.
 
-    ``where`` and ``name`` are the store's path and own name, since another store may be there later.
+    ``where`` and ``name`` are the store's path and name, since the path may later hold another store.
     """
     with _one:
         here = context(where, name, device)

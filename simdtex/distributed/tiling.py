@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Algorithm 1 over a store, for the driver: a step is one turn, done to every tile by any process."""
+"""Algorithm 1 over a store, for the driver: a step is one turn of all tiles, executed by any processes."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
 
 Execute = Callable[[Turn, int], Iterator[int]]
-"""Does so many tasks of a turn, in any order, and yields the number of each that is done."""
+"""A function that executes the given number of tasks of a turn, in any order, and yields the number of each done."""
 
 SHOWN = 1024
-"""Sites to the side of the picture that a callback sees, at most."""
+"""The largest side of the picture of a callback, sites."""
 
 
 @dataclass(frozen=True)
 class Tiles:
-    """The plan of an output in tiles: its store, and what does the tiles."""
+    """The plan of an output in tiles: its store, and the function that executes tasks."""
 
     store: Store
     execute: Execute
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Lay out what the leading process needs: the sample, and a count for each of its candidates."""
+        """Return the run of the leading process, which has the sample and a count for each of its candidates."""
         return Run(self, machine)
 
 
 class Run:
-    """The turns of an output; the state is the present turn, which the store keeps."""
+    """The turns of an output; the state is the current turn, which the store keeps."""
 
     def __init__(self, tiles: Tiles, machine: Machine) -> None:
         self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work()
@@ -49,11 +49,11 @@ class Run:
         self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store, work))
 
     def begin(self) -> Turn:
-        """Return the turn that the store is at."""
+        """Return the current turn of the store."""
         return self.store.turn
 
     def step(self, turn: Turn, watch: Callable[..., None]) -> tuple[Turn, None]:
-        """Do a turn to all tiles, and return the next turn; a task that has finished it takes little time."""
+        """Execute a turn of all tiles, and return the next turn; tasks that have finished it take little time."""
         level = self.work.layout.levels[turn.level]
         self.store.prepare(turn, self.work, self._candidates(turn))
         for done, _ in enumerate(self.execute(turn, level.tasks), 1):
@@ -65,7 +65,7 @@ class Run:
         return turn.phase == "done"
 
     def result(self, turn: Turn, observer: Any) -> tuple[Any, Output]:
-        """Return the picture and its source map as arrays of the store, which are read when they are sliced."""
+        """Return the picture and its source map as arrays of the store; slicing reads them."""
         level = self.work.layout.levels[0]
         tiles = f"{level.count} tile{'s' * (level.count > 1)} of at most {level.side} x {level.side}"
         image, source = self.store.picture(turn, self.work)
@@ -78,7 +78,7 @@ class Run:
     load = save
 
     def observer(self, callback: Callback | None) -> Watch:
-        """Return what watches this run."""
+        """Return the observer of this run."""
         return Watch(self, callback)
 
     def _candidates(self, turn: Turn) -> int:
@@ -89,10 +89,10 @@ class Run:
         return int((places.everywhere if self.lattices.exhaustive(turn.level) else places.positions).size)
 
     def _complete(self, turn: Turn) -> Turn:
-        """Return the turn after a complete one, and have the store go on to it."""
+        """Return the turn after a complete one, which becomes the current turn of the store."""
         store, lattices, levels = self.store, self.lattices, self.work.layout.levels
         if turn.phase == "show":
-            return turn._replace(number=turn.number + 1, phase="done")  # which only `finish` notes
+            return turn._replace(number=turn.number + 1, phase="done")  # only `finish` notes it
         counts, active, temperature_sum = store.total(turn)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
@@ -120,7 +120,7 @@ class Watch:
         self._fraction = 0.0
 
     def part(self, turn: Turn, done: int) -> None:
-        """Report that so many tiles have finished a turn."""
+        """Report that ``done`` tiles have finished a turn."""
         if self._callback is None:
             return
         level = self._run.work.layout.levels[turn.level]
@@ -148,7 +148,7 @@ class Watch:
         """Do nothing: the store holds the state."""
 
     def _share(self, turn: Turn, level: LevelLayout, part: float) -> float:
-        """Return the share of the expected work that is done."""
+        """Return the finished share of the expected work."""
         cooled, free = (0.0, 0.0) if turn.phase == "begin" else (part, part)
         if turn.phase == "show":
             cooled = free = 1.0
@@ -161,7 +161,7 @@ class Watch:
         return fraction_done(self._expected, turn.level, cooled, free)
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
-        """Return every n-th site of the state before the turn, at most about `SHOWN` to the side."""
+        """Return every n-th site of the state before the turn, at most about `SHOWN` on a side."""
         sample, levels = self._run.lattices.sample, self._run.work.layout.levels
         number, step = turn.level + (turn.phase in ("begin", "whole")), -(-max(level.rows, level.cols) // SHOWN)
         if number == len(levels):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parallel schedules compared: the same job under each, its steps and times, how the picture moved, and the result."""
+"""Comparison of parallel schedules for the same job: steps and times, changes of the picture, and the result."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ FIGURES = (
     *("changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free"),
     *("plausibility", "coverage", "histogram_distance", "copying", "seam"),
 )
-"""The names of a run's figures; `compare` says what each is."""
+"""The names of a run's figures, see `compare`."""
 
 MEASURED = FIGURES[-5:]
-"""Those of `simdtex.experiments.quality`."""
+"""The names of the figures of `simdtex.experiments.quality`."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Sweep:
     phase : str
         ``"relax"`` until equilibrium, then ``"free"``.
     steps : int
-        Steps of the level until its end.
+        Steps of the level until the end of the sweep.
     before, left : float
-        Mean temperature of the level's sites when it began and when it ended, 0 to 1.
+        Mean temperature of the level's sites at the start and at the end of the sweep, 0 to 1.
     changed : float or None
-        Share of the level's sites whose pixel is another than a sweep ago; None in the first sweep.
+        Share of the level's sites whose pixel differs from that a sweep ago; None in the first sweep.
     returned : float or None
-        The oscillation index: share of the level's sites whose pixel is another than a sweep ago, and the same as two
+        The oscillation index: share of the level's sites whose pixel differs from that a sweep ago, and equals that two
         sweeps ago; None in the first two sweeps.
     """
 
@@ -77,11 +77,11 @@ class Recorder:
     Parameters
     ----------
     channel_axis : int, optional
-        Of the pictures.
+        The channel axis of the pictures.
     then : callable, optional
         Called with every progress, before it is recorded.
     wait : callable, optional
-        Called before the recorder's own time is taken; waits for the device.
+        Waits for the device; called before the recorder measures its own time.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Recorder:
 
 
 class Noted(Watched):
-    """A schedule that notes, level by level, whether it claims to keep equation (14)."""
+    """A wrapper that notes, level by level, whether a schedule claims to keep equation (14)."""
 
     def __init__(self, schedule: Schedule) -> None:
         super().__init__(schedule)
@@ -163,7 +163,7 @@ class Run:
     levels : list of dict
         As in `simdtex.run.Output.statistics`.
     accounting : dict
-        What the run would take on the processor array, as in `simdtex.run.Output.statistics`.
+        The cost of the run on the processor array, as in `simdtex.run.Output.statistics`.
     """
 
     schedule: str
@@ -181,7 +181,7 @@ class Run:
 
 
 def _figures(statistics: dict[str, Any], sweeps: Sequence[Sweep]) -> dict[str, float | None]:
-    """Return the figures of a run but those of its output and its wall time."""
+    """Return the figures of a run, except those of its output and its wall time."""
     levels = statistics["levels"]
     finest = next(level for level in levels if level["level"] == 0)
     found: dict[str, float | None] = {"device_seconds": statistics["device_seconds"]}
@@ -236,7 +236,7 @@ class Entry:
         return all(self.claims)
 
     def figure(self, name: str) -> Spread | None:
-        """Return one of `FIGURES` over the seeds; None if a run has none of it, or one that is not finite."""
+        """Return one of `FIGURES` over the seeds; None if a run lacks it, or if it is not finite."""
         values = tuple(value for run in self.runs if (value := run.figures[name]) is not None)
         if len(values) < len(self.runs) or not all(map(isfinite, values)):
             return None
@@ -258,7 +258,7 @@ class Comparison:
     options : dict
         All options of the method but the schedule.
     entries : tuple of Entry
-        In the order asked for.
+        One for each schedule, in the given order.
     """
 
     sample: NDArray[Any]
@@ -270,7 +270,7 @@ class Comparison:
     entries: tuple[Entry, ...] = field(repr=False)
 
     def results(self) -> dict[str, Any]:
-        """Return everything but the pictures, for JSON; the same for the same seeds but for times."""
+        """Return everything but the pictures, for JSON; except for times, the same for the same seeds."""
         return {
             "sample_shape": list(self.sample.shape),
             "shape": list(self.shape),
@@ -305,7 +305,7 @@ def compare(
     callback: Callable[[float, str, Relaxing], Any] | None = None,
     **options: Any,
 ) -> Comparison:
-    """Run the same job under several schedules, and measure each.
+    """Return a comparison of several schedules for the same job.
 
     Parameters
     ----------
@@ -314,42 +314,43 @@ def compare(
     shape : (int, int)
         Rows and columns of the outputs, each 9 or more.
     schedules : sequence of str or simdtex.schedules.Schedule
-        All of different names.
+        The schedules, with different names.
     seeds : sequence of int
-        One run of each schedule for every seed; all different.
+        The seeds, all different: one run of each schedule for every seed.
     channel_axis : int, optional
         As in `simdtex.synthesize`.
     device : str, optional
         As in `simdtex.synthesize`; all runs are on one machine.
     callback : callable, optional
-        ``callback(fraction, job, progress)``, called several times a second: the share of all runs that is done, 0 to
-        1, the present run in words, and where that stands. An exception ends the comparison.
+        ``callback(fraction, job, progress)``, called several times a second: the finished share of all runs, 0 to 1,
+        the current run in words, and its progress. An exception ends the comparison.
     **options
-        Of the method ``mrf``, see `simdtex.methods.mrf.Options`, which says what defaults differ in ``schedules``:
-        ``search`` is ``"exact"``, since a schedule is judged by the model, not by a list of candidates.
+        Options of the method ``mrf``, see `simdtex.methods.mrf.Options`, which lists the defaults that differ in
+        ``schedules``: ``search`` is ``"exact"``, so that the model decides and not a list of candidates.
 
     Returns
     -------
     Comparison
-        The same for the same seeds, but for times.
+        Except for times, the same for the same seeds.
 
     Raises
     ------
     ValueError, TypeError
-        As `simdtex.synthesize`; no schedules or no seeds, one of them twice; pictures of fewer than 9 x 9 pixels.
+        As in `simdtex.synthesize`; or there are no schedules or no seeds, one occurs twice, or a picture has fewer than
+        9 x 9 pixels.
 
     Notes
     -----
-    The figures of a run are, by name: ``steps``, ``sweeps`` and ``relaxations_per_site`` of the finest level until no
-    temperature was left; the same with ``all_`` over every level, relaxations per site of the finest. ``seconds``
+    The figures of a run are, by name: ``steps``, ``sweeps`` and ``relaxations_per_site`` of the finest level until all
+    temperatures were 0; the same with ``all_`` over every level, relaxations per site of the finest. ``seconds``
     and ``device_seconds``. ``utilisation`` of the processor array, 0 to 1, its ``passes``, and ``model_seconds``,
-    what a MasPar MP-1 would take by a model. ``changed_cooling`` and ``oscillation_cooling``: mean over
+    the time of a MasPar MP-1 by a model. ``changed_cooling`` and ``oscillation_cooling``: mean over
     the sweeps of the finest level until its equilibrium; ``changed_free`` and ``oscillation_free``: in its last free
-    sweep, the latter from two free sweeps on. ``plausibility``, ``coverage``, ``histogram_distance``, ``copying`` and
-    ``seam`` as in `simdtex.experiments.quality`.
+    sweep, the latter with at least two free sweeps. ``plausibility``, ``coverage``, ``histogram_distance``, ``copying``
+    and ``seam`` as in `simdtex.experiments.quality`.
 
-    A schedule says itself whether it keeps equation (14) on the lattice of each level; `simdtex.schedules.Checked`
-    checks the claim of your own. Before the first run of each schedule a small one is made, so that no time includes
+    A schedule claims whether it keeps equation (14) on the lattice of each level; `simdtex.schedules.Checked` checks
+    the claim of your own schedule. A small run precedes the first run of each schedule, so that no time includes
     building kernels.
 
     Cost: schedules x seeds runs of `simdtex.synthesize`, and about 1 s each for the quality. Memory: two pictures
@@ -378,7 +379,7 @@ def compare(
     machine = open_machine(device, profile=True)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
     found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in chosen}
-    turns = [(seed, name) for seed in keys for name in chosen]  # so that a change of the load affects all alike
+    turns = [(seed, name) for seed in keys for name in chosen]  # so that changes of the load affect all alike
     for number, (seed, name) in enumerate(turns):
 
         def report(progress: Relaxing, number: int = number, seed: int = seed, name: str = name) -> None:
@@ -397,7 +398,7 @@ def compare(
 
 @dataclass(frozen=True)
 class _Call:
-    """The job that every run does: the sample as given, its pixels with channels last, and the options."""
+    """The job of every run: the given sample, its pixels with channels last, and the options."""
 
     sample: NDArray[Any]
     pixels: NDArray[Any]
@@ -408,7 +409,7 @@ class _Call:
     def run(
         self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Callable[[Relaxing], None]
     ) -> tuple[Run, tuple[bool, ...], dict[str, Any]]:
-        """Return a run, at which levels the schedule claims equation (14), and the options as they were executed."""
+        """Return a run, the schedule's claim of equation (14) at each level, and the options as executed."""
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)
         image, said = self._synthesize(noted, seed, size, callback=recorder)
         made = image[..., None] if self.channel_axis is None else np.moveaxis(image, self.channel_axis, -1)
@@ -443,7 +444,7 @@ def _check_distinct(what: str, given: Sequence[Any]) -> None:
 
 
 def _check_sides(sample: tuple[int, ...], shape: tuple[int, int]) -> tuple[int, int]:
-    """Return the output's shape; raise unless both pictures are large enough to be measured."""
+    """Return the output's shape; raise unless both pictures are large enough for measurements."""
     if min(sample) < COPIED_PATCH:
         raise ValueError(
             f"the sample of {sample[0]} rows x {sample[1]} columns is too small to compare with; "

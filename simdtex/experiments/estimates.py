@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Energies of Markov chains against the exact one, with error bars."""
+"""Energies of Markov chains compared with the exact one, with error bars."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from simdtex.experiments.ising import Chains
 from simdtex.experiments.kaufman import torus_energy
 
 LEVEL = 0.001
-"""Probability that a table of correct results has one that differs."""
+"""Probability that at least one result of a table of correct results differs."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """Whether it agrees, in words."""
+        """Whether the energy agrees, in words."""
         return f"differs by {abs(self.sigmas):.0f} sigma" if self.differs else "agrees"
 
 
 def findings(runs: Sequence[Chains]) -> list[Finding]:
-    """Compare runs with the exact energy.
+    """Return a comparison of runs with the exact energy.
 
     Parameters
     ----------

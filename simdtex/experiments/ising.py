@@ -23,13 +23,13 @@ from simdtex.ops.snapshot import snapshot
 from simdtex.options import one_of, real, whole
 
 AT_ONCE = 2**22
-"""Relaxations in one launch at most, which bounds its time."""
+"""The most relaxations in one launch, which bounds its time."""
 
 HOST, MEASURED = 24, 40
 """Bytes on the host for each spin, and for each chain and sweep (benchmarks/memory.py)."""
 
 QUEUE = 2**16
-"""Steps in one launch of `ising_sequence` at most: one work-item does them all."""
+"""The most steps in one launch of `ising_sequence`, since one work-item executes all of them."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Experiment:
     Raises
     ------
     ValueError, TypeError
-        A value is out of range; the sentence names the remedy.
+        A value is out of range; the message names the remedy.
     """
 
     size: tuple[int, int]
@@ -96,9 +96,9 @@ class Chains:
     even, odd : (T, R, n) float64 array
         Mean spin of the sublattices whose row + column is even and odd.
     spins : (T, R, H, W) uint8 array
-        In the end, 0 down and 1 up.
+        The spins at the end, 0 down and 1 up.
     steps, relaxations, launches : int
-        Of the schedule; sites of all those steps, in one chain; kernels enqueued.
+        Steps of the schedule; sites of all those steps, in one chain; kernels enqueued.
     seconds : float
     """
 
@@ -116,7 +116,7 @@ class Chains:
 
     @property
     def magnetisation(self) -> NDArray[np.float64]:
-        """(T, R, n) mean spin."""
+        """The mean spin, (T, R, n)."""
         height, width = self.spins.shape[-2:]
         even = (height * width + 1) // 2
         whole: NDArray[np.float64] = (self.even * even + self.odd * (height * width - even)) / (height * width)
@@ -131,7 +131,7 @@ def ising(
     seed: int = 1,
     callback: Callable[[float], Any] | None = None,
 ) -> Chains:
-    """Relax Ising spins by a schedule, and measure after every sweep.
+    """Relax Ising spins by a schedule, and return measurements after every sweep.
 
     Parameters
     ----------
@@ -146,8 +146,8 @@ def ising(
     Notes
     -----
     Each step draws the spins of its sites from their conditional distributions, P(up) = 1 / (1 + exp(-2 S / T)) for
-    neighbours that sum to S. The energy is -(1/N) times the sum over bonds of the product of their spins. The same bits
-    on every machine.
+    neighbours that sum to S. The energy is -(1/N) times the sum over bonds of the product of their spins. The bits are
+    the same on every machine.
 
     Cost: sweeps x sites x chains draws, and reading back the spins after every sweep that is measured. Steps of one
     site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
@@ -203,7 +203,7 @@ class _Run:
         return spins
 
     def sweep(self) -> None:
-        """Relax by the schedule until it says that a sweep has ended."""
+        """Relax by the schedule until the end of a sweep."""
         if self.schedule.tile:  # tiles see one another as they were before the sweep
             self.spins = snapshot(self.machine, self.spins, self.grid.height)
         last = False
@@ -221,7 +221,7 @@ class _Run:
         self._relax_single()
 
     def _relax(self, info: schedules.Info) -> None:
-        """Relax the sites of a step, every old value read before the first new one is written."""
+        """Relax the sites of a step; all old values are read before the first new one is written."""
         grid, most = replace(self.grid, tile=self.schedule.tile), max(1, AT_ONCE // self.chains)
         relaxed = []
         for k in range(0, info.sites.size, most):
@@ -233,7 +233,7 @@ class _Run:
             self.spins = ising_commit(self.machine, self.spins, sites, drawn)
 
     def _relax_single(self) -> None:
-        """Do the postponed steps."""
+        """Execute the postponed steps."""
         most = min(QUEUE, max(1, 4 * AT_ONCE // self.chains))
         for k in range(0, len(self.single), most):
             part = self.machine.put(np.array(self.single[k : k + most], np.uint32).view(np.int32))
@@ -257,7 +257,7 @@ def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
 
 
 def _measure(spins: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Return (3, chains): the energy, and the mean spins of the even and the odd sublattice."""
+    """Return the energy, and the mean spins of the even and the odd sublattice, (3, chains)."""
     now = 2 * spins.astype(np.int8) - 1
     parity = np.indices(now.shape[1:]).sum(0) % 2
     field = sum(np.roll(now, by, axis) for axis in (1, 2) for by in (1, -1))

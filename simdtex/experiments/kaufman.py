@@ -19,7 +19,7 @@ HOTTEST = 1e6
 """Above this temperature 1 / T is lost in sums of order 1."""
 
 COLDEST = 0.05
-"""Below this temperature the energy is -2 to the last bit: the first excitation weighs exp(-8 / T)."""
+"""Below this temperature the energy is -2 to the last bit: the weight of the first excitation is exp(-8 / T)."""
 
 
 def torus_energy(temperature: float, rows: int, cols: int) -> float:

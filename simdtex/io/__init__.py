@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures and volumes in and out."""
+"""Reading and writing of pictures, volumes, tables, grids and realisations."""

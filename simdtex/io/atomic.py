@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one writer: a file or folder is written completely or not at all, and a checked file carries its SHA-256.
 
-While it is written it has a hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, and is
-renamed at the end. A killed process leaves its hidden file, which a later write into the folder removes after a day.
+An incomplete file has a hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, and is renamed
+at the end. A killed process leaves its hidden file, which a write into the folder removes when it is a day old.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ PathLike = str | os.PathLike[str]
 
 _HIDDEN = re.compile(r"\.simdtex-[0-9a-f]{16}(\..*)?")
 _LEFT = 86400.0
-"""Age in seconds from which on a hidden file is one that a killed process has left."""
+"""Age in seconds above which a hidden file was left by a killed process."""
 
 _HEADER = b"simdtex sha256 %s\n"
 _HEADER_SIZE = len(_HEADER % (b"0" * 64))
 
 
 class NotWritten(ValueError):
-    """A file or folder could not be written; the sentence names it and a remedy."""
+    """A file or folder could not be written; the message names it and a remedy."""
 
 
 class Damaged(ValueError):
@@ -43,16 +43,15 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
     is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed,
-    and the new file has the permissions of the old one. Raises ValueError if
-    `check_target` does, and NotWritten if the block or the renaming raises OSError, for example because the disk is
-    full.
+    and the new file has the permissions of the old one. Raises ValueError if `check_target` does, and NotWritten if the
+    block or the renaming raises OSError, for example because the disk is full.
     """
     check_target(Path(path))
     target = Path(os.path.realpath(path))
     temporary, replaced = _hidden(target), target.exists()
     try:
         _remove_leftovers(target)
-        # not tempfile, which would leave the finished file readable by its owner alone
+        # not tempfile, whose file would be readable only by its owner
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if replaced else 0o666))
         yield temporary
         _sync(temporary)
@@ -69,8 +68,8 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
-    An existing folder `path` is replaced as a whole at the end, and the new one has its permissions; the caller checks
-    whether it may be. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    An existing folder `path`, which the caller has checked, is replaced as a whole at the end, and the new one has its
+    permissions. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
     Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
@@ -101,7 +100,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
     except OSError as error:
         raise _not_written(path, error) from None
     finally:
-        for _ in range(20):  # threads of a library may write for a while after Ctrl-C, as those of Zarr do
+        for _ in range(20):  # threads of a library, such as Zarr's, may write for a while after Ctrl-C
             if not temporary.exists():
                 break
             shutil.rmtree(temporary, ignore_errors=True)
@@ -111,7 +110,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
 
 
 def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
-    """Write a file atomically, with a line in front that holds the SHA-256 of its content.
+    """Write a file atomically, with a first line that holds the SHA-256 of its content.
 
     ``write`` writes the content into a binary file from its current position on. Errors are those of `atomic_path`.
     """
@@ -129,7 +128,7 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
 
 
 def write_durable(path: Path, data: Any) -> None:
-    """Write bytes into a file atomically and make its folders; all of it is on the disk at the end.
+    """Write bytes into a file atomically, and make its folders; everything is on the disk at the end.
 
     Errors are those of `atomic_path`.
     """
@@ -145,7 +144,7 @@ def write_durable(path: Path, data: Any) -> None:
 
 
 def read_checked(path: PathLike) -> BinaryIO:
-    """Open a file that `write_checked` has written, at the beginning of its content; the caller closes it.
+    """Return a file that `write_checked` has written, open at the beginning of its content; the caller closes it.
 
     Raises Damaged unless the SHA-256 is that of the content, and OSError if the file cannot be read.
     """
@@ -162,14 +161,14 @@ def read_checked(path: PathLike) -> BinaryIO:
 
 
 class Unbuffered:
-    """A file without ``fileno``: NumPy writes to a real file past Python, and misses that the disk is full."""
+    """A file without ``fileno``, to which NumPy writes through Python: otherwise it does not notice a full disk."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self.write = file.write
 
 
 def _sync(path: Path, flags: int = os.O_RDWR) -> None:
-    """Flush a file to the disk, which may report only now that it is full."""
+    """Flush a file to the disk, which may not report before that it is full."""
     descriptor = os.open(path, flags)
     try:
         os.fsync(descriptor)
@@ -204,7 +203,7 @@ def check_target(target: Path) -> None:
 
 
 def check_folder_writable(target: Path) -> None:
-    """Raise ValueError unless the folder that holds `target`, a link followed, is writable."""
+    """Raise ValueError unless the folder that holds `target`, after following a link, is writable."""
     if not os.access(os.path.dirname(os.path.realpath(target)), os.W_OK | os.X_OK):
         raise ValueError(f"the folder {target.parent} is not writable: choose another folder")
 
@@ -212,9 +211,9 @@ def check_folder_writable(target: Path) -> None:
 def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[Path]:
     """Return the files of an earlier run in a folder, by name; raise before long work unless it can be written.
 
-    The folder may exist if it holds files of its own kind only: ``own(name)`` says whether an earlier run may have
-    written a file. ``what`` names in messages what is written there, as ``"the report"``. Unfinished files of a killed
-    process are left to the atomic writer.
+    The folder may exist if it holds only files of its own kind: ``own(name)`` returns whether an earlier run may have
+    written a file. ``what`` is the content of the folder in messages, for example ``"the report"``. Unfinished files of
+    a killed process are left to the atomic writer.
     """
     try:
         if folder.is_dir():
@@ -225,7 +224,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
             raise ValueError(f"the folder {folder.parent} does not exist: create it first")
         else:
             with suppress(FileNotFoundError):
-                os.lstat(folder)  # raises for a name that is too long, which `exists` hides since Python 3.14
+                os.lstat(folder)  # raises for a too long name, which `exists` hides since Python 3.14
             found = []
     except OSError as error:
         raise ValueError(f"{folder} cannot be written ({error.strerror}): give another folder") from None
@@ -238,14 +237,14 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
 
 
 def _not_written(path: PathLike, error: OSError) -> NotWritten:
-    number = error.errno or errno.ENOSPC  # NumPy and others do not say why only a part was written
+    number = error.errno or errno.ENOSPC  # NumPy and others give no reason if only a part was written
     remedy = "free some space" if number in (errno.ENOSPC, errno.EDQUOT) else "choose another path"
     return NotWritten(f"{os.fspath(path)} could not be written ({os.strerror(number)}): {remedy}")
 
 
 @contextmanager
 def exclusive(path: PathLike) -> Iterator[None]:
-    """Lock a file or folder against other processes, by a hidden file beside it; ValueError if another one holds it.
+    """Lock a file or folder by a hidden file beside it; raise ValueError if another process holds the lock.
 
     The lock ends with the block or the process. It has no effect on Windows and on file systems without locks.
     """
@@ -278,15 +277,15 @@ def _hidden(target: Path) -> Path:
 
 
 def is_leftover(path: Path) -> bool:
-    """Return whether a path is that of an unfinished write, begun more than a day ago."""
+    """Return whether a path is an unfinished file, started more than a day ago."""
     try:
         return bool(_HIDDEN.fullmatch(path.name)) and time.time() - path.stat().st_mtime > _LEFT
-    except OSError:  # it has been renamed meanwhile
+    except OSError:  # it has meanwhile been renamed
         return False
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove what killed processes have left in the target's folder."""
+    """Remove unfinished files of killed processes in the target's folder."""
     for entry in target.parent.iterdir():
         if is_leftover(entry):
             if entry.is_dir():

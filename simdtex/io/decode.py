@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Decoding of picture files: each format by the library that keeps its values."""
+"""Decoding of picture files: each format by a library that preserves its values."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from simdtex.io.limits import check_array, check_size, read_npy
 Array = NDArray[Any]
 
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
-"""The only Pillow readers in use: others start programs, for example that of PostScript."""
+"""The only Pillow readers in use, since some others start programs, for example the one of PostScript."""
 
 ORIENTATION = 0x0112
 """The EXIF and TIFF tag of the orientation."""
 
 _KEPT = (0x010E, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
-"""The EXIF tags that are kept beside exposure and place: description, camera, software, date, author, rights."""
+"""EXIF tags that are kept in addition to exposure and place: description, camera, software, date, author, rights."""
 
 _SIZE = (0xA002, 0xA003)
 """The EXIF tags of width and height."""
@@ -44,17 +44,17 @@ _PILLOW = Lock()
 
 
 class Metadata(NamedTuple):
-    """What a picture file says beside its pixels.
+    """The data of a picture file other than its pixels.
 
     Attributes
     ----------
     profile : bytes, optional
-        The ICC profile, which says what colours the values are.
+        The ICC profile, which defines the colours of values.
     dpi : (float, float), optional
         Pixels per inch, across and down.
     exif : bytes, optional
-        Camera, exposure, date, place, author and rights; without the orientation, which is applied, the size and the
-        preview.
+        Camera, exposure, date, place, author and rights; without the orientation, which is applied, and without size
+        and preview.
     more : bool
         Whether the file has further frames or pages, which are not read.
     """
@@ -66,16 +66,16 @@ class Metadata(NamedTuple):
 
 
 NOTHING = Metadata()
-"""What a file says that has pixels alone."""
+"""The metadata of a file that has only pixels."""
 
 Decoded = tuple[Array, Metadata]
 
 
 def decode(data: bytes, most: int) -> Decoded:
-    """Decode the bytes of a picture file of at most so many pixels; the format is recognised by its content.
+    """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel; and what the file says of it. Raise TooLarge before anything is decoded, and each decoder's
+    opaque alpha channel; and the metadata of the file. Raise TooLarge before anything is decoded, and each decoder's
     own errors for a damaged file.
     """
     with _quiet():
@@ -104,8 +104,8 @@ def _quiet() -> Iterator[None]:
 
 
 def _opened(data: bytes, most: int) -> PIL.Image.Image:
-    """Return the picture, of which only the header has been read, if it is within the limits."""
-    with _PILLOW:  # Pillow has a limit of its own, one for the whole process
+    """Return the picture, with only its header read, if it is within the limits."""
+    with _PILLOW:  # Pillow has its own limit for the whole process
         before, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
         try:
             picture = PIL.Image.open(io.BytesIO(data), formats=FORMATS)
@@ -117,7 +117,7 @@ def _opened(data: bytes, most: int) -> PIL.Image.Image:
 
 
 def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
-    """Decode PGM or PPM, text or binary, of which Pillow changes the values unless their largest is 255 or 65535."""
+    """Return decoded PGM or PPM, text or binary; Pillow changes values unless the maximum is 255 or 65535."""
     kind, width, height, largest = (int(word) for word in header.groups())
     if not 0 < largest < 65536:
         raise ValueError(f"its largest value is {largest}, not 1 to 65535")
@@ -152,9 +152,9 @@ def _read_pillow(data: bytes, most: int) -> Decoded:
 
 
 def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
-    """Return the orientation of a picture of Pillow, and what its file says beside its pixels."""
+    """Return the orientation of a picture of Pillow, and the metadata of its file."""
     orientation, exif, more, profile = 1, None, False, picture.info.get("icc_profile")
-    with suppress(Exception):  # a damaged second frame is no reason to refuse the first
+    with suppress(Exception):  # a damaged second frame does not invalidate the first
         more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
     with suppress(Exception):  # nor is damaged EXIF
         found, kept = picture.getexif(), PIL.Image.Exif()
@@ -179,7 +179,7 @@ def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
 
 
 def _in_rgb(picture: PIL.Image.Image) -> PIL.Image.Image:
-    """Return a CMYK picture in sRGB, by its colour profile if it has one that can be used."""
+    """Return a CMYK picture in sRGB, by its colour profile if that can be used."""
     converted = None
     if found := picture.info.get("icc_profile"):
         from PIL import ImageCms
@@ -214,14 +214,14 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
         kind, compression = int(page.photometric), int(page.compression)
         orientation = int(page.tags.valueof(ORIENTATION, 1))
         metadata = Metadata(page.iccprofile)
-        with suppress(Exception):  # a damaged resolution or second page is no reason to refuse the first
+        with suppress(Exception):  # a damaged resolution or second page does not invalidate the first
             told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
             dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
             metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
             pixels, found = _read_pillow(data, most)
-            return pixels, metadata._replace(profile=found.profile)  # none of print colours
+            return pixels, metadata._replace(profile=found.profile)  # without that of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()
@@ -242,7 +242,7 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
 
 
 def _divided(pixels: Array) -> Array:
-    """Return pixels whose colours were multiplied by their alpha with the colours themselves, 0 where alpha is 0."""
+    """Return pixels with their colours divided by alpha, by which they were multiplied; 0 where alpha is 0."""
     full = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     alpha = pixels[..., -1:].astype(np.float64)
     colours = pixels[..., :-1] * np.divide(full, alpha, out=np.zeros_like(alpha), where=alpha > 0)
@@ -260,7 +260,7 @@ def _check_page(page: Any, most: int) -> None:
 
 
 def _finished(pixels: Array, orientation: int, alpha: bool) -> Array:
-    """Return the pixels upright, and without their last channel if it is alpha and opaque everywhere."""
+    """Return the pixels upright, without the last channel if it is alpha and opaque everywhere."""
     if alpha:
         opaque = 1 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max
         if (pixels[..., -1] == opaque).all():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Grids of cells in the files of geostatistics: the text of GSLIB and Geo-EAS, and the binary grids of SGeMS.
+"""Grids of cells in file formats of geostatistics: the text of GSLIB and Geo-EAS, and the binary grids of SGeMS.
 
 An array of values has the axes (z, y, x), each in ascending order of its coordinate: row 0 is the smallest y, as in the
-files, whose values are x fastest, then y, then z. The origin is the centre of the first cell.
+files, where x varies fastest, then y, then z. The origin is the centre of the first cell.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
 SUFFIXES = (".gslib", ".sgems")
-"""How the name of a grid that is written ends; a file that is read is recognised by its first lines."""
+"""The suffixes for writing grids; files to read are recognised by their first lines."""
 
 MISSING = (-999.0, -9999.0, -997799.0, -9966699.0, -9999999.0)
-"""Numbers that stand for an unknown value: those of GSLIB, grids of maps, MPSlib, SGeMS, and DeeSse."""
+"""Numbers for an unknown value: those of GSLIB, grids of maps, MPSlib, SGeMS, and DeeSse."""
 
 NO_DATA = -9966699
-"""What is written for an unknown value, which is SGeMS's own."""
+"""The number that is written for an unknown value, that of SGeMS."""
 
 MAGIC = b"\xb2\x11\x17\x5d"
 
@@ -44,14 +44,14 @@ _BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
 _WHOLE = (np.uint8, np.int16, np.int32)
 _SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
 _FAR = 1e30
-"""The largest coordinate, which is far within 32-bit floats."""
+"""The largest coordinate, far below the largest 32-bit float."""
 
 _LINE = 2**14
-"""Bytes of a line of a header, at most."""
+"""The most bytes of a line of a header."""
 
 
 class Frame(NamedTuple):
-    """Where cells lie: the centre of the first and the size of each, (x, y) or (x, y, z)."""
+    """The position of cells: the centre of the first and the size of each, (x, y) or (x, y, z)."""
 
     origin: tuple[float, ...]
     cell: tuple[float, ...]
@@ -64,8 +64,8 @@ class CartesianGrid:
     Attributes
     ----------
     values : dict of str to ndarray, (nz, ny, nx)
-        Each variable by its name, in the order of the file. Whole numbers are of the smallest type of uint8, int16 and
-        int32 that holds them; others are float64 from a text and float32 from SGeMS. NaN is unknown.
+        The variables by name, in the order of the file. Integers have the smallest type of uint8, int16 and int32 that
+        holds them; all other numbers are float64 from a text and float32 from SGeMS. NaN is unknown.
     origin : (x, y, z)
         The centre of the first cell.
     cell : (x, y, z)
@@ -78,7 +78,7 @@ class CartesianGrid:
 
 
 def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:
-    """Check where cells lie; None is 0 for the origin and 1 for the size of a cell."""
+    """Check the position of cells, and return it; None is 0 for the origin and 1 for the size of a cell."""
     first = None if origin is None else _numbers("origin", origin)
     size = None if cell is None else _numbers("cell", cell)
     axes = len(first or size or "xy")
@@ -103,7 +103,7 @@ def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
 
 
 def kind_of(path: PathLike) -> str | None:
-    """Return what a file is by its first lines: ``"grid"``, ``"points"`` for a point set of Geo-EAS, or None."""
+    """Return the kind of a file by its first lines: ``"grid"``, ``"points"`` for a point set of Geo-EAS, or None."""
     if not os.path.isfile(path):
         return None
     try:
@@ -116,19 +116,19 @@ def kind_of(path: PathLike) -> str | None:
     words = second.split()
     if len(words) not in (1, 4, 10, 11) or not words[0].isdigit():
         return None
-    if len(words) > 1:  # else a table whose rows have as many numbers
+    if len(words) > 1:  # otherwise a table with that number of columns
         return None if len(third.split()) == len(words) and _all_numbers(third.split()) else "grid"
     return "grid" if _of_title(_text(title)) else "points"
 
 
 def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels: int | None = None) -> CartesianGrid:
-    """Read a grid of GSLIB or Geo-EAS (text) or of SGeMS (binary), recognised by its content.
+    """Return the grid in a file of GSLIB or Geo-EAS (text) or of SGeMS (binary), recognised by its content.
 
     Parameters
     ----------
     path : path
         A text: a title, the number of variables, their names, each in a line, and a value of each variable for each
-        cell, x fastest, then y, then z. Or a Cartesian grid that SGeMS has saved. The notes describe the headers.
+        cell, x fastest, then y, then z. Or a Cartesian grid saved by SGeMS. The notes describe the headers.
     missing : iterable of float
         Numbers that mean an unknown value; they become NaN.
     max_pixels : int, optional
@@ -149,14 +149,14 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     -----
     A text gives the number of cells in one of three ways:
 
-    * its first line is ``nx ny nz``, as of MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as of DeeSse and geone: sizes of
+    * its first line is ``nx ny nz``, as in MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as in DeeSse and geone: sizes of
       a cell, and the corner of the grid, half a cell before the first centre;
-    * its second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz``, as of GSLIB: the
+    * its second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz``, as in GSLIB: the
       centre of the first cell, and sizes; a last number is that of realisations, which follow each other;
-    * its title ends in ``(NXxNYxNZ)``, as of SGeMS.
+    * its title ends in ``(NXxNYxNZ)``, as in SGeMS.
 
-    Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats, of which the
-    shortest decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
+    Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats; origin and size
+    are the shortest decimal numbers with these values. Regions and groups of SGeMS are ignored.
     """
     with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
         binary = file.read(len(MAGIC)) == MAGIC
@@ -166,11 +166,11 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
 
 
 Read = tuple[dict[str, Array], tuple[int, ...], Frame]
-"""Columns of values by their names, nx ny nz, and where the cells lie."""
+"""Columns of values by name, nx ny nz, and the position of the cells."""
 
 
 def _typed(column: Array, missing: NDArray[np.float64]) -> Array:
-    """Return a column with NaN for unknown values, or as integers if all are known and whole."""
+    """Return a column with NaN for unknown values, or as integers if all values are known integers."""
     unknown = np.isnan(column) | np.isin(column, missing)
     if unknown.any():
         return np.where(unknown, column.dtype.type(np.nan), column)
@@ -182,7 +182,7 @@ def _typed(column: Array, missing: NDArray[np.float64]) -> Array:
 
 
 def _gslib(file: BinaryIO, most: int) -> Read:
-    """Read the text of a grid."""
+    """Return the columns of a grid's text."""
     file.seek(0)
     title, second = (_text(file.readline(_LINE)) for _ in range(2))
     words = second.split()
@@ -211,7 +211,7 @@ def _gslib(file: BinaryIO, most: int) -> Read:
 
 
 def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int]:
-    """Return nx ny nz, where cells lie, and the number of realisations, from the first two lines of a text."""
+    """Return nx ny nz, the position of cells, and the number of realisations, from the first two lines of a text."""
     found = words[1:] or _of_title(title)
     if found is None or len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
         raise ValueError(
@@ -225,7 +225,7 @@ def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int
     else:
         size = found[3:6] or ["1"] * 3
         corners = [Decimal(word) for word in found[6:9]] or [-Decimal(word) / 2 for word in size]
-        lies = Frame(  # in decimals: a binary sum would move 0.1
+        lies = Frame(  # in decimals, since a binary sum would change 0.1
             tuple(float(corner + Decimal(word) / 2) for corner, word in zip(corners, size, strict=True)),
             tuple(map(float, size)),
         )
@@ -233,7 +233,7 @@ def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int
 
 
 def _of_title(title: str) -> list[str] | None:
-    """Return the numbers that a title says of a grid, at least nx ny nz; None if it does not."""
+    """Return the numbers of a grid in its title, at least nx ny nz; None if there are none."""
     words = title.split()
     if len(words) in (3, 6, 9) and _all_numbers(words):
         return words
@@ -242,7 +242,7 @@ def _of_title(title: str) -> list[str] | None:
 
 
 def number_of(word: Any) -> float | None:
-    """Return the number that a word is, or None."""
+    """Return the number in a word, or None."""
     try:
         return float(word)
     except ValueError:
@@ -254,7 +254,7 @@ def _all_numbers(words: Iterable[Any]) -> bool:
 
 
 def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.float64]:
-    """Return the numbers of a text from here to its end, `count` of them; `line` is the number of the first line."""
+    """Return the ``count`` numbers of a text from here to its end; ``line`` is the number of the first line."""
     found, at, last = np.empty(count), 0, b"\n"
     while lines := file.readlines(2**20):
         text, last = b"".join(lines), lines[-1][-1:]
@@ -280,7 +280,7 @@ def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.floa
 
 
 def _apart(names: list[str]) -> list[str]:
-    """Return names that differ: one that comes again gets a number."""
+    """Return distinct names: a repeated name gets a number."""
     found: dict[str, None] = {}
     for number, name in enumerate(names):
         found[name if name not in found else f"{name}_{number}"] = None
@@ -292,7 +292,7 @@ def _text(data: bytes) -> str:
 
 
 def _sgems(file: BinaryIO, most: int) -> Read:
-    """Read a binary grid of SGeMS, from behind its magic number on."""
+    """Return the columns of a binary grid of SGeMS, read from after its magic number."""
     length = os.fstat(file.fileno()).st_size
 
     def take(form: str) -> tuple[Any, ...]:
@@ -347,8 +347,8 @@ def write_grid(
     path : path
         ``.gslib``, a text, or ``.sgems``. An existing file is replaced.
     values : mapping of str to array_like, (nz, ny, nx) or (ny, nx)
-        Each variable by its name. NaN or masked is unknown, and is written as -9966699. A text keeps every digit; SGeMS
-        has 32-bit floats, to which larger floats are rounded.
+        The variables by name. NaN or masked is unknown, and is written as -9966699. A text keeps every digit; SGeMS has
+        32-bit floats, to which longer floats are rounded.
     origin : (x, y) or (x, y, z), optional
         The centre of the first cell. None is 0.
     cell : (x, y) or (x, y, z), optional
@@ -364,7 +364,7 @@ def write_grid(
     Notes
     -----
     The first line of a text is ``nx ny nz sx sy sz ox oy oz`` with the corner of the grid, half a cell before the first
-    centre, as `read_grid` says.
+    centre, see `read_grid`.
     """
     arrays: dict[str, np.ma.MaskedArray[Any, Any]] = {str(name): np.ma.asanyarray(one) for name, one in values.items()}
     lies = check_grid(path, arrays.values(), origin, cell)
@@ -384,7 +384,7 @@ def write_grid(
 def check_grid(
     path: PathLike, arrays: Iterable[Any], origin: Sequence[float] | None, cell: Sequence[float] | None
 ) -> Frame:
-    """Check before a long run that such values and such an origin can be written; return where the cells lie."""
+    """Check before a long run that such values and origin can be written; return the position of the cells."""
     target = Path(path)
     if _suffix(path) not in SUFFIXES:
         raise ValueError(f"{target} names no format of grids: end its name in one of {', '.join(SUFFIXES)}")
@@ -403,7 +403,7 @@ def check_grid(
 
 
 def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
-    """Raise unless a format holds these values."""
+    """Raise unless the format can hold the values of ``array``."""
     check_real("the grid", array)
     known = array.compressed()
     wrong = np.isin(known, MISSING) if known.dtype.kind != "b" else np.zeros(known.shape, bool)
@@ -439,7 +439,7 @@ def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame)
 
 
 def _words(row: np.ma.MaskedArray[Any, Any]) -> list[str]:
-    """Return each value by the fewest digits that say it."""
+    """Return each value as the shortest text that represents it."""
     data = row.data.astype(np.uint8) if row.dtype == bool else row.data
     found: list[str] = np.where(_unknown(row), str(NO_DATA), data.astype(str)).tolist()
     return found

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hard data: values known at points, read from a table and placed on the cells of a grid or the pixels of a picture.
+"""Hard data: known values at points, read from a table and placed in the cells of a grid or the pixels of a picture.
 
 x grows with the column, y with the row, and z with the layer. Without an origin and a size of cells they are in pixels:
-(0, 0) is the centre of the first pixel, of row 0. NaN is an unknown value.
+(0, 0) is the centre of the first pixel, in row 0. NaN is an unknown value.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
 
 SEVERAL = ("refuse", "mean", "most")
-"""What becomes of data of one cell that differ."""
+"""The treatments of different data in one cell."""
 
 _AXES = tuple(re.compile(rf"{axis}(?:$|[^a-z]|loc|coord)", re.IGNORECASE) for axis in "xyz")
-"""How columns of coordinates are called: x, Xlocation, X_coord, x (m), but not Zn."""
+"""The names of columns of coordinates: x, Xlocation, X_coord, x (m), but not Zn."""
 
 
 @dataclass(frozen=True, eq=False)
 class HardData:
-    """A table of known values, a row for each datum; `len` is the number of data.
+    """A table of known values with a row for each datum; `len` is the number of data.
 
     Attributes
     ----------
     points : ndarray of float64, (data, 2) or (data, 3)
         x and y, or x, y and z, of each datum, in the units of the file.
     values : ndarray of float64, (data, variables)
-        NaN if a variable is unknown.
+        The values of each datum, NaN if unknown.
     names : tuple of str
         The name of each variable.
     lines : tuple of int, or None
-        The line of the file that each datum is from, counted from 1; None if it is from no text.
+        The line of each datum in the file, counted from 1; None if it is not from a text.
     """
 
     points: Floats
@@ -61,12 +61,12 @@ class HardData:
         return len(self.points)
 
     def where(self, row: int) -> str:
-        """Name a datum by its line in the file, or by its row, counted from 0."""
+        """Return words for a datum: its line in the file, or its row, counted from 0."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
 
 def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData:
-    """Read a table of known values.
+    """Return the table of known values in a file.
 
     Parameters
     ----------
@@ -74,30 +74,30 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
         separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
         line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x
-        and y is a header, which names the variables; if it calls the third of four or more columns z, that is the third
-        coordinate. From ``#`` to the end of a line is a comment.
+        and y is a header, which names the variables; if the third of four or more columns is called z, it is the third
+        coordinate. A comment extends from ``#`` to the end of the line.
 
         Or a point set of Geo-EAS, recognised by a second line of one number: a title, the number of columns, their
         names, each in a line, and a datum in each line, with blanks between numbers. The first columns are x and y and,
-        if it is called so, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
+        if its name is z, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     max_pixels : int, optional
-        The most cells, or bytes of a text, that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most cells, or bytes of a text, to read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
     HardData
-        The rows in the order of the file. Variables without a name are ``value``, or ``value 1`` and so on.
+        The data in the order of the file. Variables without a name are ``value``, or ``value 1`` and so on.
 
     Raises
     ------
     ValueError
-        The file is missing, no table, too large, has no rows, or a row is wrong; the message names the line.
+        The file is missing, not a table, too large, has no rows, or has an invalid row; the message names the line.
 
     Notes
     -----
-    About 8 s for a million rows of text.
+    Cost: about 8 s for a million rows of text.
     """
     binary = Path(path).suffix.lower() == ".npy"
     with reading(path, "the hard data", max_pixels, each=BYTES if binary else 1) as most:
@@ -112,7 +112,7 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
 
 
 def _parsed(text: Iterable[str]) -> HardData:
-    """Parse the lines of a table or of a point set."""
+    """Return the data in the lines of a table or of a point set."""
     lines = iter(text)
     first = list(islice(lines, 2))
     if len(first) == 2 and re.fullmatch(r"\s*[0-9]{1,9}\s*", first[1]):
@@ -138,7 +138,7 @@ def _parsed(text: Iterable[str]) -> HardData:
 
 
 def _point_set(columns: int, lines: Iterable[str]) -> HardData:
-    """Parse a point set of Geo-EAS from its third line on."""
+    """Return the data of a point set of Geo-EAS, parsed from its third line on."""
     numbered = enumerate(lines, 3)
     names = [line.strip() for _, line in islice(numbered, columns)]
     if columns < 3:
@@ -184,7 +184,7 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
 
 
 def _check_order(header: Sequence[str]) -> None:
-    """Raise unless a header that names x and y has them in front."""
+    """Raise unless x and y are the first columns of a header that names both."""
     names = [name.lower() for name in header]
     if ("x" in names and names[0] != "x") or ("y" in names and names[1] != "y") or names[0] in ("row", "rows"):
         raise ValueError(
@@ -198,7 +198,7 @@ def _names(variables: int, header: Sequence[str] | None = None) -> tuple[str, ..
 
 
 def _table(array: Any) -> HardData:
-    """Convert an array of rows."""
+    """Return the data of an array of rows."""
     try:
         numbers = np.ma.asarray(array)
     except ValueError:
@@ -221,14 +221,14 @@ def place_hard_data(
     cell: Sequence[float] | None = None,
     several: str = "refuse",
 ) -> np.ma.MaskedArray:
-    """Place known values on the cells of a grid, or the pixels of a picture.
+    """Return known values placed in the cells of a grid, or in the pixels of a picture.
 
     Parameters
     ----------
     table : HardData or array_like, (data, 3 or more)
         x, y and the value of each datum, or one value for each of several variables; NaN is unknown. x grows with the
         column, y with the row and z with the layer. A datum belongs to the cell that contains it; on the border of two
-        cells, to that of the larger coordinate (without `origin` and `cell`, 1.5 goes to 2, -0.5 to 0).
+        cells, to the cell with the larger coordinate (without `origin` and `cell`, 1.5 goes to 2, -0.5 to 0).
     shape : (rows, cols) or (layers, rows, cols)
         The size of the grid. With two numbers, z of the data, if any, must be in the only layer.
     dtype : dtype, optional
@@ -321,7 +321,7 @@ def _mean(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.int
 
 
 def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
-    """Return each site once, with the most frequent of its values; of several, the first."""
+    """Return each site once, with the most frequent of its values; the first of equally frequent ones."""
     _, kinds = np.unique(values, return_inverse=True)
     pairs, first, counts = np.unique(sites * len(values) + kinds, return_index=True, return_counts=True)
     order = np.lexsort((first, -counts, pairs // len(values)))
@@ -359,12 +359,12 @@ def _sites(
 
 
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
-    """Return the values in another type; unknown ones are 0."""
+    """Return the values in the type ``kind``; unknown values are 0."""
     values = np.where(np.isnan(data.values), 0.0, data.values)
     found, wrong = cast(values, kind)
     wrong |= np.isinf(values)
     if kind.kind in "iu":
-        wrong |= np.abs(values) >= 2**53  # float64, which the table was read as, may have rounded these
+        wrong |= np.abs(values) >= 2**53  # the float64 of the table may have rounded these
     if wrong.any():
         row, variable = (int(k) for k in np.argwhere(wrong)[0])
         remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers below 2**53"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading, checking and writing of pictures, which never changes a value.
+"""Reading, checking and writing of pictures, without a change of any value.
 
 A picture is an array (rows, cols) or (rows, cols, channels), row 0 at the top. 8-bit, 16-bit and float pixels keep
 their type from the file to the synthesis and back. Pillow reads and writes the 8-bit formats, tifffile every TIFF, and
@@ -55,9 +55,9 @@ class Image:
     pixels : ndarray, (rows, cols) or (rows, cols, channels)
         The values of the file, in native byte order.
     channel_axis : None or -1
-        None for a grey picture of two axes, -1 for one with channels last.
+        None for a grey picture with two axes, -1 for a picture with channels last.
     metadata : Metadata
-        What the file says beside the pixels: `write` takes it.
+        The metadata of the file, for `write`.
     """
 
     pixels: Array
@@ -66,7 +66,7 @@ class Image:
 
 
 def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
-    """Read a picture file, whose format is recognised by its content and not by its name.
+    """Return the picture in a file, whose format is recognised by its content and not by its name.
 
     Parameters
     ----------
@@ -80,11 +80,11 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     Returns
     -------
     Image
-        Pixels keep their 8-bit, 16-bit, integer or float values; those of PGM and PPM are the numbers in the file,
-        uint8 if the largest that it allows is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by
-        their colour profile if they have one; 1-bit becomes uint8 0 and 255. A fully opaque alpha channel is dropped;
-        any other is kept as the last channel, and colours that were multiplied by it (TIFF) are divided by it. The
-        orientation that a camera noted (EXIF) is applied.
+        Pixels keep their 8-bit, 16-bit, integer or float values. PGM and PPM give the numbers in the file, as uint8 if
+        the maximum in its header is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by their
+        colour profile if they have one; 1-bit becomes uint8 0 and 255. A fully opaque alpha channel is removed; any
+        other is kept as the last channel, and colours that were multiplied by it (TIFF) are divided by it. The
+        orientation in the EXIF data of a camera is applied.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:
-    """Read a picture from the bytes of its file, as `read` does; messages call it `name`."""
+    """Return a picture from the bytes of its file, as `read` does; messages call it ``name``."""
     most = max_pixels_or_default(max_pixels)
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
@@ -128,7 +128,7 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
 
 
 def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-    """Separate a picture from its alpha channel, if it has one.
+    """Return a picture without its alpha channel, if any, and the mask of its transparent pixels.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     Returns
     -------
     pixels : ndarray, (rows, cols) or (rows, cols, channels)
-        The picture without alpha, its values unchanged: (rows, cols) of two channels, (rows, cols, 3) of four.
+        The picture without alpha, its values unchanged: (rows, cols) from two channels, (rows, cols, 3) from four.
     transparent : ndarray of bool, (rows, cols)
-        Where alpha is below half of full scale (255 in 8 bits, 65535 in 16, 1 in floats), or NaN.
+        True where alpha is below half of full scale (255 in 8 bits, 65535 in 16, 1 in floats), or NaN.
 
     Raises
     ------
@@ -162,17 +162,17 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None) -> NDArray[np.bool_]:
-    """Read a picture as a mask.
+    """Return the mask in a picture file.
 
     Parameters
     ----------
     path : path
-        A picture as for `read`, grey or colour. Full scale is 255 in 8 bits and 65535 in 16, but 1 of bool, of
-        floats, and of integers that are all 0 or 1.
+        A picture as in `read`, grey or colour. Full scale is 255 in 8 bits and 65535 in 16, but 1 for bool, floats,
+        and integers that are all 0 or 1.
     shape : (rows, cols)
-        The size it must have; further axes are ignored.
+        The required size; further axes are ignored.
     max_pixels : int, optional
-        As for `read`.
+        As in `read`.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
     Raises
     ------
     ValueError
-        The file cannot be read as by `read`, or has another size.
+        `read` cannot read the file, or it has another size.
     """
     pixels = read(path, max_pixels=max_pixels).pixels
     rows, cols = shape[:2]
@@ -197,15 +197,15 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
 
 
 def _half(dtype: np.dtype[Any]) -> float:
-    """Return half of full scale; of integers it lies between two of them."""
+    """Return half of full scale, which for integers lies between two of them."""
     return np.iinfo(dtype).max / 2 if dtype.kind in "iu" else 0.5
 
 
 def as_array(name: str, values: Any) -> Array:
-    """Return array-likes as an ndarray, or as a masked array if that is what they are.
+    """Return an array-like as an ndarray, or a masked one as a masked array.
 
-    The arrays of other libraries, such as xarray and dask, are taken whole, their axes by position. Raises ValueError
-    if rows have unequal lengths, and TypeError if NumPy cannot take the array, for example from a GPU.
+    Arrays of other libraries, such as xarray and dask, are converted as a whole, with their axes by position. Raises
+    ValueError if rows have unequal lengths, and TypeError if NumPy cannot convert the array, for example from a GPU.
     """
     if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
         values = values.compute()
@@ -222,7 +222,7 @@ def as_array(name: str, values: Any) -> Array:
 
 
 def cast(values: Array, dtype: DTypeLike) -> tuple[Array, NDArray[np.bool_]]:
-    """Return values in another type, and where it cannot hold them: integers must be exact, floats finite."""
+    """Return values in another type, and the mask of those that it cannot hold: integers inexact, floats infinite."""
     with np.errstate(invalid="ignore", over="ignore"):
         found = values.astype(dtype)
     if found.dtype.kind == "f":
@@ -235,24 +235,24 @@ AXES = {2: "(rows, cols)", 3: "(layers, rows, cols)"}
 
 
 def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False, axes: int = 2) -> Array:
-    """Check that an array can serve as a sample, and move its channels to the end.
+    """Return a sample with its channels last; raise if the array cannot be one.
 
     Parameters
     ----------
     array : array_like
-        As many axes as `axes` says if `channel_axis` is None, else one more. bool, any integer and any real float type.
-        An xarray or dask array is taken whole, its axes by position.
+        `axes` axes if `channel_axis` is None, else one more. bool, any integer and any real float type. An xarray or
+        dask array is converted as a whole, with its axes by position.
     channel_axis : int or None
         The axis that holds the channels; negative counts from the end.
     unknown : bool
-        Whether floats may be NaN and values masked, which means that they are unknown; the mask is dropped.
+        Whether values may be unknown: NaN in floats, or masked; the result has no mask.
     axes : {2, 3}
         2: a picture (rows, cols); 3: a volume (layers, rows, cols).
 
     Returns
     -------
     ndarray, ([layers,] rows, cols, channels)
-        The values with their type, contiguous and in native byte order; a view of the input if it is so already.
+        The values with their type, contiguous and in native byte order; a view of the input if possible.
 
     Raises
     ------
@@ -296,13 +296,13 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Return rows and columns of WIDTHxHEIGHT, as ``640x480`` for 640 columns and 480 rows, or of a square's side."""
+    """Return rows and columns from WIDTHxHEIGHT, for example ``640x480``: 480 rows, 640 columns; or a square's side."""
     width, height = parse_sides(text, "WIDTHxHEIGHT")
     return height, width
 
 
 def parse_sides(text: str, form: str) -> tuple[int, ...]:
-    """Return the sides that a text names in the order of a form such as WIDTHxHEIGHT; one number is that of all."""
+    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; a single number gives all sides."""
     sides, words = form.split("x"), re.split(r"\s*[xX\u00d7]\s*", text.strip())
     if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
         example = "x".join(("640", "480", "100")[: len(sides)])
@@ -311,7 +311,7 @@ def parse_sides(text: str, form: str) -> tuple[int, ...]:
 
 
 def pixels_of(name: str, values: Any, axes: int = 2) -> Array:
-    """Return a picture's values as an array, after checking their type and axes; with 3 ``axes`` a volume's."""
+    """Return the values of a picture, or of a volume with 3 ``axes``, as an array; raise for a wrong type or axes."""
     pixels = as_array(name, values)
     unmasked(name, pixels)
     check_real(name, pixels)
@@ -322,13 +322,13 @@ def pixels_of(name: str, values: Any, axes: int = 2) -> Array:
 
 
 class Format(NamedTuple):
-    """The types and the numbers of channels that a format holds without loss; None is any."""
+    """The types and the numbers of channels that a format holds without loss; None allows any."""
 
     types: frozenset[str] | None
     channels: tuple[int, ...] | None
 
     def holds(self, dtype: DTypeLike | None, channels: int | None) -> bool:
-        """Return whether the format holds such values; None is not checked."""
+        """Return whether the format holds values of this type and number of channels; None is not checked."""
         return (dtype is None or self.types is None or np.dtype(dtype).name in self.types) and (
             channels is None or self.channels is None or channels in self.channels
         )
@@ -362,7 +362,7 @@ _MARKER = 65533
 """The most bytes of EXIF that a JPEG holds."""
 
 _BIG = 2**32 - 2**25
-"""Bytes from which on a TIFF must be a BigTIFF."""
+"""The size in bytes from which a TIFF must be a BigTIFF."""
 
 
 def check_writable(
@@ -372,10 +372,10 @@ def check_writable(
     *,
     suffixes: Collection[str] | None = None,
 ) -> None:
-    """Raise ValueError before a long run unless its result can be written; nothing is created now.
+    """Raise ValueError before a long run unless its result can be written, without creating a file.
 
     The file must be writable and its suffix name a format that holds pixels of this type and number of channels; None
-    is not checked. For files that are no pictures, `suffixes` are the allowed ones, and only these are checked.
+    is not checked. For other files than pictures, `suffixes` are the allowed ones, and only these are checked.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -389,7 +389,7 @@ def check_writable(
 
 
 def holds_all(path: PathLike, dtype: DTypeLike, channels: int) -> bool:
-    """Return whether the format of a path's suffix is one that is written, and changes no such pixel."""
+    """Return whether the format of a path's suffix can be written, and holds such pixels without loss."""
     suffix = Path(path).suffix.lower()
     return suffix in _FORMATS and suffix not in LOSSY and _FORMATS[suffix].holds(dtype, channels)
 
@@ -424,15 +424,15 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG are
         grey and colour with alpha; WebP turns grey into equal RGB.
     metadata : Metadata, optional
-        What `read` found beside the pixels. PNG, TIFF, JPEG and WebP keep the colour profile, if it is one of as many
-        channels; PNG, JPEG and WebP the EXIF; and all but WebP and ``.npy`` the pixels per inch.
+        The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels;
+        PNG, JPEG and WebP the EXIF data; and all but WebP and ``.npy`` the pixels per inch.
 
     Raises
     ------
     TypeError
         The values are not real numbers.
     ValueError
-        The path cannot be written, or its format cannot hold such pixels; the message names one that can.
+        The path cannot be written, or its format cannot hold such pixels; the message names a suitable format.
     """
     pixels = pixels_of("the picture", array)
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
@@ -460,7 +460,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
 
         data = imagecodecs.png_encode(pixels)
         said = pillow_bytes(PIL.Image.new("RGB" if pixels.ndim == 3 else "L", (1, 1)), "PNG", **beside)
-        head = 33  # bytes of the signature and the header; what Pillow says of colours and size follows it
+        head = 33  # bytes of the signature and the header; Pillow's chunks on colours and size follow
         path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
     elif suffix in (".tif", ".tiff"):
         write_tiff(path, [pixels], metadata)
@@ -470,7 +470,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
 
 
 def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
-    """Return a picture in a format of Pillow, which does not notice that a full disk has taken only a part."""
+    """Return the bytes of a picture in a format of Pillow, which itself would not notice a full disk."""
     buffer = io.BytesIO()
     picture.save(buffer, format=kind, **options)
     return buffer.getvalue()
@@ -500,16 +500,16 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:
-    """Return a colour profile if it is one of grey or of RGB and the picture has as many channels, alpha apart."""
+    """Return a profile of grey or RGB if the picture has that number of channels, not counting alpha, else None."""
     space = {1: b"GRAY", 2: b"GRAY", 3: b"RGB ", 4: b"RGB "}.get(channels)
     return profile if profile and profile[16:20] == space else None
 
 
 def profile_name(profile: bytes | None) -> str:
-    """Return the name of a colour profile; without one, colours are taken for sRGB."""
+    """Return the name of a colour profile; without a profile, colours are sRGB."""
     if profile is None:
         return "sRGB"
-    from PIL import ImageCms  # loaded only for pictures that have one
+    from PIL import ImageCms  # loaded only for pictures with a profile
 
     try:
         name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(profile))).strip()
@@ -519,11 +519,11 @@ def profile_name(profile: bytes | None) -> str:
 
 
 def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> NDArray[np.uint8]:
-    """Convert pixels of any shape and type to 8 bits for a preview.
+    """Return pixels of any shape and type in 8 bits for a preview.
 
-    uint8 is returned unchanged, bool as 0 and 255. Of other types `limits` are the values shown as 0 and 255, None
-    those of `array`; values outside are clipped, and all are mid-grey if the limits are equal. The sample's smallest
-    and largest value make all previews of a run agree.
+    uint8 is returned unchanged, bool as 0 and 255. For other types `limits` are the values shown as 0 and 255, None:
+    those of `array`. Values outside are clipped, and all are mid-grey if the limits are equal. With the sample's
+    smallest and largest value as `limits`, all previews of a run agree.
     """
     pixels = np.asarray(array)
     if pixels.dtype == np.uint8:

@@ -20,17 +20,17 @@ from simdtex.options import whole
 PathLike = str | os.PathLike[str]
 
 VARIABLE = "SIMDTEX_MAX_PIXELS"
-"""The environment variable that sets how many pixels a file may have."""
+"""The environment variable with the most pixels of a file."""
 
 PIXELS = 2**27
 """The default limit: pixels of a picture or of a source map, cells of a table."""
 
 BYTES = 8
-"""A file may unpack to this many bytes for each allowed pixel."""
+"""The most bytes to which a file may unpack, for each allowed pixel."""
 
 
 class TooLarge(ValueError):
-    """A file exceeds a limit; the message continues after the file's name."""
+    """A file exceeds a limit; the message starts after the file's name."""
 
 
 def max_pixels_or_default(max_pixels: int | None) -> int:
@@ -47,7 +47,7 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
 
 
 def check_size(pixels: int, unpacked: int, most: int, each: int = BYTES) -> None:
-    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more than `each` bytes for so many pixels."""
+    """Raise TooLarge if ``pixels`` exceeds ``most``, or the ``unpacked`` bytes exceed ``most`` times ``each``."""
     for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", each * most)):
         if count > limit:
             raise TooLarge(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
@@ -60,7 +60,7 @@ def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
 
 
 def size_of_file(name: str, what: str) -> int:
-    """Return the bytes of a file; raise unless it is a regular one; `what` names it, for example ``"the image"``."""
+    """Return the size of a file in bytes; raise unless it is a regular file. ``what`` names it, as ``"the image"``."""
     try:
         found = os.stat(name)
     except FileNotFoundError:
@@ -76,10 +76,10 @@ def size_of_file(name: str, what: str) -> int:
 
 @contextmanager
 def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
-    """Check a file and yield how many pixels may be read; errors of the block name the file and a remedy.
+    """Check a file and yield the most pixels to read; errors of the block name the file and a remedy.
 
     ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. With ``kind``
-    any error is one of a library that finds the file damaged, which is no ``kind`` then.
+    any error comes from a library for which the file is damaged, and the message says that it is no ``kind``.
     """
     name, most = os.fspath(path), max_pixels_or_default(max_pixels)
     size = size_of_file(name, what)
@@ -101,7 +101,7 @@ def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BY
 
 
 def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:
-    """Read an ``.npy`` array of `length` bytes, header included, if it is within the limits."""
+    """Return an ``.npy`` array of ``length`` bytes, including its header, if it is within the limits."""
     begin = file.tell()
     version = np.lib.format.read_magic(file)
     try:
@@ -123,7 +123,7 @@ def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:
 
 
 def read_npz(path: PathLike, name: str, most: int) -> NDArray[Any]:
-    """Read the array called `name` from an ``.npz`` file, if it is within the limits."""
+    """Return the array ``name`` of an ``.npz`` file, if it is within the limits."""
     with zipfile.ZipFile(path) as archive:
         member = archive.getinfo(f"{name}.npy")
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):

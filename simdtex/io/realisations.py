@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing the realisations of a simulation, and reading NetCDF: by xarray, as plain NumPy arrays, or as a grid.
+"""Writing the realisations of a simulation, by xarray, as NumPy arrays, or as a grid; and reading NetCDF.
 
 Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns. The extra ``simulate`` installs the libraries:
 ``pip install 'simdtex[simulate]'``.
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["check_realisations_path", "read_netcdf", "write_realisations"]
 
 MARK = "simdtex_realisations"
-"""Attribute of a Zarr store that was written here, which lists its arrays; only such a store is replaced."""
+"""The attribute that lists the arrays of a Zarr store written here; only a store with it is replaced."""
 
 PathLike = str | os.PathLike[str]
 
@@ -44,8 +44,8 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
     Raises
     ------
     ValueError
-        The suffix is unknown, or is of a grid and there is a source map; the folder is missing or not writable, `path`
-        is something else than what would be replaced, or a library is not installed.
+        The suffix is unknown, or is that of a grid and there is a source map; the folder is missing or not writable,
+        `path` exists and may not be replaced, or a library is not installed.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -75,16 +75,16 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     path : path
         ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed), which ``xarray.open_dataarray`` reads;
         or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
-        ``.gslib`` (text) and ``.sgems`` are grids of which each realisation is a variable, called by the array's name,
-        ``__real`` and its number, as SGeMS does: `simdtex.write_grid`; they keep origin and size of cells, and no
-        attributes, and cells outside of the coordinate ``region`` are unknown values there. An existing file is
-        replaced, and a Zarr store if it was written here and nothing was added; its attribute ``simdtex_realisations``
-        lists its arrays.
+        ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
+        ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
+        attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and a
+        Zarr store if it was written here and nothing was added; its attribute ``simdtex_realisations`` lists its
+        arrays.
     array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
-        What `simdtex.simulate` returns; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
-        x), and its coordinates must be evenly spaced and ascend. ``.zarr`` and ``.nc`` alone need xarray. A Dataset is
-        that of ``source=True``: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by name, and a grid
-        cannot hold it.
+        The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
+        x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
+        ``source=True`` the result is a Dataset: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by
+        name, and a grid cannot hold it.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
 
 
 def _own(store: Path) -> bool:
-    """Return whether a folder holds what `write_realisations` wrote, and nothing else."""
+    """Return whether a folder holds only what `write_realisations` wrote."""
     try:
         wrote = json.loads((store / "zarr.json").read_text())["attributes"][MARK]
         return sorted(os.listdir(store)) == sorted([*wrote, "zarr.json"])
@@ -135,20 +135,20 @@ def _own(store: Path) -> bool:
 
 
 def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
-    """Read the variables of a NetCDF 4 file that have the axes y and x, or z, y and x, as a grid.
+    """Return the variables of a NetCDF 4 file with the axes y and x, or z, y and x, as a grid.
 
     Parameters
     ----------
     path : path
-        Coordinates z, y and x, if there are any, are evenly spaced and ascend.
+        The file. Its coordinates z, y and x, if any, are evenly spaced and ascend.
     max_pixels : int, optional
         The most values of a variable that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
     CartesianGrid
-        Values (nz, ny, nx) in the file's types, of the variables with the axes of the first; the centre of the first
-        cell, and the size of a cell.
+        Values (nz, ny, nx) in the file's types, for all variables with the axes of the first such variable; the centre
+        of the first cell, and the size of a cell.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def _variables(array: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _axis(array: Any, axis: str) -> tuple[float, float]:
-    """Return the first coordinate along an axis and the size of a cell, which is that of the attribute if there is."""
+    """Return the first coordinate along an axis, and the size of a cell, which is that of the attribute, if any."""
     if axis not in array.coords:
         return 0.0, float(array.attrs.get(f"cell_{axis}", 1.0))
     values = np.atleast_1d(np.asarray(array.coords[axis].values, np.float64))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading and writing of volumes, which never changes a value.
+"""Reading and writing of volumes, without a change of any value.
 
 A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
 picture with row 0 at the top. x is the column, y the row, z the depth.
@@ -30,7 +30,7 @@ __all__ = ["check_writable", "is_volume", "read", "write"]
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
-# "" is a folder of slices
+# "" means a folder of slices
 _FORMATS = {
     ".npz": Format(None, None),
     ".npy": Format(None, None),
@@ -43,10 +43,10 @@ _SLICE = re.compile(r"slice-([0-9]{3,})\.png")
 
 
 def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
-    """Raise ValueError before a long run unless its result can be written; nothing is created now.
+    """Raise ValueError before a long run unless its result can be written, without creating a file.
 
     The file or folder of slices must be writable, and its suffix name a format that holds values of this type and
-    number of channels; None is not checked. A folder is only replaced if it contains nothing but slices.
+    number of channels; None is not checked. A folder is only replaced if it contains only slices.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -65,7 +65,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
 
 
 def is_volume(path: PathLike) -> bool:
-    """Return whether a file holds a volume: ``.nrrd``, a TIFF of several pages, or a ``.npy`` of four axes."""
+    """Return whether a file holds a volume: ``.nrrd``, a TIFF with several pages, or a ``.npy`` with four axes."""
     suffix = Path(path).suffix.lower()
     try:
         if suffix in (".tif", ".tiff"):
@@ -74,18 +74,18 @@ def is_volume(path: PathLike) -> bool:
         if suffix == ".npy":
             return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) == 4
     except (OSError, ValueError, tifffile.TiffFileError):
-        return False  # the reader of pictures says what is wrong
+        return False  # the reader of pictures reports the error
     return suffix == ".nrrd"
 
 
 def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
-    """Read a volume.
+    """Return the volume in a file.
 
     Parameters
     ----------
     path : path
-        ``.nrrd`` of three axes, x fastest, or four, with variables before x; a TIFF of several pages, a layer each;
-        or a ``.npy`` of shape (layers, rows, cols, variables).
+        ``.nrrd`` with three axes, x fastest, or four, with variables before x; a TIFF with a page for each of several
+        layers; or a ``.npy`` of shape (layers, rows, cols, variables).
     max_pixels : int, optional
         The most values that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
@@ -97,7 +97,7 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
     Raises
     ------
     ValueError
-        The file is missing, damaged, no volume, or too large.
+        The file is missing, damaged, not a volume, or too large.
     """
     name, suffix = os.fspath(path), Path(path).suffix.lower()
     with reading(path, "the volume", max_pixels, kind="a volume") as most:
@@ -134,13 +134,13 @@ def write(path: PathLike, volume: ArrayLike) -> None:
     TypeError
         The values are not real numbers.
     ValueError
-        The path cannot be written, or its format cannot hold such values; the message names one that can.
+        The path cannot be written, or its format cannot hold such values; the message names a suitable format.
 
     Notes
     -----
-    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file x runs fastest, then
+    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file x varies fastest, then
     y, then z, with the channels as a vector before them, as ParaView, 3D Slicer and Fiji expect. It is not compressed,
-    because not every version of ParaView decompresses.
+    because not every version of ParaView can read compressed files.
     """
     values = image.pixels_of("the volume", volume, 3)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
@@ -158,11 +158,11 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
     elif suffix == ".npy":
         image.encode(path, suffix, values)
     elif suffix == ".nrrd":
-        # without the fields of a space: VTK would read the sizes of a vector volume wrongly after them
+        # without the fields of a space, after which VTK misreads the sizes of a vector volume
         header = {"encoding": "raw", "kinds": ["vector"] * (values.ndim - 3) + ["domain"] * 3}
         written = io.BytesIO()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd asks for the time in an old way
+            warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd gets the time by a deprecated call
             nrrd.write(written, values, header, index_order="C")
         # without the line of pynrrd that holds the time: the same volume is the same file
         before, _, after = written.getvalue().partition(b"# on ")

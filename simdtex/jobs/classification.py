@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which texture is where in a picture: `classify`, and `TextureClassifier`, which is trained once."""
+"""Classification of the textures in a picture: `classify`, and `TextureClassifier`, which is trained once."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def classify(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Label each pixel of a picture with the texture around it, or as unknown.
+    """Return a label for each pixel of a picture: the texture around it, or unknown.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def classify(
     Notes
     -----
     Equation (6) with the bandwidth of the nearest neighbour, of whole neighbourhoods, at up to three levels, raw and
-    with compressed contrast; a Potts field of labels; and Hotelling's test for the unknown: see
-    ``docs/classification.rst``. The same labels on every device. A turned, enlarged or differently lit texture is
-    another texture, and strips narrower than the coupling vanish.
+    with compressed contrast; a Potts field of labels; and Hotelling's test for unknown textures: see
+    ``docs/classification.rst``. The labels are the same on every device. A turned, enlarged or differently lit texture
+    is another texture, and strips narrower than the coupling vanish.
 
     Cost: pixels x exemplars x classes x 66 multiply-adds for each band; 512x512 pixels and five classes take some 5 s
     on two cores. Memory: 48 bytes for each pixel and class, 90 for each pixel, and 100 MB.
@@ -179,7 +179,7 @@ def _region(name: str, sample: Any, mask: Any, like: NDArray[Any], channel_axis:
 
 
 def _painted(painted: Sequence[tuple[NDArray[Any], Mask, Any]]) -> dict[int, list[Region]]:
-    """Return the regions of each label that was painted over pictures (pixels, unknown, labels), in ascending order."""
+    """Return the regions of each painted label, in ascending order; ``painted`` holds (pixels, unknown, labels)."""
     regions: dict[int, list[Region]] = {}
     for pixels, unknown, labels in painted:
         numbers = real_array("the training regions", labels)
@@ -256,7 +256,7 @@ class TextureClassifier:
         return {"channel_axis": self.channel_axis, "rng": self.rng, "device": self.device, **self.options}
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set arguments of the constructor, and return the classifier; it is trained as it was until `fit`."""
+        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`."""
         for name, value in parameters.items():
             if name in ("channel_axis", "rng", "device"):
                 setattr(self, name, value)
@@ -272,7 +272,7 @@ class TextureClassifier:
         image : array, or list of arrays
             Pictures of one type, as in `classify`.
         labels : (rows, cols) array of integers, or list of arrays
-            For each picture: 1 or more where a pixel is of a class, and 0 elsewhere.
+            For each picture the class of each pixel, 1 or more, and 0 elsewhere.
 
         Raises
         ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What data say of each cell, without a simulation: `estimate`."""
+"""The distribution at each cell given data, without a simulation: `estimate`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray
 
 MOST = 64
-"""Data that a cell looks at, at most."""
+"""The most data for a cell."""
 
 
 def estimate(
@@ -45,7 +45,7 @@ def estimate(
     bandwidth: float = 1.0,
     device: str | None = None,
 ) -> xarray.Dataset:
-    """Estimate the probability of each category at each cell, or mean and variance, from data: the LCPDF.
+    """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def estimate(
     categorical : bool
         Whether values are categories.
     nearest : int
-        Number of data for a cell, the nearest, 0 to 64.
+        Number of nearest data for a cell, 0 to 64.
     reach : int, optional
         Largest distance of a datum, in cells. None: an eighth of the smaller side of the training image.
     bandwidth : float
@@ -71,9 +71,9 @@ def estimate(
     Returns
     -------
     xarray.Dataset
-        Dimensions ``y`` and ``x``, with coordinates as of `simdtex.simulate`. With `categorical` the variables
+        Dimensions ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the variables
         ``probability`` (category, y, x), float64, which adds up to 1, and ``entropy`` (y, x) in bits; else ``mean`` and
-        ``variance`` (y, x) in the units of the training image. A cell with a datum is certain of it.
+        ``variance`` (y, x) in the units of the training image. A cell with a datum has its value with certainty.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fill the holes of a picture from the rest of it, and extend it: `fill`, and `extend`."""
+"""Filling the holes of a picture from the rest of it, and extending a picture: `fill` and `extend`."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ if TYPE_CHECKING:
     from simdtex.methods.typed_options import ExtendOptions, FillOptions
 
 REACH = 128
-"""How far around its window a hole is filled from, at least, pixels."""
+"""The least distance around its window from which a hole is filled, pixels."""
 
 LEAST = 16
-"""Candidates at the coarsest level of a hole, at least: what is known around it tells the layout."""
+"""The fewest candidates at the coarsest level of a hole, since its known surroundings determine the layout."""
 
 GIVEN = 100
-"""Bytes on the host for each pixel of what is extended, with what is known of it, at least."""
+"""The least bytes on the host for each pixel of an extended picture, with its known values."""
 
 MANY = 2**17
-"""Candidates at the coarsest level of a hole at most, all of which a site weighs."""
+"""The most candidates at the coarsest level of a hole; a site evaluates all of them."""
 
 FEW = 16
-"""Windows that are made one by one; where holes are in more places, one window holds them all."""
+"""The most windows that are filled one by one; holes in more places are in a single window."""
 
 
 class Window(NamedTuple):
-    """A part of a picture that is a lattice of its own: its rows and columns, and its number of levels."""
+    """A part of a picture with a separate lattice: its rows and columns, and its number of levels."""
 
     rows: slice
     cols: slice
@@ -59,18 +59,19 @@ class Window(NamedTuple):
 def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     """Return windows that hold the holes of a picture and the neighbourhoods of their sites, from top to bottom.
 
-    ``hole`` (rows, cols) is true somewhere, ``radius`` is that of a neighbourhood, and ``levels`` the number of them;
-    None: so many that at the coarsest a site in the middle of its hole sees the rim. Windows that overlap are one.
+    ``hole`` (rows, cols) is True somewhere, ``radius`` is that of a neighbourhood, and ``levels`` the number of levels.
+    With None, the neighbourhood of a site in the middle of its hole reaches the rim at the coarsest level. Overlapping
+    windows are joined.
     """
     deepest = ndimage.distance_transform_cdt(np.pad(hole, 1), metric="chessboard")[1:-1, 1:-1]
     wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
-    around = radius * 2 ** min(wanted - 1, 32) + 1  # which is more than any picture has
+    around = radius * 2 ** min(wanted - 1, 32) + 1  # larger than any picture
     near = ndimage.distance_transform_cdt(~hole, metric="chessboard") <= around
     found: list[tuple[slice, slice]] = []
     while len(boxes := ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])) != len(found):
         found = boxes
         for box in found:
-            near[box] = True  # what lies in the bend of a hole may be another's
+            near[box] = True  # the bend of a hole may contain another hole
     area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
     if len(found) > FEW or area > near.size // 2:
         rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
@@ -104,7 +105,7 @@ def fill(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Fill the holes of a picture with the texture around them.
+    """Return a picture with its holes filled with the texture around them.
 
     Parameters
     ----------
@@ -193,7 +194,7 @@ def extend(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Continue a picture beyond its edges, or make it seamless.
+    """Return a picture that is continued beyond its edges, or seamless.
 
     Parameters
     ----------
@@ -246,7 +247,7 @@ def extension(
     band: int | None,
     options: dict[str, Any],
 ) -> tuple[mrf.Plan, dict[str, Any]]:
-    """Return the plan of a run of `extend`, and its input by the names that users give it."""
+    """Return the plan of a run of `extend`, and its input by the parameters' names."""
     pixels = check_sample(image, channel_axis)
     rows, cols = pixels.shape[:2]
     for name, value in sides.items():
@@ -288,9 +289,9 @@ def extension(
 
 
 class Made(NamedTuple):
-    """The result of a window: where its sample begins in the picture, and values, temperatures and sources of its hole.
+    """The result of a window: values, temperatures and sources of its hole, and the statistics of its run.
 
-    ``statistics`` are those of its run.
+    ``corner`` is the first pixel of its sample in the picture.
     """
 
     corner: tuple[int, int]
@@ -301,7 +302,7 @@ class Made(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """The whole picture, (rows, cols, channels), its temperatures and its source map, as far as they are made."""
+    """The whole picture so far, (rows, cols, channels), its temperatures and its source map."""
 
     image: NDArray[Any]
     temperature: NDArray[np.float64]
@@ -311,8 +312,8 @@ class Whole(NamedTuple):
 class Around(NamedTuple):
     """The sample of a window.
 
-    ``corner`` is its first pixel in the picture; ``place`` says where in it the window's pixels are, None if it is a
-    texture of its own.
+    ``corner`` is its first pixel in the picture; ``place`` is the position of the window's pixels in it, None for a
+    separate sample.
     """
 
     pictures: Pictures
@@ -324,8 +325,8 @@ class Around(NamedTuple):
 class Filling:
     """The job of `fill`: a sequence of runs, one for each window.
 
-    ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample``, None: from
-    their surroundings, as far as ``reach`` pixels around a hole.
+    ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample`` or, if it is
+    None, from their surroundings up to ``reach`` pixels around a hole.
     """
 
     pixels: NDArray[Any]
@@ -335,7 +336,7 @@ class Filling:
     options: Options
 
     def inputs(self) -> dict[str, Any]:
-        """Return all that determines the result but the seed, by the names that users give it."""
+        """Return everything but the seed that determines the result, by the parameters' names."""
         known = np.where(self.hole[..., None], 0, self.pixels)
         sample = self.sample and (self.sample.pixels, self.sample.known)
         return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
@@ -343,7 +344,10 @@ class Filling:
     def run(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
-        """Fill one window after the other; the state is the results of finished ones, and the present run's state."""
+        """Fill one window after the other, and return the result.
+
+        The state is the results of finished windows, and the state of the current run.
+        """
         whole = self.begin()
         parts = self.windows()
         done, inside = checkpointing.found or ([], None)
@@ -371,7 +375,7 @@ class Filling:
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
     def windows(self) -> list[Window]:
-        """Return the windows that are filled, one after the other."""
+        """Return the windows, in the order in which they are filled."""
         if self.options.boundary == "torus":
             return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
         return windows(self.hole, int(neighbourhood_offsets(self.options.order).max()), self.options.levels)
@@ -386,7 +390,7 @@ class Filling:
         return whole
 
     def around(self, window: Window) -> Around:
-        """Return the sample of a window: its surroundings, or the job's own."""
+        """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
             return Around(self.sample, (0, 0), None)
         hole, (rows, cols) = self.hole[window.rows, window.cols], self.hole.shape
@@ -400,7 +404,7 @@ class Filling:
         return Around(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
     def _guide(self, window: Window, around: Around, values: NDArray[Any]) -> Surroundings | None:
-        """Return the colours around a window's hole as its guide; None with a sample of its own, or of categories."""
+        """Return the colours around a window's hole as its guide; None with a separate sample or with categories."""
         pictures = around.pictures
         if self.sample is not None or not _has_tones(self.options, pictures):
             return None
@@ -433,7 +437,7 @@ class Filling:
         callback: Callback | None,
         checkpointing: Checkpointing,
     ) -> Made:
-        """Fill one window."""
+        """Fill one window, and return its result."""
         at = (window.rows, window.cols)
         hole = self.hole[at]
         made, output = drive(self.plan(window, around), machine, seed, callback, checkpointing)
@@ -450,7 +454,7 @@ def filling(
     channel_axis: int | None,
     options: dict[str, Any],
 ) -> Filling:
-    """Return the job of `fill`, which has the same parameters; raise ValueError or TypeError if one is invalid."""
+    """Return the job of `fill` for the same parameters; raise ValueError or TypeError if one is invalid."""
     pixels, hole = check_picture(image, channel_axis)
     hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
     if not hole.any():
@@ -467,24 +471,24 @@ def filling(
 
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:
-    """Return whether means of pixels are pixels: not of categories, and not for grey levels of a density."""
+    """Return whether the mean of pixels is a legal pixel: not for categories or for grey levels of a density."""
     return not (options.categorical or options.pixel == "density" or few(pictures.pixels))
 
 
 def _fewest_levels(pictures: Pictures) -> int:
-    """Return the number of levels of which the coarsest has `MANY` candidates or fewer."""
+    """Return the least number of levels whose coarsest level has at most `MANY` candidates."""
     return 1 + max(0, ceil(log2(prod(pictures.pixels[0].shape[:2]) / MANY) / 2))
 
 
 def shifted(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
-    """Return sources (..., 2 or 3) that count from a corner in pixels of the whole; -1 stays -1."""
+    """Return sources (..., 2 or 3) relative to ``corner`` as positions in the whole picture; -1 stays -1."""
     found = source.copy()
     found[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
     return found
 
 
 def paste(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], hole: Mask, level: int) -> NDArray[Any]:
-    """Return a picture with the values of a level's lattice in the hole of a window."""
+    """Return a copy of ``below`` with the values of a level's lattice in the hole of a window."""
     above = below.copy()
     fine = values.repeat(2**level, 0).repeat(2**level, 1)[: hole.shape[0], : hole.shape[1]]
     above[at][hole] = fine[hole]
@@ -500,9 +504,9 @@ def _pasting(
     number: int,
     count: int,
 ) -> Callback:
-    """Return a callback that sees the whole picture, with the present hole pasted in, and the share of all windows.
+    """Return a callback that receives the whole picture, with the current hole in it, and the share of all windows.
 
-    The sources of the hole count from ``corner``.
+    The sources of the hole are relative to ``corner``.
     """
 
     def seen(progress: Any) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The run of `fill`, to look at any moment of it."""
+"""The replay of a run of `fill`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from simdtex.model.explanation import Explanation
 
 
 class HoleReplay:
-    """The run that fills one hole, to look at any moment of it, as with `simdtex.methods.mrf.replay.Replay`.
+    """The replay of a run that fills one hole, with the methods of `simdtex.methods.mrf.replay.Replay`.
 
-    The arrays of `at` are those of the whole picture, with a coarse level's sites repeated; sites are pixels of the
-    window around the hole, and sources and candidates pixels of the picture or of the sample. Raises ValueError if
-    the job has several windows.
+    The arrays of `at` are those of the whole picture, with the sites of a coarse level repeated; sites are pixels of
+    the window around the hole, and sources and candidates are pixels of the picture or of the sample. Raises ValueError
+    if the job has several windows.
     """
 
     def __init__(self, job: Filling, machine: Machine, seed: int) -> None:
@@ -39,7 +39,7 @@ class HoleReplay:
         return self._replay.sweeps
 
     def at(self, sweep: int, sets: int | None = None) -> Instant:
-        """Return the picture after so many sets of a sweep; None: after all of it."""
+        """Return the picture after the first ``sets`` sets of a sweep; None: all."""
         now = self._replay.at(sweep, sets)
         pasted = partial(paste, at=self._at, hole=self._hole[self._at], level=now.level)
         return Instant(
@@ -51,7 +51,10 @@ class HoleReplay:
         )
 
     def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
-        """Return why a pixel had its value after so many sets of a sweep; raise ValueError if it did not relax."""
+        """Return an explanation of a pixel's value after the first ``sets`` sets of a sweep, None: all.
+
+        Raises ValueError if the pixel has not relaxed.
+        """
         if not self._hole[row, col]:
             raise ValueError("this pixel is not in the hole: its value is given")
         why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets)

@@ -20,11 +20,11 @@ from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
 from simdtex.options import check_real, unmasked
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
-"""`place_hard_data`, or what places a table where it lies on the ground."""
+"""`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
 
 
 class Inputs(NamedTuple):
-    """The arrays of a job: the sample's ``pictures``, what is ``given`` of the output, and the ``guide`` of both."""
+    """The arrays of a job: the sample's ``pictures``, the ``given`` values of the output, and the ``guide`` of both."""
 
     pictures: Pictures
     given: Given | None = None
@@ -32,7 +32,7 @@ class Inputs(NamedTuple):
 
     @property
     def plain(self) -> bool:
-        """Whether there is one sample and nothing else."""
+        """Whether there is one sample and no other array."""
         return self.pictures.clean and self.given is None and self.guide is None
 
     def identity(self) -> dict[str, Any]:
@@ -55,9 +55,9 @@ def check_inputs(
     guide: Any = None,
     place: Placing = place_hard_data,
 ) -> Inputs:
-    """Check the arrays of a job; the arguments are those of `simdtex.synthesize`, or a sample already checked.
+    """Check the arrays of a job, and return them; the parameters are those of `simdtex.synthesize`.
 
-    ``place(table, shape, dtype)`` places a table of known values.
+    ``sample`` may already be checked. ``place(table, shape, dtype)`` places a table of known values.
     """
     pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
     given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
@@ -65,7 +65,7 @@ def check_inputs(
 
 
 def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
-    """Check a sample, or a list or tuple of samples, and ``mask``, which says likewise what may be used.
+    """Check a sample, or a list or tuple of samples, with the ``mask`` or masks of usable pixels, and return them.
 
     With 3 ``axes`` the sample is a volume.
     """
@@ -89,9 +89,9 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
 
 
 def check_picture(image: Any, channel_axis: int | None, axes: int = 2) -> tuple[NDArray[Any], Mask]:
-    """Check a picture; return its pixels (rows, cols, channels), and where a channel is NaN or masked (rows, cols).
+    """Check a picture; return its pixels (rows, cols, channels), and the mask (rows, cols) of unknown ones.
 
-    With 3 ``axes`` it is a volume (layers, rows, cols, channels).
+    A pixel is unknown if a channel is NaN or masked. With 3 ``axes`` it is a volume (layers, rows, cols, channels).
     """
     array = as_array("the sample", image)
     pixels = check_sample(array, channel_axis, unknown=True, axes=axes)
@@ -108,7 +108,7 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
 
 
 def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
-    """Return a mask as a bool array of a shape."""
+    """Return a mask as a bool array of ``shape``; raise if it is not one."""
     found = _unmasked(name, mask)
     if found.dtype != np.bool_:
         raise TypeError(f"{name} holds {found.dtype} values; give True and False")
@@ -117,7 +117,7 @@ def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = 
 
 
 def as_known(known: Any, name: str = "known") -> HardData | NDArray[Any]:
-    """Return known values as a table, which a path is read to, or as an array."""
+    """Return known values as an array or as a table, which is read if ``known`` is a path."""
     if isinstance(known, (str, os.PathLike)):
         return read_hard_data(known)
     return known if isinstance(known, HardData) else as_array(name, known)
@@ -131,7 +131,10 @@ def check_known(
     source: Any = None,
     place: Placing = place_hard_data,
 ) -> Given:
-    """Check the known values of an output: a masked array, floats with NaN for unknown, a table or its path."""
+    """Check the known values of an output, and return them.
+
+    ``known`` is a masked array, floats with NaN for unknown values, a table or its path.
+    """
     known = as_known(known)
     variables, dtype = pictures.pixels[0].shape[-1], pictures.pixels[0].dtype
     if isinstance(known, HardData):
@@ -170,7 +173,7 @@ def check_known(
 
 
 def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
-    """Return the positions in the sample that known pixels are from, (rows, cols, 2 or 3)."""
+    """Return the positions of known pixels in the sample, (rows, cols, 2 or 3)."""
     place = _unmasked("known_source", source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
@@ -190,7 +193,7 @@ def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.in
 
 
 def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> GuidePair:
-    """Check a guide, ``(of the sample, of the output)``: arrays (rows, cols) or (rows, cols, G), or of a volume."""
+    """Check a guide ``(of the sample, of the output)``, arrays (rows, cols[, G]) or of a volume, and return it."""
     if not isinstance(guide, (tuple, list)) or len(guide) != 2:
         raise TypeError("guide is no pair; give (guide of the sample, guide of the output)")
     first, second = guide

@@ -21,7 +21,7 @@ from simdtex.model.turned import HALVES, Turned, turned
 from simdtex.options import check_real
 
 ONE = 1e-3
-"""How far the sum of probabilities may be from 1; they are divided by it."""
+"""The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
 
 
 class Maps(NamedTuple):
@@ -34,12 +34,12 @@ class Maps(NamedTuple):
     scale: NDArray[Any] | HardData | None = None
 
     def shape(self, axes: int) -> tuple[int, ...] | None:
-        """Return the sides of the first that is an array: rows and columns or, of 3 ``axes``, layers too."""
+        """Return the sides of the first map that is an array: rows and columns and, with 3 ``axes``, layers."""
         shapes = (np.shape(one)[-axes:] for one in self if one is not None and not isinstance(one, HardData))
         return next((shape for shape in shapes if len(shape) == axes), None)
 
     def digests(self) -> dict[str, str]:
-        """Return the SHA-256 digest of each, by name."""
+        """Return the SHA-256 digest of each map, by name."""
         arrays = {
             name: (one.points, one.values)
             if isinstance(one, HardData)
@@ -50,7 +50,7 @@ class Maps(NamedTuple):
         return {name: digest(*those) for name, those in arrays.items()}
 
     def of_images(self, pictures: Pictures, shape: tuple[int, int]) -> Turned | None:
-        """Return the copies of training images that are wanted; None without maps of these."""
+        """Return the copies of training images that the maps require; None without such maps."""
         if self.image_map is self.rotation is self.scale is None:
             return None
         rotation = None if self.rotation is None else _numbers("rotation", self.rotation, shape)
@@ -86,7 +86,7 @@ class Maps(NamedTuple):
     def of_categories(
         self, categories: NDArray[Any] | None, shape: tuple[int, ...], place: Placing
     ) -> NDArray[np.float64] | None:
-        """Return the probability of each category, (categories, *shape), NaN where nothing is said; None without."""
+        """Return the probability of each category, (categories, *shape), NaN where not given; None without a map."""
         if self.probabilities is None:
             return None
         if categories is None:
@@ -121,13 +121,13 @@ class Maps(NamedTuple):
 
 
 def _cell(at: NDArray[np.integer]) -> str:
-    """Return where a cell is, in words."""
+    """Return the position of a cell, in words."""
     names = ("layer", "row", "column")[-len(at) :]
     return ", ".join(f"{name} {n}" for name, n in zip(names, at, strict=True))
 
 
 def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
-    """Return the inputs of a simulation whose cells outside of a region, where it is False, take no part."""
+    """Return the inputs of a simulation without the cells where the region is False, which take no part."""
     inside = check_mask(region, shape, "region", "the output")
     if not inside.any():
         raise ValueError("region is False everywhere; set it True where cells are to be simulated")
@@ -141,9 +141,9 @@ def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
 
 
 def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
-    """Return what stands for no value in arrays of the training images' type: NaN, or a number that none of them has.
+    """Return the number that marks a missing value in arrays of the training images' type.
 
-    That is the largest of a type of integers, or else the smallest.
+    It is NaN for floats; for integers the largest number of the type or, if the images have that, the smallest.
     """
     dtype = pixels[0].dtype
     if dtype.kind == "f":

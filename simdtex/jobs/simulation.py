@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import xarray
 
 AT_ONCE = 4
-"""Realisations that a processor works on at once, at most: each has a queue of its own."""
+"""The most realisations that run on a processor at the same time, each with its own queue."""
 
 
 @overload
@@ -72,7 +72,7 @@ def simulate(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> xarray.DataArray | xarray.Dataset:
-    """Simulate realisations that look like a training image and honour data (multiple-point simulation).
+    """Return realisations that look like a training image and honour data (multiple-point simulation).
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def simulate(
     n : int
         Number of realisations, 1 or more.
     shape : (int, int) or (int, int, int), optional
-        Rows and columns of each, or layers, rows and columns. None: those of `known`, or of the first map below, if
-        that is an array, else of the training image.
+        Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the first map
+        below, if that is an array, else of the training image.
     known : array, HardData or path, optional
         Hard data: a masked array of `shape`, floats with NaN for unknown values, a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
@@ -99,7 +99,8 @@ def simulate(
         As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and the part of the
         training image that may be used.
     region : (rows, cols) or (layers, rows, cols) bool array, optional
-        True for cells that are simulated. The others have no value: NaN in floats, else the attribute ``missing``.
+        True for cells that are simulated. All other cells have no value: NaN in floats, else the attribute
+        ``missing``.
     probabilities : (categories, rows, cols) array, or table or its path, optional
         Soft data, of a volume (categories, layers, rows, cols): the probability at each cell of each category of the
         first variable, in ascending order of category; the sum is 1, and unknown probabilities are NaN. A table has the
@@ -128,7 +129,7 @@ def simulate(
     callback : callable, optional
         Called with a `simdtex.run.Simulating` after every realisation.
     checkpoint
-        As in `simdtex.synthesize`; it keeps the realisations that are finished.
+        As in `simdtex.synthesize`; it keeps the finished realisations.
     **options
         Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which lists the defaults that differ in ``simulate``.
 
@@ -137,18 +138,18 @@ def simulate(
     xarray.DataArray
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
-        cells; of a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each:
-        `simdtex.synthesize` with it gives the same map, unless `region` or a later parameter of `simulate` is used.
+        cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
+        realisation: `simdtex.synthesize` with it returns the same map, unless `region` or a later parameter is used.
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
         with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
         ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
-        where values are no floats, the attribute ``missing``.
+        unless values are floats, the attribute ``missing``.
     xarray.Dataset
-        With `source`: that array is the variable ``simulation``, and ``source_row`` and ``source_column`` (realisation,
-        y, x), int32, are the row and the column, counted from 0, of the training image that each cell is from, with
-        ``source_layer`` of a volume and, of several training images, ``source_image`` the number of the training image;
-        -1 where from nowhere, as data are. The dataset has the attributes, too.
+        With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
+        x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume
+        adds ``source_layer``, and several training images add ``source_image``, the number of the training image. Cells
+        without a source, such as data, have -1. The dataset has the attributes, too.
 
     Raises
     ------
@@ -157,10 +158,10 @@ def simulate(
 
     Notes
     -----
-    Cost: n times that of `simdtex.synthesize`, and of memory n results. Every combination of training image, eighth of
-    a turn and size that `rotation`, `scale` and `image_map` name is a training image of its own, 64 at most: the memory
-    of each is that of a further training image and 4 bytes per cell, and the coarsest level, which weighs every
-    candidate, takes as many times longer.
+    Cost: n times that of `simdtex.synthesize`, and the memory of n results. Every combination of training image, eighth
+    of a turn and size in `rotation`, `scale` and `image_map` is a separate training image, 64 at most. Each takes the
+    memory of a further training image and 4 bytes per cell. The time of the coarsest level, which evaluates every
+    candidate, is proportional to their number.
 
     Examples
     --------
@@ -182,7 +183,7 @@ def simulate(
     sides = ("layers", "rows", "columns")[-axes:]
     if shape is not None:
         within_32_bits(check_sides(shape, sides), 1)
-    frame(origin, cell)  # which raises early
+    frame(origin, cell)  # raises early
     pictures = check_samples(training, channel_axis, mask, axes)
     known = None if known is None else as_known(known)
     given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
@@ -211,7 +212,7 @@ def simulate(
     plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
     pixels = pictures.pixels[0]
     columns = (axes + (len(pictures.pixels) > 1)) if source else 0
-    each = 2 * prod(size) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)  # they are copied once
+    each = 2 * prod(size) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)  # realisations are copied once
     memory.require_host(n * (each + 64))
     made = np.empty((n, *size, pixels.shape[-1]), pixels.dtype)
     sources = np.empty((n, *size, columns), np.int32)
@@ -233,7 +234,7 @@ def simulate(
             made[finished], sources[finished] = checkpointing.found["pictures"], checkpointing.found["sources"]
 
         def offer_finished(info: Any, tree: Callable[[], Any]) -> None:
-            if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no state of its own
+            if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no saved state
                 with lock:
                     checkpointing.offer(info, state)
 
@@ -279,7 +280,7 @@ def simulate(
 
 
 def grid_axes(size: tuple[int, ...], origin: Any, cell: Any) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the coordinates of cells, and the sizes of a cell as attributes; rows and columns if neither is given."""
+    """Return the coordinates of cells, and the sizes of a cell as attributes; rows and columns without both."""
     at, sides = ((), ()) if origin is None and cell is None else frame(origin, cell)
     found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
     for axis, first, side in zip("xyz", at, sides, strict=False):
@@ -288,7 +289,7 @@ def grid_axes(size: tuple[int, ...], origin: Any, cell: Any) -> tuple[dict[str, 
 
 
 def realisation_seed(seed: int, number: int) -> int:
-    """Return the seed of a realisation, from that of the simulation and its number."""
+    """Return the seed of a realisation from the seed of the simulation and the number of the realisation."""
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
@@ -300,7 +301,7 @@ def _machines(device: str | None, jobs: int | None, n: int) -> list[Machine]:
 
 
 def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: list[Machine]) -> None:
-    """Simulate each number on a machine that is free; the first error ends it all."""
+    """Call ``one`` for each number on a free machine; the first error ends all calls."""
     free: SimpleQueue[Machine] = SimpleQueue()
     for machine in machines:
         free.put(machine)
@@ -323,7 +324,7 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
 
 
 def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
-    """Return the digests of training images, whose pixels are completed where they are unknown, and of hard data."""
+    """Return the digests of hard data and of the training images, with their unknown pixels completed."""
     found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
     if given and given.told.any():
         found["hard_data"] = digest(np.where(given.told, given.values, 0), given.told)

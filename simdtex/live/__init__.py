@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The live page: a run is watched and steered while it goes on, in a browser or in a notebook.
+"""The live page, which shows and controls a run while it executes, in a browser or in a notebook.
 
-`Session` is what a page talks to, whatever carries the messages: `simdtex.live.server` a WebSocket, and
-`simdtex.live.widget` the connection of a notebook. The page itself is in ``page/``: a style sheet, and the parts of an
-ES module, which `script` puts together, because a notebook takes one text.
+A page exchanges messages with a `Session`, over a WebSocket (`simdtex.live.server`) or over a notebook's connection
+(`simdtex.live.widget`). The page itself is in ``page/``: a style sheet, and the parts of an ES module, which `script`
+joins, because a notebook takes one text.
 """
 
 from importlib.resources import files

@@ -19,30 +19,30 @@ from simdtex.options import true_or_false, whole
 Array = NDArray[Any]
 
 MAX_PIXELS = 2**22
-"""Pixels of a frame, at most."""
+"""The most pixels of a frame."""
 
 MAX_OFFSET = 2**20
-"""Rows or columns between a window's corner and the layer's, at most."""
+"""The most rows or columns between the corner of a window and that of the layer."""
 
 MAX_SIDE = 2**14
-"""Rows or columns of a frame, at most."""
+"""The most rows or columns of a frame."""
 
 MAX_STEP = 2**9
-"""Rows and columns of a layer in one pixel of a frame, at most."""
+"""The most rows and columns of a layer in one pixel of a frame."""
 
 TILES = 3
-"""Copies of a tiled layer along each axis: it and one on either side."""
+"""Copies of a tiled layer along each axis: the layer and one on either side."""
 
 CHUNK = 2**22
-"""Pixels of a layer that are averaged at a time, which bounds the memory."""
+"""The most pixels of a layer that are averaged together, which bounds the memory."""
 
 
 class Window(NamedTuple):
     """The part of a layer that the page shows.
 
-    ``left`` and ``top`` are the layer's first column and row, ``width`` and ``height`` the pixels of the frame, each
-    the mean of ``step`` x ``step`` pixels of the layer; ``tiled`` shows it `TILES` x `TILES`
-    times.
+    ``left`` and ``top`` are the first column and row in the layer, ``width`` and ``height`` the size of the frame. Each
+    of its pixels is the mean of ``step`` x ``step`` pixels of the layer; ``tiled`` shows `TILES` x `TILES` copies of
+    the layer.
     """
 
     layer: str = "picture"
@@ -55,10 +55,10 @@ class Window(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """What a frame is taken from.
+    """A picture from which frames are cut.
 
-    ``shape`` are its rows and columns on the page; ``values`` may have fewer, as those of a coarse level, and are
-    (rows, cols) or (rows, cols, channels); ``colours`` turns a part of them into 8-bit pixels.
+    ``shape`` are its rows and columns on the page; ``values`` are (rows, cols) or (rows, cols, channels), and may be
+    smaller, at a coarse level; ``colours`` converts a part of them to 8-bit pixels.
     """
 
     shape: tuple[int, int]
@@ -67,7 +67,7 @@ class Layer(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """The part of a window that lies within its layer: its corner in the layer, its size in pixels, and RGBA bytes."""
+    """The part of a window within its layer: its corner in the layer, its size in pixels, and RGBA bytes."""
 
     left: int
     top: int
@@ -77,7 +77,7 @@ class Frame(NamedTuple):
 
 
 def parse_window(message: Mapping[str, Any]) -> Window:
-    """Return the window that a message describes; raise ValueError or TypeError if it describes none."""
+    """Return the window in a message; raise ValueError or TypeError if the message has no valid one."""
     window = Window(**{name: message[name] for name in Window._fields if name in message})
     if not isinstance(window.layer, str):
         raise TypeError("the layer must be a name")
@@ -92,9 +92,9 @@ def parse_window(message: Mapping[str, Any]) -> Window:
 
 
 def picture(pixels: Array, sample: Array, shape: tuple[int, int] | None = None) -> Layer:
-    """Return a picture, (rows, cols[, channels]), as a layer; `shape` is its size on the page, if of a coarse level.
+    """Return a picture, (rows, cols[, channels]), as a layer; at a coarse level, ``shape`` is its size on the page.
 
-    Black and white are the least and the largest value of the sample that it was made from, unless it has 8 bits.
+    Black and white are the least and the largest value of ``sample``, unless the picture has 8 bits.
     """
     limits = None if sample.dtype == np.uint8 else (float(sample.min()), float(sample.max()))
     return Layer(shape or (pixels.shape[0], pixels.shape[1]), pixels, partial(to_display, limits=limits))
@@ -107,10 +107,10 @@ def overlay(
     shares: Sequence[float],
     shape: tuple[int, int] | None = None,
 ) -> Layer:
-    """Return a picture with its labels (rows, cols) over it, as a layer.
+    """Return a layer of a picture and the colours of its labels (rows, cols) over it.
 
-    Each label has its colour of ``colours`` (labels, 3), and that colour its share of ``shares`` (labels,) in the
-    pixels. ``shape`` is the picture's size on the page, if of a coarse level.
+    Each label has a colour in ``colours`` (labels, 3), which has a share in ``shares`` (labels,) of the pixel. At a
+    coarse level, ``shape`` is the size of the picture on the page.
     """
     shown = picture(pixels, pixels).colours(pixels).reshape(*labels.shape, -1)
     shown = shown[..., :3] if shown.shape[2] > 2 else shown[..., :1]
@@ -134,8 +134,8 @@ def layers(
 ) -> dict[str, Callable[[], Layer]]:
     """Return functions that make the layers of a run or a result, by name.
 
-    ``shape`` are the rows and columns of the output, whatever the level. The functions ``image``, ``source`` and
-    ``temperature`` return the arrays of the present level; None if the method has none.
+    ``shape`` are the rows and columns of the output, at any level. The functions ``image``, ``source`` and
+    ``temperature`` return the arrays of the current level; they are None if the method has no such array.
     """
     found = {"picture": lambda: picture(image(), sample, shape)}
     if source:
@@ -149,7 +149,7 @@ def layers(
 
 
 def render(layer: Layer, window: Window, *, smooth: bool = True) -> Frame:
-    """Return a window of a layer as RGBA; without `smooth`, the first of step x step pixels stands for their mean."""
+    """Return a window of a layer as RGBA; without ``smooth``, each pixel is the first of its step x step pixels."""
     fine = np.arange(window.step if smooth else 1)
     top, rows, row = _axis(window.top, window.height, window, fine, layer.shape[0], layer.values.shape[0])
     left, cols, col = _axis(window.left, window.width, window, fine, layer.shape[1], layer.values.shape[1])
@@ -170,7 +170,7 @@ def render(layer: Layer, window: Window, *, smooth: bool = True) -> Frame:
 
 
 def thumbnail(layer: Layer, side: int) -> Frame:
-    """Return all of a layer, reduced by a whole number so that no side is longer than `side` pixels."""
+    """Return a whole layer, reduced by an integer factor so that no side is longer than ``side`` pixels."""
     rows, cols = layer.shape
     step = -(-max(rows, cols) // side)
     return render(layer, Window(width=-(-cols // step), height=-(-rows // step), step=step))
@@ -179,12 +179,12 @@ def thumbnail(layer: Layer, side: int) -> Frame:
 def _axis(
     begin: int, count: int, window: Window, fine: NDArray[np.intp], size: int, stored: int
 ) -> tuple[int, int, NDArray[np.intp]]:
-    """Return where the frame begins on an axis of the layer, its pixels, and the indices of the values they average."""
+    """Return the begin of the frame on an axis of the layer, its pixels, and the indices of the values to average."""
     places = begin + window.step * np.arange(count)
     beside = size * (TILES // 2) if window.tiled else 0
     places = places[(places > -beside - window.step) & (places < size + beside)]
     index = (places[:, None] + fine).reshape(-1)
     index = index % size if window.tiled else index.clip(0, size - 1)
-    side = next((2**level for level in range(16) if -(-size // 2**level) == stored), None)  # of a site of its lattice
+    side = next((2**level for level in range(16) if -(-size // 2**level) == stored), None)  # the spacing of its lattice
     index = index // side if side else index * stored // size
     return int(places[0]) if len(places) else begin, len(places), index

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A look inside a result: its run replayed, the moment that the page shows, and why a pixel has its value."""
+"""The inside of a result: its run replayed, the moment that the page shows, and the explanation of a pixel."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from simdtex.options import whole
 
 SET_COLOURS = np.array([[0, 0, 0], [90, 110, 140], [255, 30, 155]], np.uint8)
 SET_SHARES = (0.0, 0.6, 1.0)
-"""Colours over sites, and their shares: none, relaxed earlier in the sweep, relaxed by the last set."""
+"""Shares of the colours over sites: not relaxed, relaxed earlier in the sweep, relaxed in the last set."""
 
 BARS = 64
-"""Bars of the LCPDF of a channel, at most."""
+"""The most bars of the LCPDF of a channel."""
 
 
 class Inside:
     """The run of a result, and the moment of it that the page shows.
 
-    Raises ValueError if the job is none of the method ``mrf`` on one lattice.
+    Raises ValueError unless the job is one run of the method ``mrf``, on one lattice.
     """
 
     def __init__(self, job: Job, machine: Machine) -> None:
         self.job, self.sample = job, frames.picture(job.sample, job.sample)
         self._replay = job.replay(machine)
         self.sweeps = self._replay.sweeps
-        self.moment: tuple[int, int] | None = None  # a sweep, and sets of it; None for the result
+        self.moment: tuple[int, int] | None = None  # a sweep, and a number of its sets; None for the result
         self._instant: Any = None
 
     def seek(self, level: Any, sweep: Any, sets: Any) -> None:
-        """Show the field after so many sets of a sweep of a level, or after the nearest that there is."""
+        """Show the field after the first ``sets`` sets of a sweep of a level, or at the nearest existing moment."""
         for name, number in (("level", level), ("sweep", sweep), ("sets", sets)):
             whole(name, number, 0)
         level = min(level, self.sweeps[0].level)
         found = [n for n, one in enumerate(self.sweeps) if one.level == level]
-        if not found:  # a level without a sweep looks as the one above
+        if not found:  # a level without a sweep looks like the one above
             found = [n for n, one in enumerate(self.sweeps) if one.level > level][-1:]
         n = found[min(max(sweep, 1), len(found)) - 1]
         self.moment = n, min(sets, self.sweeps[n].sets)
@@ -54,7 +54,7 @@ class Inside:
         self.moment = self._instant = None
 
     def layers(self, result: dict[str, Callable[[], frames.Layer]]) -> dict[str, Callable[[], frames.Layer]]:
-        """Return the layers of the moment, those of the result if it is shown, and the job's sample."""
+        """Return the layers of the moment, or of the result if that is shown, and the job's sample."""
         now, job = self._instant, self.job
         sample = {"sample": lambda: self.sample}
         if now is None:
@@ -64,15 +64,15 @@ class Inside:
         return found | sample | {"sets": lambda: frames.overlay(image, now.relaxed, SET_COLOURS, SET_SHARES, job.shape)}
 
     def describe(self) -> dict[str, Any]:
-        """Return what the page has to know: the sample's size, and the sweeps of the run.
+        """Return the data for the page: the sample's size, and the sweeps of the run.
 
-        Of each sweep its level and number, its sets and sites, and the mean temperature before it.
+        A sweep has its level and number, its numbers of sets and sites, and the mean temperature before it.
         """
         rows, cols = self.sample.shape
         return {"width": cols, "height": rows, "sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
 
     def explain(self, row: Any, col: Any) -> dict[str, Any]:
-        """Return why a pixel of the output has the value that is shown, as plain numbers."""
+        """Return an explanation of the shown value of an output pixel, as plain numbers."""
         for name, number, side in zip(("row", "column"), (row, col), self.job.shape, strict=True):
             whole(f"the {name} of the pixel", number, 0, side - 1)
         sweep, sets = self.moment or (-1, None)
@@ -84,10 +84,10 @@ class Inside:
 
 
 def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]:
-    """Return an explanation as plain numbers; ``display`` turns pixels into 8-bit ones.
+    """Return an explanation as plain numbers; ``display`` converts pixels to 8 bits.
 
-    The fields are those of `simdtex.model.explanation.Explanation`. ``candidates`` is a list, one dict for each of the
-    first by rank and the one that is taken. ``density`` has at most `BARS` bars for each channel.
+    The fields are those of `simdtex.model.explanation.Explanation`. ``candidates`` is a list with a dict for each of
+    the first candidates by rank and the taken one. ``density`` has at most `BARS` bars for each channel.
     """
     near, found, shown = why.neighbours, why.candidates, why.shown()
     costs = {"distance": found.distance, **found.costs, "total": found.total}

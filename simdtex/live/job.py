@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page asks for: the call of a public function, and the command line that repeats it."""
+"""The job of a page: the call of a public function, and the command line that repeats it."""
 
 from __future__ import annotations
 
@@ -35,36 +35,36 @@ Maps = dict[str, Array]
 Message = dict[str, Any]
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
-"""The functions behind the page's jobs, by command: more of a texture, a seamless picture, a filled hole, labels."""
+"""The functions of the page's jobs, by command: a larger texture, a seamless picture, a filled hole, labels."""
 
 MAX_SIDE = 2**14
-"""Rows or columns of an output, at most."""
+"""The most rows or columns of an output."""
 
 MIN_REGION = 8
-"""Rows and columns of a region of the picture, at least."""
+"""The fewest rows and columns of a region of the picture."""
 
 MAX_POINTS = 2**16
-"""Points of all strokes together, at most."""
+"""The most points of all strokes together."""
 
 MAX_LABEL = 8
 """The largest label of a stroke; 0 erases."""
 
 LABELS = label_colours(MAX_LABEL + 1)
-"""The colours of labels, on the brush and over a picture."""
+"""The colours of labels, for the brush and over a picture."""
 
 WHOLE = (slice(None), slice(None))
 """All rows and columns."""
 
 RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture", "labels", "strokes")
-"""Names that a picture's files cannot have, since other files of a package have them."""
+"""Names that the picture's files cannot have, since other files of an archive have them."""
 
 
 class Hint(ValueError):
-    """What is painted does not suffice yet; the sentence says what is missing."""
+    """More has to be painted; the sentence names what is missing."""
 
 
 class Picture(NamedTuple):
-    """A picture that was given: the name of its file, its pixels, channel axis or None, and what the file says."""
+    """A given picture: the name of its file, its pixels, its channel axis or None, and the metadata of the file."""
 
     name: str
     pixels: Array
@@ -73,18 +73,18 @@ class Picture(NamedTuple):
 
 
 class Job:
-    """A run that the page asks for, checked; raises ValueError or TypeError if the message is wrong.
+    """A run that a page requests, checked; raises ValueError or TypeError if the message is invalid.
 
     The ``message`` has ``job`` (``synth``, ``extend``, ``fill`` or ``classify``) and ``seed``; ``width``, ``height``
     and ``method`` of ``synth``; ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is
-    the sample of ``synth`` and ``extend``; ``guide``, with strokes on the ``sample`` and the ``output``, of which those
-    on the sample are the classes of ``classify``; ``hole``, strokes; ``of``, the number of the result to fill. ``maps``
-    are further maps of the picture, by name, which ``pyramid`` and ``classify`` do not carry; ``result(number)``
+    the sample of ``synth`` and ``extend``; ``guide``, strokes on the ``sample`` and on the ``output``, where those on
+    the sample are the classes of ``classify``; ``hole``, strokes; ``of``, the number of the result to fill. ``maps``
+    are further maps of the picture, by name, which ``pyramid`` and ``classify`` do not arrange; ``result(number)``
     returns a result.
 
-    Of the job, ``options`` are those that differ from their defaults, ``files`` the pictures that the command line
-    reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by
-    name. ``given`` are the picture and its maps. ``labelled`` are those files that hold labels, and ``classes`` the
+    The attributes of a job: ``options`` are those that differ from their defaults, ``files`` the pictures that the
+    command line reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the
+    further maps by name. ``given`` are the picture and its maps, ``labelled`` the files of labels, and ``classes`` the
     painted labels.
     """
 
@@ -131,13 +131,13 @@ class Job:
     def run(
         self, machine: Machine, callback: Callable[[Any], None], checkpointing: Checkpointing
     ) -> tuple[Array, Output]:
-        """Return the output, made on a machine; `checkpointing` has the state to go on from, if any."""
+        """Run the job on a machine, and return its output; `checkpointing` has the state to continue from, if any."""
         keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True}
         made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
         return made
 
     def replay(self, machine: Machine) -> Replay | HoleReplay:
-        """Return the run, to look at any moment of it; raise ValueError if it is not one run of ``mrf``."""
+        """Return the replay of the run; raise ValueError if it is not one run of ``mrf``."""
         if self.method != "mrf":
             raise ValueError("only runs of the method mrf can be looked into")
         keywords = {name: value for name, value in self._keywords.items() if name != "method"}
@@ -165,18 +165,18 @@ class Job:
         return {"labels": lambda: frames.overlay(self.sample, image(), LABELS, shares)}
 
     def shares(self, labels: Array) -> list[tuple[int, float]]:
-        """Return each label of a result, 0 of the unknown, and its share."""
+        """Return each label of a result and its share; 0 is unknown."""
         return [(label, float((labels == label).mean())) for label in ([0, *self.classes] if self.classes else [])]
 
     @property
     def command(self) -> str:
-        """The command line that makes the same bytes from the files."""
+        """The command line that makes the same bytes from ``files``."""
         words = ["simdtex", self.kind, next(iter(self.files)), "-o", self.output, *self._flags]
         words += [word for read, write in self._also for word in ("--also", f"{read}={write}")]
         return shlex.join(words) + "\n"
 
     def _read(self, name: str, sample: Array, maps: Maps) -> None:
-        """Take the sample and its maps, whose files begin with `name`."""
+        """Add the sample and its maps; the names of their files begin with ``name``."""
         self.sample, self.maps = sample, maps
         self.output = f"texture{_suffix(sample)}"
         self.carried = {one: f"texture-{one}{_suffix(pixels)}" for one, pixels in maps.items()}
@@ -241,10 +241,10 @@ def _guide(message: Message) -> dict[str, Any]:
 
 
 def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
-    """Return the labels that strokes of a round brush leave, (rows, cols), 0 where there are none.
+    """Return the labels painted by strokes of a round brush, (rows, cols), 0 where there are none.
 
     Each stroke is a dict with a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in
-    pixels; a later stroke covers an earlier one. Raises ValueError or TypeError if `strokes` is something else.
+    pixels; a later stroke covers an earlier one. Raises ValueError or TypeError if ``strokes`` are invalid.
     """
     if not isinstance(strokes, list):
         raise TypeError("strokes must be a list; paint again")
@@ -277,7 +277,7 @@ def _points(given: list[Any]) -> list[tuple[float, float]]:
 
 
 def _options(given: Any, table: str) -> dict[str, Any]:
-    """Return the options that differ from their defaults; only those with a control are taken."""
+    """Return the options that differ from their defaults; only options with a control are valid."""
     if not isinstance(given, dict):
         raise TypeError(f"options must be names and values, not {shown(given)}")
     defaults = {control["name"]: control["default"] for control in controls(table)}
@@ -303,7 +303,7 @@ def _part(given: Any, shape: tuple[int, ...]) -> tuple[slice, slice]:
 
 
 def file_stem(name: str, otherwise: str) -> str:
-    """Return a file's name without its ending, in lower case letters, digits and dashes."""
+    """Return a file's name without its suffix, in lower case letters, digits and dashes."""
     found = re.sub(r"[^a-z0-9]+", "-", name.rpartition(".")[0].lower() or name.lower()).strip("-")[:40]
     return otherwise if found in RESERVED else found
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The states of a run at the ends of its levels, where a run with other options can start."""
+"""The states of a run at the ends of its levels, from which a run with other options can start."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from simdtex.checkpoint import Checkpointing, pack
 from simdtex.methods import mrf
 
 MAX_BYTES = 2**27
-"""Bytes of a state that is kept, at most."""
+"""The most bytes of a kept state."""
 
 
 class Levels:
-    """The states of a run of ``mrf`` at the end of each level; ``key`` is the job without its options, None keeps none.
+    """The states of a run of ``mrf`` at the end of each level.
 
-    If an earlier run, ``before``, has the same key, this run starts after the last level that is the same.
+    ``key`` is the job without its options; None keeps no state. If an earlier run, ``before``, has the same key, this
+    run starts after the last level that is the same in both.
     """
 
     def __init__(self, key: Any, options: mrf.Options, before: Levels | None = None) -> None:
@@ -34,7 +35,7 @@ class Levels:
 
     @property
     def checkpointing(self) -> Checkpointing:
-        """The state that the run starts from, and what takes its states."""
+        """The state that the run starts from, and the function that receives its states."""
         found = None if self.level is None else deepcopy(self._states[self.level])
         return Checkpointing(found, self._offer)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of a page: what it shows of them, and their files."""
+"""The results of a page: their layers and data for the page, and their files."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from simdtex.options import one_of, whole
 from simdtex.run import Output
 
 MAX_RESULTS = 24
-"""Results that are kept, at most."""
+"""The most results that are kept."""
 
 MAX_BYTES = 2**29
-"""Bytes of their arrays, at most; the latest is kept whatever its size."""
+"""The most bytes of their arrays; the latest result is kept whatever its size."""
 
 THUMBNAIL = 96
 """The longest side of a thumbnail, pixels."""
@@ -37,7 +37,7 @@ ARRANGEMENT = "arrangement.npz"
 
 
 class Result:
-    """A result: its ``number``, from 1, its job, what the job returned, and the duration of the run with its frames."""
+    """A result: its ``number``, from 1, its job, the job's output, and the duration of the run with its frames."""
 
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
@@ -55,7 +55,7 @@ class Result:
             self.layers[f"map {name}"] = partial(frames.picture, one, one)
 
     def _faults(self) -> frames.Layer:
-        """Return the picture with marks where its pattern leaves its lattice."""
+        """Return the layer of the picture with marks where its pattern leaves its lattice."""
         return frames.overlay(self.image, self._fault_map, FAULT_COLOURS, (0.0, 0.5))
 
     @cached_property
@@ -67,14 +67,14 @@ class Result:
 
     @property
     def arrays(self) -> list[NDArray[Any]]:
-        """All arrays that it holds; those of the picture are shared with other results."""
+        """All arrays of the result; those of the given picture are shared with other results."""
         picture, maps = self.job.given
         own = [self.image, self.source, self.temperature, *self.maps.values()]
         return [one for one in [*own, picture.pixels, *maps.values()] if one is not None]
 
     @cached_property
     def thumbnail(self) -> frames.Frame:
-        """The picture, small."""
+        """The thumbnail of the picture."""
         return frames.thumbnail(next(iter(self.layers.values()))(), THUMBNAIL)
 
     def describe(self) -> dict[str, Any]:
@@ -95,12 +95,12 @@ class Result:
 
     @property
     def files(self) -> list[str]:
-        """The names of its files; the last is an archive of the others, the files the job reads, and its command."""
+        """The names of its files; the last is an archive of all others, the job's input files, and its command."""
         own = dict.fromkeys([*self._pictures, *self.job.labelled])
         return [*own, *[ARRANGEMENT] * (self.source is not None), self.archive]
 
     def file(self, name: str) -> bytes:
-        """Return the bytes of a file; raises ValueError if there is none of that name."""
+        """Return the bytes of the file ``name``; raise ValueError if there is no such file."""
         one_of("file", name, self.files)
         with TemporaryDirectory() as temporary:
             folder = Path(temporary) / "files"
@@ -128,7 +128,7 @@ class Results(dict[int, Result]):
         self.dropped: list[int] = []
 
     def add(self, job: Job, image: NDArray[Any], output: Output, seconds: float) -> Result:
-        """Add a result."""
+        """Add a result, and return it."""
         number = 1 + max(self, default=0)
         result = self[number] = Result(number, job, image, output, seconds)
         while len(self) > MAX_RESULTS or (len(self) > 1 and self.nbytes > MAX_BYTES):
@@ -138,11 +138,11 @@ class Results(dict[int, Result]):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
+        """Number of bytes of all arrays."""
         return sum({id(one): one.nbytes for result in self.values() for one in result.arrays}.values())
 
     def find(self, number: Any) -> Result:
-        """Return the result of a number; raises ValueError or TypeError if there is none."""
+        """Return the result ``number``; raise ValueError or TypeError if there is none."""
         whole("the result", number, 1)
         if number not in self:
             raise ValueError(f"result {number} is no longer kept; make it again with its command line")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server of the live page: for this computer alone, and for those who know the page's address.
+"""The server of the live page: by default for this computer only, and for users who know the page's address.
 
-A message is a text of JSON. In those of the page, ``buffers`` has the size of the file that follows in pieces, if any;
-in those to the page it is the number of binary messages that follow.
+A message is a text of JSON. In messages from the page, ``buffers`` has the size of the file that follows in pieces, if
+any; in messages to the page it is the number of binary messages that follow.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from simdtex.options import whole
 from simdtex.synthesis import synthesize
 
 TOKEN = "SIMDTEX_LIVE_TOKEN"
-"""The environment variable with the token of the page's address, so that the address stays the same."""
+"""The environment variable with the token of the page's address, which keeps the address constant."""
 
 FILES: dict[str, tuple[Callable[[], str], str]] = {
     "": (lambda: (PAGE / "index.html").read_text(encoding="utf-8"), "text/html"),
     "live.js": (script, "text/javascript"),
     "live.css": (style, "text/css"),
 }
-"""The files of the page, by the part of the address after the token: what returns the text, and its type."""
+"""The files of the page, by the part of the address after the token: a function that returns the text, and its type."""
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -52,30 +52,30 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Headers of every answer: the page loads nothing from elsewhere, cannot be framed, and its address is not sent on."""
+"""Headers of every response: the page loads only its own files, cannot be framed, and does not reveal its address."""
 
 REFUSED = "This address lacks the right token. Open the address that `simdtex live` has printed."
 
 MAX_PAGES = 8
-"""Pages that are open at a time, at most."""
+"""The most pages that are open at the same time."""
 
 KEPT = 600.0
-"""Seconds that a session is kept for a page that has lost the connection, unless others need its place."""
+"""Seconds that a session is kept for a page that has lost the connection, unless another page needs its place."""
 
 RUN_KEPT = 30.0
-"""Seconds that its run goes on."""
+"""Seconds that the run of such a session continues."""
 
 MAX_MESSAGE = 2**22
-"""Bytes of a message without its file, and of a piece of a file, at most."""
+"""The most bytes of a message without its file, and of a piece of a file."""
 
 SMALL = 2**16
-"""Bytes of a message that may wait to be handled beside others."""
+"""The most bytes of a message that may wait together with others."""
 
 PIECE_WAIT, FILE_WAIT = 10.0, 120.0
-"""Seconds that a piece of a file, and all of it, may take to come."""
+"""The most seconds to receive a piece of a file, and the whole file."""
 
 ENDING = 2.0
-"""Seconds that the end of the server waits for a session's run, or for a request that does not come."""
+"""The most seconds that the server, when it ends, waits for a session's run or for an incomplete request."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -84,18 +84,18 @@ BAD_MESSAGE, TOO_MANY = 1003, 1013
 
 
 class Pages:
-    """The sessions of the pages that are open or have lost their connection lately."""
+    """The sessions of pages that are open or have recently lost their connection."""
 
     def __init__(self, machine: Machine, picture: Picture | None = None) -> None:
         self._machine, self._picture = machine, picture
         self._lock = threading.Lock()
         self._sessions: dict[str, Session] = {}
-        self._lost: dict[str, float] = {}  # when, the oldest first
+        self._lost: dict[str, float] = {}  # time of the loss, the oldest first
         self._closed = threading.Event()
-        self.large = threading.Lock()  # of the page whose large message comes and is handled: one at a time
+        self.large = threading.Lock()  # held while a large message is received and handled
 
     def join(self, key: str | None, send: Send) -> Session | None:
-        """Return the session of a page, the one it had before or a new one; None if there are too many."""
+        """Return the session of a page, its earlier one or a new one; None if there are too many."""
         with self._lock:
             if key in self._lost:
                 del self._lost[key]
@@ -115,7 +115,7 @@ class Pages:
             session.send = lambda message, buffers: None
 
     def tend(self, every: float = 1.0) -> None:
-        """End runs and sessions of pages that are lost for long, until `close`."""
+        """End runs and sessions of pages that have been lost for too long, until `close`."""
         while not self._closed.wait(every):
             with self._lock:
                 self._expire()
@@ -140,11 +140,11 @@ class Pages:
 def serve(
     picture: Picture | None, device: str | None, address: str, port: int, ready: Callable[[str, Machine], None]
 ) -> None:
-    """Serve the live page until Ctrl-C; every new page begins with ``picture``.
+    """Serve the live page until Ctrl-C; every new page starts with ``picture``.
 
-    With any ``address`` but 127.0.0.1, other computers may reach the page; ``port`` 0 takes a free one. ``ready`` is
-    called with the page's address and the machine, once the page can be opened. Raises ValueError if the address cannot
-    be listened to, or if the token is too short.
+    With any ``address`` but 127.0.0.1, other computers may reach the page; ``port`` 0 takes a free port. ``ready`` is
+    called with the page's address and the machine when the page can be opened. Raises ValueError if the server cannot
+    listen on the address, or if the token is too short.
     """
     token = os.environ.get(TOKEN) or secrets.token_urlsafe(24)
     if not re.fullmatch(r"[\w-]{16,}", token, re.ASCII):
@@ -155,14 +155,14 @@ def serve(
         host = f"[{address}]" if ":" in address else address
         ready(f"http://{host}:{port}/{token}/", machine)
         while True:
-            time.sleep(3600)  # until Ctrl-C, which no wait for a thread lets through on Windows
+            time.sleep(3600)  # until Ctrl-C, which does not interrupt a wait for a thread on Windows
 
 
 @contextmanager
 def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
     """Serve pages in threads until the block ends, and yield the port; every path begins with the token.
 
-    Raises ValueError if the address cannot be listened to.
+    Raises ValueError if the server cannot listen on the address.
     """
     try:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
@@ -172,14 +172,14 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         raise ValueError(f"cannot listen to {address} port {port} ({why}); give another --port or --host") from None
 
     def answer(connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request; None has the WebSocket opened."""
+        """Return the response to a request; None opens the WebSocket."""
         host = request.headers.get("Host", "")
         given, slash, name = request.path.partition("?")[0].lstrip("/").partition("/")
         if not is_own_name(host, address):
             return _response(connection, 400, "This server has another name.")
         if not secrets.compare_digest(given.encode(errors="surrogateescape"), token.encode()):
             return _response(connection, 403, REFUSED)
-        if not slash:  # without it the names in the page would lack the token
+        if not slash:  # without it, relative addresses in the page would lack the token
             response = _response(connection, 308, "")
             response.headers["Location"] = f"/{token}/"
             return response
@@ -198,7 +198,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         compression=None,
         max_size=MAX_MESSAGE,
         max_queue=2,
-        ping_timeout=FILE_WAIT,  # no answer is read while a message waits for the file of another page
+        ping_timeout=FILE_WAIT,  # pongs are not read while a message waits for another page's file
         open_timeout=ENDING,
         close_timeout=ENDING,
     )
@@ -219,9 +219,9 @@ def _response(connection: ServerConnection, status: int, text: str, kind: str = 
 
 
 def is_own_name(host: str, address: str) -> bool:
-    """Return whether a Host header names this server, so that no other site's name can stand for it.
+    """Return whether a Host header names this server, and not a name of another site that resolves to it.
 
-    A server that listens to all addresses is also named by any number: others can only make names point here.
+    For a server that listens on all addresses, any numeric address is valid, since only names can be redirected.
     """
     name = host.partition("]")[0].lstrip("[") if host.startswith("[") else host.partition(":")[0].lower()
     if name in (*LOOPBACK, address.lower()):
@@ -233,7 +233,7 @@ def is_own_name(host: str, address: str) -> bool:
 
 
 def talk(connection: ServerConnection, pages: Pages) -> None:
-    """Carry messages between a page and its session until the connection ends."""
+    """Pass messages between a page and its session until the connection ends."""
 
     def send(message: Message, buffers: Sequence[bytes]) -> None:
         with suppress(ConnectionClosed):
@@ -260,7 +260,7 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
 
 
 def _carry(text: Data, connection: ServerConnection, session: Session, pages: Pages) -> None:
-    """Give a session a message and its file; a large one is handled before another one comes, of whatever page."""
+    """Give a session a message and its file; a large one is handled before that of any other page is received."""
     message = json.loads(text)
     sizes = message.pop("buffers", [])
     large = bool(sizes) or len(text) > SMALL
@@ -270,7 +270,7 @@ def _carry(text: Data, connection: ServerConnection, session: Session, pages: Pa
 
 
 def _file(size: Any, connection: ServerConnection) -> bytes:
-    """Return a file of so many bytes, which comes in pieces."""
+    """Return a file of ``size`` bytes, which arrives in pieces."""
     whole("the size of a file", size, 1, MAX_BYTES)
     data, end = bytearray(), time.monotonic() + FILE_WAIT
     while len(data) < size:
@@ -282,7 +282,7 @@ def _file(size: Any, connection: ServerConnection) -> bytes:
 
 
 def build_kernels(machine: Machine) -> None:
-    """Build the kernels of a first run, of a grey and of a coloured sample."""
+    """Build the kernels of a first run, for a grey and for a coloured sample."""
     rng = np.random.default_rng(0)
     for axis, shape in ((None, (32, 32)), (-1, (32, 32, 3))):
         synthesize(rng.integers(0, 256, shape, np.uint8), (48, 48), channel_axis=axis, rng=0, device=machine)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The state of a page: it takes messages, makes one output at a time, and sends frames of it.
+"""The session of a page: it receives messages, makes one output at a time, and sends frames of it.
 
-A message is a dict with a ``kind``, and buffers. Whatever carries messages calls `Session.receive`, and the session's
-``send``; ``docs/live.rst`` lists them.
+A message is a dict with a ``kind``, and buffers. The connection passes messages of the page to `Session.receive`, and
+the session passes its own to ``send``; ``docs/live.rst`` lists them.
 """
 
 from __future__ import annotations
@@ -43,46 +43,46 @@ __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 Send = Callable[[Message, Sequence[bytes]], None]
 
 MAX_BYTES = 2**27
-"""Bytes of a file that the page gives, at most."""
+"""The most bytes of a file from the page."""
 
 MAX_PIXELS = 2**25
-"""Pixels of a picture that the page gives, at most."""
+"""The most pixels of a picture from the page."""
 
 MAX_MAPS = 16
-"""Further maps of a material, at most."""
+"""The most further maps of a material."""
 
 MAX_HELD = 2**29
-"""Bytes of a picture and its further maps, at most."""
+"""The most bytes of a picture and its further maps."""
 
 MAX_QUEUE = 64
-"""Messages that wait to be handled, at most."""
+"""The most messages that wait to be handled."""
 
 STARTING_SIDE = 512
-"""The first output is about twice as large as its sample, and no side is much longer than this, pixels."""
+"""About the longest side of the first output, pixels; otherwise that is about twice as large as its sample."""
 
 PREVIEW = 512
 """The longest side of the preview of the picture, pixels."""
 
 LARGE = 1024
-"""The middle of a picture with a longer side is the sample at first."""
+"""The first sample is only the middle of a picture with a longer side than this, pixels."""
 
 DEMO_SIDE = 160
-"""Rows and columns of the run that a page without a picture plays."""
+"""Rows and columns of the demonstration run on a page without a picture."""
 
 INTERVAL = 4
-"""Time between two frames of a run in units of what the last one took: frames take at most a quarter of a run."""
+"""Time between two frames in units of the time to make the last one: frames take at most a quarter of a run."""
 
 MAX_RATE = 30
-"""Frames a second, at most."""
+"""The most frames per second."""
 
 MAX_UNSEEN = 2
-"""Frames that are sent before the page has shown one, at most."""
+"""The most frames that are sent and not yet shown by the page."""
 
 log = logging.getLogger(__name__)
 
 
 class Cancelled(Exception):
-    """The run is no longer wanted."""
+    """The run is cancelled."""
 
 
 class Session:
@@ -91,30 +91,30 @@ class Session:
     Parameters
     ----------
     send : callable
-        ``send(message, buffers)`` takes a message to the page; the session's thread calls it.
+        ``send(message, buffers)`` sends a message to the page; the session's thread calls it.
     machine : Machine
     picture : Picture, optional
-        What the page begins with.
+        The first picture of the page.
 
     Notes
     -----
-    One thread handles the messages, one after another: between runs, and during a run in its callback. A request for
-    another run, or another picture, ends the run.
+    One thread handles the messages, one after another, between runs and in the callback of a run. A request for another
+    run, or another picture, ends the run.
     """
 
     def __init__(self, send: Send, machine: Machine, picture: Picture | None = None) -> None:
-        self.key = secrets.token_urlsafe(16)  # by which a page that comes back finds its session
+        self.key = secrets.token_urlsafe(16)  # with which a page that reconnects finds its session
         self.send, self._machine, self._picture = send, machine, picture
         self._maps: dict[str, NDArray[Any]] = {}
         self.results = Results()
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
-        self._inside: dict[int, Inside] = {}  # the results that the page looks into: the shown one, and one beside it
+        self._inside: dict[int, Inside] = {}  # the replayed results: the shown one, and one beside it
         self._window = frames.Window()
-        self._wanted: Message | None = None  # the job that is asked for, until it is finished
-        self._asked: Message | None = None  # the last job that was asked for with this picture
+        self._wanted: Message | None = None  # the requested job, until it is finished
+        self._asked: Message | None = None  # the last requested job with this picture
         self._refused = ""  # why the last job could not be done
-        self._begun: Message | None = None  # the message that announced the present run
-        self._job: Job | None = None  # of the present run
+        self._begun: Message | None = None  # the message that announced the current run
+        self._job: Job | None = None  # the job of the current run
         self._paused = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
@@ -125,20 +125,20 @@ class Session:
         self._thread.start()
 
     def receive(self, message: Any, buffers: Sequence[Any] = ()) -> threading.Event:
-        """Handle a message of the page later, and return what is set then; an error is sent back as one sentence."""
+        """Queue a message of the page; return an event that is set when it is handled. Errors go back to the page."""
         handled = threading.Event()
         self._messages.put((message, buffers, handled))
         return handled
 
     def follow(self, handled: threading.Event, *, every: bool) -> None:
-        """Wait until a message is handled if `every` has to be, else until fewer than `MAX_QUEUE` wait."""
+        """Wait until a message is handled; unless ``every``, only until fewer than `MAX_QUEUE` messages wait."""
         while self._thread.is_alive() and not handled.is_set() and (every or self._messages.qsize() >= MAX_QUEUE):
             handled.wait(0.01)
 
     def wait(self, timeout: float | None = None) -> Result:
-        """Return the latest result once nothing is being made; a picture with which nothing was made yet is begun with.
+        """Return the latest result when no run is left; start a first run if the picture has none.
 
-        Raises ValueError if there is no picture or the job was refused or cancelled, and TimeoutError after so many
+        Raises ValueError if there is no picture or the job was refused or cancelled, and TimeoutError after ``timeout``
         seconds.
         """
         end = inf if timeout is None else time.monotonic() + timeout
@@ -156,7 +156,7 @@ class Session:
         return self.results[max(self.results)]
 
     def close(self, wait: float = 0.0) -> None:
-        """End the run and the thread; wait for it, so many seconds at most."""
+        """End the run and the thread, and wait for the thread for at most ``wait`` seconds."""
         self._closed = True
         self.receive({"kind": "cancel"})
         self._thread.join(wait)
@@ -187,7 +187,7 @@ class Session:
 
     @contextmanager
     def _reported(self, job: str = "") -> Iterator[None]:
-        """Tell the page in a sentence what goes wrong in this block, or what is still to be painted for a ``job``."""
+        """Send the page a sentence about an error in this block, or about what is still to be painted for a ``job``."""
         kind = "error"
         try:
             yield
@@ -204,11 +204,11 @@ class Session:
         self.send({"kind": kind, "text": sentence, "job": job}, [])
         if job:
             self._refused = sentence
-            if job not in ("fill", "classify"):  # which are about the result or the picture that is shown
+            if job not in ("fill", "classify"):  # these use the result or the picture that is shown
                 self._select(None)
 
     def _on_hello(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Send everything that the page shows: it may have been loaded again during a run."""
+        """Send everything that the page shows, since it may have been reloaded during a run."""
         tables = {name: controls(name) for name in TABLES}
         hello = {"version": version("simdtex"), "device": self._machine.name, "controls": tables, "bytes": MAX_BYTES}
         shown = {name: frames.thumbnail(frames.picture(one, one), THUMBNAIL) for name, one in _examples().items()}
@@ -242,7 +242,7 @@ class Session:
         self._send_picture(new=True)
 
     def _on_demo(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Send the pictures of a small run, which the page plays while it has no picture; any message ends the run."""
+        """Send the pictures of a small run to a page without a picture; any message ends the run."""
         if self._picture is not None:
             return
         side, shape = 3 * DEMO_SIDE // 5, (DEMO_SIDE, DEMO_SIDE)
@@ -288,7 +288,7 @@ class Session:
         self._paused, self._refused = False, ""
 
     def _on_begin(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Make a first result of the picture, as the page does, if nothing was asked for yet."""
+        """Start a first run with the picture, as the page does, if no job has been requested."""
         if self._picture is not None and self._asked is None:
             part, (width, height) = _beginning(self._picture)
             first: Message = {"kind": "make", "job": "synth", "method": "mrf", "seed": 1, "options": {}, "part": part}
@@ -317,7 +317,7 @@ class Session:
         self._select(number, restore=True)
 
     def _on_inside(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Look into the selected result and, side by side, into another; or close them."""
+        """Replay the selected result and, side by side, another one; or close the replays."""
         if not message.get("open"):
             self._inside, self._stale = {}, True
             return
@@ -338,7 +338,7 @@ class Session:
         self.send({"kind": "inside", "panes": looked}, [small.pixels for small in samples])
 
     def _on_seek(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Show a moment of the results that are looked into, or, without a level, the results."""
+        """Show a moment of the replayed results or, without a level, the results."""
         for one in self._inside.values():
             if message.get("level") is None:
                 one.finish()
@@ -375,7 +375,7 @@ class Session:
         self.send({"kind": "result", **result.describe(), "dropped": dropped}, [result.thumbnail.pixels])
 
     def _select(self, number: int | None, *, restore: bool = False) -> None:
-        """Have the page show a result, or the run; with `restore` also its picture, its maps and its settings."""
+        """Select the result to show, or the run; with ``restore`` also its picture, its maps and its settings."""
         if number not in self._inside:
             self._inside = {}
         self._selected, self._stale = number, True
@@ -395,7 +395,7 @@ class Session:
     def _send_frame(
         self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True, pane: int = 0
     ) -> None:
-        """Send the window of the layer that the page looks at, of a result, the run or the sample."""
+        """Send the page's window of its layer, of a result, the run or the sample."""
         assert self._picture is not None
         name, pixels = self._window.layer, self._picture.pixels
         if not layers or (name == "sample" and name not in layers):
@@ -423,7 +423,7 @@ class Session:
             self._send_frame({}, "sample")
 
     def _run(self, message: Message) -> None:
-        """Make what a message asks for, unless something else is asked for meanwhile."""
+        """Run the job of a message, unless another job is requested meanwhile."""
         assert self._picture is not None
         with self._reported(str(message.get("job"))), suppress(Cancelled):
             try:
@@ -444,7 +444,7 @@ class Session:
                     self._wanted = None
 
     def _begin(self, job: Job) -> Levels:
-        """Find the level that the run starts from, and tell the page."""
+        """Return the states of the run, with the level that it starts from, and send that to the page."""
         key = {name: value for name, value in job.message.items() if name != "options"}
         restarts = job.method == "mrf" and job.kind != "fill"
         options = resolve(mrf.Options, job.kind, job.options if restarts else {})
@@ -457,7 +457,7 @@ class Session:
         return levels
 
     def _watch(self, job: Job, progress: Any) -> None:
-        """Handle messages during a run, show it, and wait while it is paused; the run's callback."""
+        """Handle messages during a run, show it, and wait while it is paused: the callback of the run."""
         while True:
             self._handle_all()
             if self._wanted is not job.message:
@@ -470,11 +470,11 @@ class Session:
             self._handle(*self._messages.get())
 
     def _show_run(self, job: Job, progress: Any) -> None:
-        """Send how far the run is, and a frame of it or of the selected result."""
+        """Send the progress of the run, and a frame of it or of the selected result."""
         fields = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
         self.send({"kind": "progress", **fields, "paused": self._paused}, [])
         if self._selected is None:
-            self._machine.sync()  # the time of the run's kernels is not the frame's
+            self._machine.sync()  # so that the frame's time excludes the run's kernels
         began = time.perf_counter()
         if self._selected is None:
             source, temperature = getattr(progress, "source", None), getattr(progress, "temperature", None)
@@ -492,7 +492,7 @@ def _examples() -> dict[str, NDArray[np.uint8]]:
 
 
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
-    """Return the part of a picture that is the sample at first, None if all is, and the output's width and height.
+    """Return the part of a picture that is the first sample, None for all, and the output's width and height.
 
     The output of a regular sample has a size that its lattice fits.
     """

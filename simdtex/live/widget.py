@@ -20,7 +20,7 @@ try:
 except ModuleNotFoundError:
 
     class AnyWidget:  # type: ignore[no-redef]
-        """Stands in for the missing package, so that the name can be imported."""
+        """A placeholder for the missing package, so that the name can be imported."""
 
         def __init__(self) -> None:
             raise ValueError(
@@ -31,8 +31,8 @@ except ModuleNotFoundError:
 class Live(AnyWidget):
     """The live page in a notebook: synthesise, fill, extend and classify interactively.
 
-    It is the page of ``simdtex live``, in Jupyter, JupyterLab, marimo and VS Code; the run is in the process of the
-    kernel. It needs the extra ``notebook``: ``pip install 'simdtex[notebook]'``.
+    It is the page of ``simdtex live``, in Jupyter, JupyterLab, marimo and VS Code; the kernel's process runs the jobs.
+    It needs the extra ``notebook``: ``pip install 'simdtex[notebook]'``.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ class Live(AnyWidget):
     name : str
         Name of its file in the command line that repeats a result.
     device : str, optional
-        As of `simdtex.synthesize`.
+        As in `simdtex.synthesize`.
 
     Attributes
     ----------
     image : array or None
-        The latest result, in the sample's type, channels last; of a classification its labels.
+        The latest result, in the sample's type, channels last; for a classification its labels.
     source : (rows, cols, 2) int32 array or None
-        Its source map.
+        The source map of the latest result.
     maps : dict
         Further maps in its arrangement, by name.
     command : str
@@ -65,8 +65,8 @@ class Live(AnyWidget):
 
     Notes
     -----
-    Cost: a frame takes 4 bytes for each pixel of the view; at most 30 a second are sent, as fast as the page sees them,
-    and making them takes at most a quarter of a run.
+    Cost: a frame takes 4 bytes for each pixel of the view. At most 30 per second are sent, no faster than the page can
+    show them, and making them takes at most a quarter of a run.
 
     Examples
     --------
@@ -82,7 +82,7 @@ class Live(AnyWidget):
     _esm = script()
     _css = style()
 
-    _session: Session | None = None  # None if the sample is refused
+    _session: Session | None = None  # None if the sample is invalid
 
     def __init__(
         self,
@@ -102,11 +102,11 @@ class Live(AnyWidget):
         self.on_msg(lambda _, message, buffers: session.receive(message, buffers))
 
     def wait(self, timeout: float | None = None) -> NDArray[Any]:
-        """Return the latest result once nothing is being made, and begin if nothing was made yet.
+        """Return the latest result when no run is left; start a first run if there is no result.
 
-        Of a cell that runs with those after it (*Run All*) the page shows nothing before all have ended, so that the
-        first run begins here. ``timeout`` is in seconds. Raises ValueError if there is no sample, or if the job was
-        refused or cancelled, and TimeoutError.
+        With *Run All*, the page appears only after all cells have ended, so the first run starts here. ``timeout`` is
+        in seconds. Raises ValueError if there is no sample, or if the job was refused or cancelled, and TimeoutError
+        after ``timeout``.
         """
         if self._session is None:
             raise ValueError("there is no picture yet; give one first")
@@ -134,7 +134,7 @@ class Live(AnyWidget):
         return self._latest.job.command if self._latest else ""
 
     def close(self) -> None:
-        """End what is being made, and take the widget away."""
+        """End the run, and remove the widget."""
         if self._session:
             self._session.close()
         super().close()

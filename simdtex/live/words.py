@@ -25,7 +25,7 @@ TABLES: dict[str, tuple[Any, str]] = {
     "extend": (mrf.Options, "extend"),
     "classify": (classifier.Options, "classify"),
 }
-"""The options and the command of each set of controls: of the methods, and of the jobs that one method does."""
+"""The options and the command of each set of controls: for the methods, and for the jobs with a single method."""
 
 
 def controls(name: str) -> list[dict[str, Any]]:
@@ -33,8 +33,8 @@ def controls(name: str) -> list[dict[str, Any]]:
 
     A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
     ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
-    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider; and
-    ``empty``, the text of an empty field, and ``usual``, what it stands for as a number, None if that depends.
+    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
+    ``empty``, the text of an empty field; and ``usual``, its number, None if that is not fixed.
     """
     options, job = TABLES[name]
     made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]

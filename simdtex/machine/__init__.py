@@ -9,13 +9,13 @@ __all__ = ["Machine", "open_machine"]
 
 
 def open_machine(device: str | Machine | None = None, *, profile: bool = False) -> Machine:
-    """Open a device.
+    """Return the machine of a device.
 
     Parameters
     ----------
     device : str, int, DeviceInfo, Machine or None
         Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes the device that
-        SIMDTEX_DEVICE names, else a GPU, else a CPU. A machine is returned as it is.
+        SIMDTEX_DEVICE names, else a GPU, else a CPU. A machine is returned unchanged.
     profile : bool
         Whether an OpenCL device measures the time of every kernel.
 

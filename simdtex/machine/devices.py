@@ -87,16 +87,16 @@ class DeviceInfo:
 
 
 def devices(probe: bool = True) -> list[DeviceInfo]:
-    """List all OpenCL devices, best first, and the NumPy reference last.
+    """Return all OpenCL devices, best first, and the NumPy reference last.
 
-    A platform that reports no device, or raises, has a line of its own with the reason. Platforms are queried once in a
+    A platform that reports no device, or raises, has a separate line with the reason. Platforms are queried once in a
     process.
 
     Parameters
     ----------
     probe : bool
-        Build and run a tiny program on each device, in a process of its own, so that a runtime that crashes or hangs
-        does not affect the others. Without it every device is marked "not probed".
+        Build and run a tiny program on each device, in a separate process, so that a runtime that crashes or hangs
+        does not affect other devices. Without it every device is marked "not probed".
 
     Returns
     -------
@@ -119,7 +119,7 @@ def probe(info: DeviceInfo) -> DeviceInfo:
 
 
 def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
-    """Choose a usable device.
+    """Return a usable device.
 
     Devices are probed in order of preference, in this process, and only until one is usable; devices that `text` does
     not match are never probed.
@@ -128,9 +128,9 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
     ----------
     text : str, int, DeviceInfo or None
         Part of a device's name, platform or version (case does not matter), an index of the listing, or "reference" for
-        the NumPy twin. None stands for the value of the environment variable SIMDTEX_DEVICE or, if that is unset or
-        empty, the first usable device of the listing. If several devices match, the one whose whole name is the text is
-        taken, else the only usable one of them. A `DeviceInfo` that is usable is returned as it is.
+        the NumPy twin. None means the value of the environment variable SIMDTEX_DEVICE or, if that is unset or empty,
+        the first usable device of the listing. If several devices match, the result is the one whose whole name is the
+        text, else the only usable one of them. A usable `DeviceInfo` is returned unchanged.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
         )
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":
-        return _reference(0)  # without asking any runtime: it must work even if all are broken
+        return _reference(0)  # without any runtime: it must work even if all are broken
     runtimes.check_fork()
     return choose(wanted, devices(probe=False), probe)
 
@@ -165,7 +165,7 @@ def choose(
     listing: Sequence[DeviceInfo],
     check: Callable[[DeviceInfo], DeviceInfo] = lambda info: info,
 ) -> DeviceInfo:
-    """Choose from a listing, best first, by the rules of `find`; `check` returns the probed line for a line."""
+    """Return a device of a listing, best first, by the rules of `find`; ``check`` probes a line and returns it."""
     if text is None:
         found = []
         for info in listing:
@@ -211,7 +211,7 @@ def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
 
 @functools.cache
 def _enumerate() -> tuple[DeviceInfo, ...]:
-    """Query every platform for its devices, once in a process, and sort them by preference."""
+    """Return the devices of every platform, sorted by preference; platforms are queried once in a process."""
     found: list[DeviceInfo] = []
     for number, vendor in enumerate(runtimes.platforms()):
         title = f"platform {number}"
@@ -229,7 +229,7 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
 
 
 def _describe(title: str, handle: cl.Device) -> DeviceInfo:
-    """Read the properties of a device."""
+    """Return the line of a device with its properties."""
     bits = int(handle.type)  # a mask: 2 CPU, 4 GPU, 8 accelerator
     return DeviceInfo(
         index=0,

@@ -15,10 +15,10 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Machine: TypeAlias = "OpenCL | Reference"
-"""A machine as methods see it: what the two classes have in common. Methods know nothing about OpenCL."""
+"""The machine of methods: the common interface of both classes. Methods do not depend on OpenCL."""
 
 Launcher: TypeAlias = "OpenCL"
-"""The machine that launchers of kernels get."""
+"""The machine argument of functions that launch kernels."""
 
 Array = Any
 """An array of a machine: `simdtex.machine.opencl.DeviceArray`, or `numpy.ndarray` on the reference."""
@@ -30,8 +30,8 @@ class Operation(Generic[P, R]):
     Parameters
     ----------
     function : callable
-        Its first argument is an OpenCL machine, or None for the twin; the others are arrays of that machine, or of
-        NumPy, and numbers. Its module, its kernel file and its test have one name.
+        Its first argument is an OpenCL machine, or None for the twin; all others are arrays of that machine, or of
+        NumPy, and numbers. Its module, its kernel file and its test have the same name.
     """
 
     def __init__(self, function: Callable[Concatenate[Any, P], R]) -> None:
@@ -44,5 +44,5 @@ class Operation(Generic[P, R]):
             return self._function(launcher, *args, **kwargs)
 
     def reference(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Compute in NumPy."""
+        """Return the result of the twin in NumPy."""
         return self._function(None, *args, **kwargs)

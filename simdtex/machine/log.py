@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any
 
 PENDING = 4096
-"""Launches whose events may wait for being read."""
+"""The most launches whose events wait to be read."""
 
 
 class Log:
@@ -38,12 +38,12 @@ class Log:
         if self.profile:
             self._pending.append((kernel.function_name, event))
             if len(self._pending) >= PENDING:
-                half = PENDING // 2  # the device goes on with the other half meanwhile
+                half = PENDING // 2  # meanwhile the device continues with the other half
                 self._pending[half - 1][1].wait()
                 self.settle(half)
 
     def settle(self, count: int | None = None) -> None:
-        """Read the times of the first launches that are pending, which must be complete; of all by default."""
+        """Read the times of the first ``count`` pending launches, None: all, which must be complete."""
         for name, event in self._pending[:count]:
             took = event.profile.end - event.profile.start
             self._total += took

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Memory checks before a run: the device's memory and the host's.
 
-The arrays of a CPU and of the NumPy reference are in the host's memory, and count there.
+The arrays of a CPU and of the NumPy reference are in the host's memory, and are counted there.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.
 """Limit of this process's control group in a container, version 2 and version 1."""
 
 TEMPORARY = 2**26
-"""Bytes of the host's memory that a machine takes whatever the size: scratch memory, sorting, its pool."""
+"""Bytes of the host's memory that a machine takes at any size: scratch memory, sorting, its pool."""
 
 
 def shared(machine: Machine) -> bool:
@@ -29,7 +29,7 @@ def shared(machine: Machine) -> bool:
 def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER) -> None:
     """Raise DeviceError if a run does not fit the memory that is available.
 
-    ``device`` and ``host`` are the bytes that the run takes at most in arrays of the machine, and in other arrays on
+    ``device`` and ``host`` are the most bytes of the run in arrays of the machine, and in other arrays on
     the host; ``remedy`` is the end of the error message.
     """
     if device > machine.memory:
@@ -41,7 +41,7 @@ def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER)
 
 
 def require_host(wanted: int, remedy: str = SMALLER) -> None:
-    """Raise DeviceError if this many bytes are more than the host has available."""
+    """Raise DeviceError if ``wanted`` bytes exceed the available memory of the host."""
     there = available()
     if wanted > there:
         raise DeviceError(
@@ -51,7 +51,7 @@ def require_host(wanted: int, remedy: str = SMALLER) -> None:
 
 
 def available() -> int:
-    """Return the bytes that this process may still take, within the limit of its control group."""
+    """Return the bytes that are available to this process, within the limit of its control group."""
     found: int = psutil.virtual_memory().available
     for path in LIMITS:
         try:

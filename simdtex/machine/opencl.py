@@ -22,7 +22,7 @@ from simdtex.machine.log import Log
 from simdtex.model.sample import BLOCK
 
 SMALL_COPY = 2**16
-"""Bytes that are copied to a device without waiting."""
+"""The most bytes that are copied to a device without waiting."""
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
@@ -55,7 +55,7 @@ def kernel_folder() -> Path:
 class DeviceArray:
     """A contiguous array on a device: a buffer, a shape and a type.
 
-    ``event`` is that of the copy that fills the buffer, and keeps the source alive. Creating a `pyopencl.array.Array`
+    ``event`` belongs to the copy that fills the buffer, and keeps the source alive. Creating a `pyopencl.array.Array`
     takes tens of microseconds, and a step of ten small kernels creates a dozen.
     """
 
@@ -78,7 +78,7 @@ class DeviceArray:
 
 
 class OpenCL:
-    """One OpenCL device. Threads may share it; each gets the bytes of a run alone.
+    """One OpenCL device. Threads may share it, and the bytes of a run do not depend on other threads.
 
     Operations of several threads run one after another, so that sharing saves compilation, but no time. Figures of
     work, such as `launches` and `seconds`, cover all threads. In a forked process it raises DeviceError.
@@ -142,12 +142,12 @@ class OpenCL:
 
     @contextmanager
     def running(self) -> Iterator[OpenCL]:
-        """Let an operation launch its kernels, while no other thread launches any."""
+        """Let an operation launch its kernels while no other thread launches kernels."""
         with self._plain_errors(), self._lock:
             yield self
 
     def put(self, array: Any) -> Any:
-        """Copy to the device; a small array is copied in the queue's order, without waiting."""
+        """Return a copy on the device; a small array is copied in the queue's order, without waiting."""
         array = np.array(array, order="C")
         large = array.nbytes > SMALL_COPY  # without the pool, which would round the size up and keep the memory
         with self._plain_errors():
@@ -163,7 +163,7 @@ class OpenCL:
             return result
 
     def get(self, array: DeviceArray) -> Any:
-        """Wait for the queue, and copy to NumPy."""
+        """Return a copy in NumPy, after waiting for the queue."""
         result = np.empty(array.shape, array.dtype)
         with self._plain_errors():
             if result.size:
@@ -171,7 +171,7 @@ class OpenCL:
         return result
 
     def part(self, array: DeviceArray, begin: int, end: int) -> Any:
-        """Copy elements ``begin`` to ``end`` - 1 of the first axis on the device."""
+        """Return a copy on the device of elements ``begin`` to ``end`` - 1 of the first axis."""
         with self._plain_errors():
             result = self.empty((end - begin, *array.shape[1:]), array.dtype)
             if result.size:
@@ -239,7 +239,7 @@ class OpenCL:
 
     @property
     def spared(self) -> int:
-        """Multiply-adds of distances that a bound has made needless so far; waits for the device."""
+        """Multiply-adds of distances that a bound has avoided so far; waits for the device."""
         with self._lock:
             self._read_counters()
             return self._spared
@@ -259,12 +259,12 @@ class OpenCL:
             ) from error
 
     def split(self, items: int, most: int) -> int:
-        """Return how many work-items, at most ``most``, share each of so many items, to keep the device busy."""
+        """Return the number of work-items, at most ``most``, for each of ``items`` items, to keep the device busy."""
         wanted = self._split or -(-self._occupied // (items * self._abreast)) * self._abreast
         return max(1, min(wanted, most))
 
     def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
-        """Return how many sites fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
+        """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
 
         The number is a multiple of the vector width.
         """
@@ -298,13 +298,13 @@ class OpenCL:
     ) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
 
-        ``function`` and ``defines`` are as of `kernel`; ``args`` are arrays of the device, scalars and structs of
+        ``function`` and ``defines`` are as in `kernel`; ``args`` are arrays of the device, scalars and structs of
         NumPy, and integers of Python, which become 32 bits.
         """
         self.enqueue(self.kernel(function, defines), size, *args, local=local)
 
     def enqueue(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
-        """Enqueue a kernel that is compiled already, as `launch` does."""
+        """Enqueue a compiled kernel, as `launch` does."""
         local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self.log.add(kernel(self.queue, size, local, *map(_argument, args)), kernel)
@@ -314,9 +314,9 @@ class OpenCL:
     ) -> None:
         """Enqueue a kernel for one range of work-items after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
 
-        The kernel's second and third arguments are where a launch begins and the end of its range: PoCL would compile a
-        kernel once more for launches with a global offset. The other arguments are set once, so that a launch takes a
-        few microseconds.
+        The kernel's second and third arguments are the begin and the end of a launch's range, since PoCL recompiles a
+        kernel for launches with a global offset. All other arguments are set once, so that a launch takes a few
+        microseconds.
         """
         kernel = self.kernel(function, defines)
         kernel.set_args(*map(_argument, args))
@@ -330,7 +330,7 @@ class OpenCL:
 
 
 def _argument(value: Any) -> Any:
-    """Return an argument of a kernel as pyopencl takes it."""
+    """Return an argument of a kernel in the type for pyopencl."""
     if type(value) is DeviceArray:
         return value.data
     return np.int32(value) if isinstance(value, int) else value

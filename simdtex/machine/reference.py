@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Reference:
-    """Runs the NumPy twin of every operation; the interface is that of `simdtex.machine.opencl.OpenCL`.
+    """The machine that runs the NumPy twin of every operation, with the interface of `simdtex.machine.opencl.OpenCL`.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Reference:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Have an operation compute in NumPy."""
+        """Let an operation compute in NumPy."""
         self.launches += 1
         yield None
 
@@ -46,7 +46,7 @@ class Reference:
         return array[begin:end]
 
     def sync(self, work: int = 0) -> None:
-        """Do nothing: every operation is done when it returns."""
+        """Do nothing, since every operation is complete when it returns."""
 
     def profile(self) -> None:
         """Return None: nothing is timed."""

@@ -121,7 +121,7 @@ def _icd_folder() -> Iterator[None]:
     """Point the loader to a temporary folder that lists all runtimes and the Intel runtime from the package index.
 
     The .icd file in Intel's wheel names a path that does not exist, and the loader reads a single folder. A folder
-    that the user has set is left alone, and on Windows runtimes are found in the registry.
+    that the user has set is not changed, and on Windows runtimes are found in the registry.
     """
     library = intel_library() if sys.platform == "linux" else None
     if library is None or any(os.environ.get(name) for name in _ICD_VARIABLES):
@@ -186,7 +186,7 @@ def failure(handle: cl.Device) -> str:
 
 
 def failures(indices: Sequence[int]) -> list[str]:
-    """Return what `failure` returns for devices of the listing, each checked in a process of its own."""
+    """Return the results of `failure` for devices of the listing, each checked in a separate process."""
     with ThreadPoolExecutor() as pool:
         return list(pool.map(_failure_apart, indices))
 

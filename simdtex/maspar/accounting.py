@@ -27,7 +27,7 @@ FLOP = 4
 
 
 class Account:
-    """Counts SIMD passes and their work.
+    """The counts of SIMD passes and of their work.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Account:
         The neighbourhood, rows and columns of sites.
     channels : int
     words : int
-        Words fetched of each neighbour: its channels, its temperature and, with coherence, its source.
+        Words fetched from each neighbour: its channels, its temperature and, with coherence, its source.
 
     Notes
     -----
@@ -44,7 +44,7 @@ class Account:
 
         passes candidates |N| channels 4 / FLOPS  +  shifts words 4 / XNET
 
-    since a pass takes as long for one active PE as for all.
+    since the time of a pass does not depend on the number of active PEs.
     """
 
     def __init__(self, array: ProcessorArray, offsets: NDArray[np.int32], channels: int, words: int) -> None:
@@ -54,7 +54,7 @@ class Account:
         self.total: dict[str, Any] = dict.fromkeys(keys, 0)
 
     def begin(self, grid: Grid, candidates: int) -> None:
-        """Begin a level: its lattice, and how many candidates a relaxation weighs."""
+        """Start a level with its lattice and the number of candidates of a relaxation."""
         self._grid, self._shifts = grid, self.array.shifts(grid, self._offsets)
         self._flop = self._flop_each * candidates
 
@@ -68,7 +68,7 @@ class Account:
             self.total[key] += more
 
     def report(self) -> dict[str, Any]:
-        """Return the totals, as `simdtex.run.Output` describes them."""
+        """Return the totals, see `simdtex.run.Output`."""
         active = self.total["sites"] / max(1, self.total["passes"])
         rows, cols = self.array.layers(self._grid)
         arrays = {mapping: ProcessorArray(self.array.rows, self.array.cols, mapping) for mapping in MAPPINGS}

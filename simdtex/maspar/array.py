@@ -34,16 +34,16 @@ LARGEST = 2**22
 
 @dataclass(frozen=True)
 class ProcessorArray:
-    """An array, and how pictures are laid onto it.
+    """An array, and the mapping of pictures onto it.
 
     Parameters
     ----------
     rows, cols : int
-        PEs, 1 or more each way.
+        Numbers of PEs, 1 or more.
     mapping : {"cut-and-stack", "hierarchical"}
         A picture larger than the array is cut into layers of the array's size, pixel (i, j) on PE (i mod rows,
         j mod cols); or each PE holds a block of ceil(height / rows) x ceil(width / cols) pixels side by side. All
-        levels of the multigrid stay where their pixels are.
+        levels of the multigrid stay on the PEs of their pixels.
     """
 
     rows: int
@@ -94,7 +94,7 @@ class ProcessorArray:
         def total(rows: int, cols: int) -> int:
             return sum(max(u, v) for i, j in pairs for u in down[rows][i] for v in across[cols][j])
 
-        rows, cols = ([ways.index(each) for each in ways] for ways in (down, across))  # most layers are alike
+        rows, cols = ([ways.index(each) for each in ways] for ways in (down, across))  # most layers are equal
         return np.array([total(row, col) for row in rows for col in cols], np.int64)
 
     def _ways(self, grid: Grid, length: int, pes: int, offsets: set[int]) -> list[dict[int, tuple[int, ...]]]:
@@ -113,7 +113,7 @@ class ProcessorArray:
 
 
 def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
-    """Return the processor array that a text names.
+    """Return the processor array described by a text.
 
     Parameters
     ----------

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The methods: programs over whole-array steps, to be read with the papers."""
+"""The methods: programs of whole-array steps, which follow the papers."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the methods speak of: lattices, samples, source maps."""
+"""The data types that all methods share: lattices, samples, guides, source maps."""

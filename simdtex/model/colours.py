@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colours for what has none: temperatures, where pixels are from, and how often the sample's are taken."""
+"""False colours for temperatures, source maps, the use of the sample, and labels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OKABE_ITO = (
     *((0, 0, 0), (230, 159, 0), (86, 180, 233), (0, 158, 115)),
     *((240, 228, 66), (0, 114, 178), (213, 94, 0), (204, 121, 167)),
 )
-"""Black, and seven colours that colour-blind people tell apart, sRGB."""
+"""Black and seven colours that colour-blind people can distinguish, sRGB."""
 
 
 def temperature_colours(temperature: ArrayLike) -> Picture:
@@ -38,10 +38,10 @@ def _temperature_table() -> Picture:
 
 
 def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
-    """Return a colour for each output pixel by the sample position it was taken from, (rows, cols, 3) uint8.
+    """Return a colour for each output pixel by its position in the sample, (rows, cols, 3) uint8.
 
-    ``source`` (rows, cols, 2) are rows and columns in the sample; a negative one is black. Neighbours in the sample
-    have neighbouring colours of one lightness, so a patch copied whole shows as a smooth area and a seam as an edge.
+    ``source`` (rows, cols, 2) are rows and columns in the sample; a negative position is black. Neighbours in the
+    sample have similar colours of one lightness, so a copied patch is a smooth area and a seam is an edge.
     """
     positions = np.asarray(source)
     extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
@@ -52,23 +52,22 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
 
 
 def use_colours(counts: NDArray[np.intp]) -> Picture:
-    """Return a colour for each pixel of the sample by how often it was taken, (sample rows, sample cols, 3) uint8.
+    """Return a colour for each pixel of the sample by its number of uses, (sample rows, sample cols, 3) uint8.
 
-    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is one of
-    `simdtex.model.use.counts`: near black for a pixel that was never taken, pale yellow for the one that was taken
-    most.
+    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is the number of uses from
+    `simdtex.model.use.counts`: near black for a pixel that was never taken, pale yellow for the most used one.
     """
     uses = np.log1p(counts)
     return temperature_colours(uses / (uses.max() or 1.0))
 
 
 def label_colours(count: int) -> Picture:
-    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, the others far apart.
+    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, and distinct colours for all others.
 
-    Labels 1 to 7 have the colours of Okabe and Ito (2008), which colour-blind people tell apart too.
+    Labels 1 to 7 have the colours of Okabe and Ito (2008), which colour-blind people can distinguish, too.
     """
     number = np.arange(len(OKABE_ITO), max(count, len(OKABE_ITO)))
-    hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: neighbours in number are far apart
+    hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: consecutive labels have distinct hues
     lightness = 0.62 + 0.16 * (number % 3 - 1)
     more = _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))
     return np.concatenate([np.array(OKABE_ITO, np.uint8), more])[:count]

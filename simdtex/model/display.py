@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a notebook shows a result: its picture, and its arrangement."""
+"""HTML of results for notebooks: the picture and its source map, and the choice at a site."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from simdtex.io.image import pillow_bytes, to_display
 from simdtex.model.colours import source_colours
 
 SIDE = 512
-"""The longest side of a picture that is shown, pixels; of larger ones every n-th row and column is."""
+"""The longest side of a displayed picture, pixels; larger pictures are displayed by every n-th row and column."""
 
 CELL = 12
-"""Pixels to a side of a neighbour in the picture of a neighbourhood."""
+"""Side of a neighbour in the picture of a neighbourhood, pixels."""
 
 
 def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statistics: dict[str, Any]) -> str:
     """Return HTML with a picture and its source map side by side, and the statistics below them.
 
-    ``made`` is (rows, cols, channels) or (depth, rows, cols, channels); of a solid the middle slice is shown. The
-    source map of several samples is not shown.
+    ``made`` is (rows, cols, channels) or (depth, rows, cols, channels); a solid is shown by its middle slice. A source
+    map with several samples is not shown.
     """
     figures = []
     if made is not None:
@@ -51,11 +51,11 @@ def choice_html(
     captions: Sequence[str],
     text: str,
 ) -> str:
-    """Return HTML with a neighbourhood, candidates with bars as long as they are probable, and a text below them.
+    """Return HTML with a neighbourhood, candidates with bars of their probabilities, and a text below them.
 
     ``offsets`` (N, 2 or 3) of the neighbours, of which those in the site's layer are shown; ``near`` (N, channels)
-    pixels, white where they are not ``certain`` (N,), 0 to 1; ``candidates`` (n, 1 + N, channels) pixels of each and of
-    its neighbours; ``probability`` and ``captions`` (n,).
+    pixels, the whiter the less ``certain`` (N,), 0 to 1; ``candidates`` (n, 1 + N, channels) pixels of each candidate
+    and of its neighbours; ``probability`` and ``captions`` (n,).
     """
     layer = np.flatnonzero((offsets[:, :-2] == 0).all(1) & offsets.any(1))
     radius = int(np.abs(offsets[:, -1]).max())

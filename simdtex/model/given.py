@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sites whose values are given: hard data, the known part of a picture. They stay what they are.
+"""Sites with given values, which do not change: hard data, and the known part of a picture.
 
-A given site has the temperature 0 from the beginning, and nothing relaxes it. At a coarse level a datum that lies
-between the sites is compared where it lies (`simdtex.ops.costs`). A guide's value between the sites stands for the
-nearest site that has none, for that level only; of several the nearest, and of those the first, row by row.
+A given site has the temperature 0 from the start and never relaxes. At a coarse level, a datum between the sites is
+compared at its own position (`simdtex.ops.costs`). A guide's value between the sites moves to the nearest site without
+a value, for that level only; of several values for a site, the nearest, and of equally near ones the first, row by row.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from simdtex.model.sample import Sample
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What is given of an output.
+    """The given values of an output.
 
     Parameters
     ----------
     values : (H, W, C) array
-        Of the sample's type.
+        Values of the sample's type.
     known : (H, W, C) bool array
-        Which of them are given. A site of which some variables are given and others are not relaxes, guided by those,
-        and shows them in the end.
+        True for given values. A site with some variables given and others not relaxes, guided by the given ones, which
+        the output shows.
     place : (H, W, 2 or 3) int32 array, optional
-        Where in the sample each given site is from: row, column and, of several pictures, its number; -1 where from
-        nowhere. None: all from nowhere.
+        The position of each given site in the sample: row, column and, with several pictures, the number of the
+        picture; -1 for a site from elsewhere. None: all sites are from elsewhere.
     suggests : bool
-        Whether sites that are from the sample suggest how to go on. Where all that they could suggest is unknown
-        itself, they are hard data instead, of which every channel is known.
+        Whether sites from the sample suggest candidates that continue them. False if all such candidates are unknown:
+        the sites are then hard data, with every channel known.
     outside : (H, W) bool array, optional
         Sites that take no part. They are known, nothing is compared with their values, and the output shows these.
     """
@@ -51,52 +51,52 @@ class Given:
 
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
-        """Sites of which everything is given, (H, W)."""
+        """Sites with all variables given, (H, W)."""
         return np.asarray(self.known.all(-1))
 
     @property
     def told(self) -> NDArray[np.bool_]:
-        """Which values are given at sites that take part, (H, W, C)."""
+        """Mask of the given values at sites that take part, (H, W, C)."""
         return self.known if self.outside is None else self.known & ~self.outside[..., None]
 
     @property
     def data(self) -> NDArray[np.bool_]:
-        """Sites that take part of which everything is given, (H, W)."""
+        """Sites that take part, with all variables given, (H, W)."""
         return self.whole if self.outside is None else self.whole & ~self.outside
 
     @cached_property
     def partly(self) -> bool:
-        """Whether there are sites of which some variables are given and others are not."""
+        """Whether there are sites with some variables given and others not."""
         return bool((self.known.any(-1) & ~self.whole).any())
 
     def colocated(self, samples: tuple[NDArray[Any], ...]) -> Colocated:
-        """Return the variables that are known at sites where others are not, as a guide for these."""
+        """Return the known variables of sites with unknown ones, as a guide for the unknown ones."""
         return Colocated(samples, self.values, self.known & ~self.whole[..., None])
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
-        """Return the picture (rows, cols, C) of a level with the known values at its sites."""
+        """Return the picture (rows, cols, C) of a level, with the known values at its sites."""
         step = (slice(None, None, grid.spacing),) * len(grid.shape)
         found: NDArray[Any] = np.where(self.known[step], self.values[step], picture)
         return found
 
 
 class Stand(NamedTuple):
-    """Sites that stand for values between them: ``site`` and ``datum``, (n,) pixel indices of the output."""
+    """Sites, and the values between the sites that move to them: ``site`` and ``datum``, (n,) pixel indices."""
 
     site: NDArray[np.int64]
     datum: NDArray[np.int64]
 
 
 MOST_NEAR = 8
-"""Data between the sites of a level that a site is compared with at most: the nearest."""
+"""The most data between the sites of a level that a site is compared with: the nearest ones."""
 
 NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
-    """Return the sites of a level's lattice that stand in for values between them, in ascending order.
+    """Return the sites of a level's lattice that receive values from between the sites, in ascending order.
 
-    ``known`` (H, W) are the values. One moves if none of the four sites around it is known itself.
+    ``known`` (H, W) is the mask of values. A value moves if none of the four sites around it is known.
     """
     step, (height, width) = grid.spacing, known.shape
     row, col = between(known, grid).T.astype(np.int64)
@@ -120,7 +120,7 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
 def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
     """Return the places (n, 2 or 3) of the data between the sites of a lattice that have no given site around them.
 
-    ``known`` (H, W) or (D, H, W) are the data; around a datum are the sites at the corners of its cell.
+    ``known`` (H, W) or (D, H, W) is the mask of data; the sites around a datum are the corners of its cell.
     """
     step, own = grid.spacing, np.zeros(grid.shape, bool)
     own[:] = grid.view(known)
@@ -138,11 +138,11 @@ def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
 def around(
     place: NDArray[np.int32], grid: Grid, order: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the data near each site of a lattice, or of a window of it, site by site, the nearest first.
+    """Return the data near each site of a lattice or a window of it, site by site, the nearest first.
 
-    ``place`` (n, 2 or 3) are the places of the data in pixels; those no farther than the neighbourhood of ``order``
-    reaches are near, and of them the `MOST_NEAR` nearest count. Returns the pixel index of the site in the grid's
-    picture, the number of the datum, and its offset (m, 2 or 3) from the site in pixels.
+    ``place`` (n, 2 or 3) are the places of the data in pixels. The data of a site are the `MOST_NEAR` nearest within
+    the neighbourhood of ``order``. Returns the pixel index of the site in the grid's picture, the number of the datum,
+    and its offset (m, 2 or 3) from the site in pixels.
     """
     step, reach, axes = grid.step, isqrt(order), place.shape[1]
     first = np.array([0, grid.within.top, grid.within.left])[-axes:]
@@ -165,10 +165,10 @@ def around(
 
 
 class Planes(NamedTuple):
-    """What is given as a run's field has it, on the host.
+    """The given values in the layout of a run's field, on the host.
 
-    ``values`` (C, H, W) uint16, `UNKNOWN` where a channel is not; ``source`` (H, W) int32, -1 where from nowhere;
-    ``known`` (H, W) bool. A site that takes no part is known, and all its channels are `UNKNOWN`, which have no weight.
+    ``values`` (C, H, W) uint16, `UNKNOWN` in unknown channels; ``source`` (H, W) int32, -1 without a source; ``known``
+    (H, W) bool. A site that takes no part is known, and all its channels are `UNKNOWN`, which have no weight.
     """
 
     values: NDArray[np.uint16]
@@ -182,7 +182,7 @@ class Planes(NamedTuple):
 
 
 def planes(given: Given, sample: Sample) -> Planes:
-    """Return the known values in a sample's channels: all of them at sites that are from the sample."""
+    """Return the given values in the channels of ``sample``; a site from the sample has all of them."""
     shape = given.whole.shape
     values = np.full((sample.channels, *shape), UNKNOWN, np.uint16)
     source = np.full(shape, -1, np.int32) if given.place is None else sample.index(given.place)

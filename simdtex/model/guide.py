@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Guides: pictures that accompany the sample and the output, are matched, and are never made.
+"""Guides: pictures of the sample and of the output that are matched and never synthesised.
 
-A guide's channels stand in equation (12) with those of the pixels, with two differences: they are known everywhere,
-whatever the temperature, and the site itself counts, with the weight `centre`. So a candidate is near if its guide,
-there and around it, equals that of the site: texture by numbers (Hertzmann et al. 2001), or a secondary variable.
+A guide's channels are terms of equation (12) like those of the pixels, with two differences: they are known everywhere,
+whatever the temperature, and the site itself counts, with the weight `centre`. So a candidate is near if its guide, at
+and around it, equals that of the site: texture by numbers (Hertzmann et al. 2001), or a secondary variable.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from simdtex.model.scale import Scale, stretch
 from simdtex.model.sums import sums_around
 
 UNKNOWN = 2**16 - 1
-"""The working level of an unknown value, which counts for nothing (kernels/common/confidence.h)."""
+"""The working level of an unknown value, which has no weight (kernels/common/confidence.h)."""
 
 
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
 """A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
 MOST = 16
-"""Channels of working levels that a variable has, at most: one for each category."""
+"""The most channels of working levels of a variable: one for each category."""
 
 
 class Planes(NamedTuple):
@@ -42,7 +42,7 @@ class AnyGuide(Protocol):
 
     @property
     def channels(self) -> int:
-        """How many, at most."""
+        """The largest number of channels."""
         ...
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
@@ -52,11 +52,11 @@ class AnyGuide(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """A guide, one picture of it for each of the sample and one for the output.
+    """A guide, with a picture for each picture of the sample and one for the output.
 
-    ``samples`` (rows, cols, G) have the sizes of the sample's pictures, ``output`` (H, W, G) is NaN where the output is
-    free; ``labels`` says whether its numbers are names: two differ or they do not; ``weight`` is its variance in units
-    of the pixels'.
+    ``samples`` (rows, cols, G) have the sizes of the sample's pictures, ``output`` (H, W, G) is NaN where there is no
+    guide; ``labels`` says whether its numbers are labels, which are only equal or different; ``weight`` is the variance
+    of the guide in units of the pixels' variance.
     """
 
     samples: tuple[NDArray[Any], ...]
@@ -66,7 +66,7 @@ class Guide:
 
     @property
     def channels(self) -> int:
-        """One for each of its own; of three labels or more one for each label."""
+        """The number of channels: one for each of the guide's, or for each label if these are three or more."""
         if not self.labels:
             return int(self.output.shape[-1])
         names = [self._names(channel).size for channel in range(self.output.shape[-1])]
@@ -76,7 +76,7 @@ class Guide:
         return np.unique(np.concatenate([np.unique(sample[..., channel]) for sample in self.samples]))
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """Return a channel for each of the guide's; of three labels or more one for each label."""
+        """Return one channel for each of the guide's, or for each label if these are three or more."""
         silent = unknown_in(self.output)
         parts = [self._channel(channel, silent, spread, top) for channel in range(self.output.shape[-1])]
         counts = zip(*(part.samples for part in parts), strict=True)
@@ -113,10 +113,10 @@ class Guide:
 
 @dataclass(frozen=True, eq=False)
 class Colocated:
-    """Data of some variables at sites whose other variables are unknown: they guide the choice of those.
+    """A guide of the known variables at sites whose other variables are unknown.
 
     ``samples`` (rows, cols, C) are the sample's pictures, ``values`` (H, W, C) of the sample's type, and ``known`` (H,
-    W, C) says which of them are given.
+    W, C) is True for given values.
     """
 
     samples: tuple[NDArray[Any], ...]
@@ -125,7 +125,7 @@ class Colocated:
 
     @property
     def channels(self) -> int:
-        """At most those of all variables, each with its categories."""
+        """The largest number of channels: those of all variables, each with its categories."""
         return int(self.known.shape[-1]) * MOST
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
@@ -139,19 +139,19 @@ class Colocated:
 
 
 AROUND = 4
-"""Pixels to each side over which known colours are averaged, and by which unknown pixels look into what is known."""
+"""Pixels to each side over which known colours are averaged; beyond the nearest known pixel if it is unknown."""
 
 NEARNESS, FAR = 0.3, 300
-"""Variance of the place in a picture in units of the colours', for places so many pixels apart."""
+"""Variance of the place in a picture, in units of the colours' variance, for places ``FAR`` pixels apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
     """The smooth colours of a picture, and the places in it: a guide for its holes.
 
-    ``sample`` (rows, cols, C) is the picture, and ``known`` where it is known. ``values`` (H, W, C)
-    is the output, known where ``given``; ``corner`` is its first row and its first column in the sample, NaN if rows or
-    columns tell nothing.
+    ``sample`` (rows, cols, C) is the picture, and ``known`` the mask of its known pixels. ``values`` (H, W, C) is the
+    output, and ``given`` the mask of its known pixels; ``corner`` is the first row and the first column of the output
+    in the sample, NaN for an axis that does not guide.
     """
 
     sample: NDArray[Any]
@@ -162,7 +162,7 @@ class Surroundings:
 
     @property
     def channels(self) -> int:
-        """Those of the colours, the row and the column."""
+        """The number of channels: the colours, the row and the column."""
         return int(self.sample.shape[-1]) + 2
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
@@ -181,17 +181,17 @@ class Surroundings:
 def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """Return the mean of the known pixels in a square around each pixel of a picture (C, rows, cols).
 
-    The square of a pixel among known ones has 9 x 9 pixels; that of another reaches `AROUND` pixels beyond the nearest
-    known one, or up to half as far again. Cost: some twelve passes over the picture for each size of square.
+    The square of a known pixel has 9 x 9 pixels; that of an unknown pixel reaches `AROUND` pixels beyond the nearest
+    known one, or up to 1.5 times as far. Cost: about twelve passes over the picture for each size of square.
     """
-    from scipy.ndimage import distance_transform_cdt  # where something is unknown: it takes long to load
+    from scipy.ndimage import distance_transform_cdt  # only for unknown pixels, since it loads slowly
 
     needed = distance_transform_cdt(~known, metric="chessboard") + AROUND
     found, before, reach = np.zeros_like(levels), 0, AROUND
     while before < needed.max():
         here = (needed > before) & (needed <= reach)
         count = sums_around(known, reach)[here]
-        for plane, smoothed in zip(levels, found, strict=True):  # one by one, for the sake of memory
+        for plane, smoothed in zip(levels, found, strict=True):  # one by one, to save memory
             smoothed[here] = sums_around(np.where(known, plane, 0), reach)[here] // count
         before, reach = reach, reach * 3 // 2
     return found

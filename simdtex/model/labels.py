@@ -35,9 +35,9 @@ def write_labels(path: PathLike, labels: NDArray[np.uint8]) -> None:
 def read_labels(path: PathLike) -> NDArray[Any]:
     """Read a picture of labels, (rows, cols) of an integer type: its values or, with a palette, the indices.
 
-    Raises ValueError if it is no such picture.
+    Raises ValueError if the file is no such picture.
     """
-    pixels = read(path).pixels  # first: it refuses what is too large or damaged
+    pixels = read(path).pixels  # first, since it rejects too large and damaged files
     with suppress(OSError, ValueError), PIL.Image.open(path) as picture:
         if picture.mode == "P":
             return np.asarray(picture)

@@ -19,7 +19,7 @@ MOST_ORDER = 4096
 
 
 LAYER = 2**16
-"""Rows that stand for a layer in an offset: (layers * LAYER + rows, columns)."""
+"""Rows that represent a layer in an offset: (layers * LAYER + rows, columns)."""
 
 
 def neighbourhood_offsets(order: int, axes: int = 2) -> NDArray[np.int32]:
@@ -27,7 +27,7 @@ def neighbourhood_offsets(order: int, axes: int = 2) -> NDArray[np.int32]:
 
     The neighbours are the sites within the distance sqrt(order), 1 to `MOST_ORDER`, in canonical order: by distance,
     then layer, then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60. With 3 ``axes`` the neighbourhood
-    is a ball, and the row of an offset has its layers in units of `LAYER`: order 1 has 6, order 8 has 92.
+    is a ball, and the row of an offset includes its layers in units of `LAYER`: order 1 has 6, order 8 has 92.
     """
     whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
@@ -60,10 +60,11 @@ LATTICE = np.dtype(
 
 
 class Part(NamedTuple):
-    """Where a window lies in its whole.
+    """The position of a window in the whole lattice.
 
-    ``top``, ``left`` the row and column of its first site in the whole lattice; ``rows``, ``cols`` sites of the whole
-    lattice; ``step`` 2**level, pixels of the whole picture from site to site; ``width`` pixels to a row of it.
+    ``top``, ``left``, the row and column of its first site in the whole lattice; ``rows``, ``cols``, the size of the
+    whole lattice; ``step``, 2**level, the spacing of sites in pixels of the whole picture; ``width``, the columns of
+    that picture.
     """
 
     top: int
@@ -76,30 +77,30 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Grid:
-    """The lattice of one level within a picture, equation (10): sites (spacing i, spacing j); or a window of it.
+    """The lattice of one level in a picture, equation (10), with sites (spacing i, spacing j); or a window of it.
 
-    Or the lattice of a volume, whose layers lie one below another: an open one, without windows and tiles.
+    It may also be the lattice of a volume, whose layers lie one below another: open, without windows and tiles.
 
     Parameters
     ----------
     height, width : int
-        The picture that holds it, or a layer of the volume, in pixels.
+        Size of the picture that holds the lattice, or of a layer of the volume, in pixels.
     spacing : int
         Pixels of that picture from site to site: 2**level, or 1 in a window.
     torus : bool
         Whether rows and columns of the whole wrap around.
     tile : (int, int), optional
         Rows and columns of tiles, in sites of the grid. Neighbours in another tile are then read from an older
-        picture that stands `plane` pixels on (`simdtex.ops.snapshot`).
+        picture, `plane` pixels further on in the buffer (`simdtex.ops.snapshot`).
     part : Part, optional
-        Where it lies in the whole, for a window that `window` has made.
+        The position in the whole of a window that `window` has made.
     layers : int
         Layers of pixels of a volume; 1: a picture.
 
     Notes
     -----
-    A site is known by its place in the whole: that place keys its random numbers, so a window relaxes as the same sites
-    of the whole do, as far as it holds their neighbourhoods. An address in a buffer keys nothing.
+    The place of a site in the whole is the key of its random numbers, and its address in a buffer is not. So a window
+    relaxes like the same sites of the whole, as far as it holds their neighbourhoods.
     """
 
     height: int
@@ -122,32 +123,32 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of the grid: (rows, cols), or (layers, rows, cols) of a volume's."""
+        """The shape of the grid: (rows, cols), or (layers, rows, cols) of a volume."""
         return tuple(-(-side // self.spacing) for side in self.pixels)
 
     @property
     def size(self) -> int:
-        """Its sites."""
+        """Number of sites."""
         return prod(self.shape)
 
     @property
     def rows(self) -> int:
-        """Rows of the grid, or of each of its layers."""
+        """Number of rows of the grid, or of each of its layers."""
         return -(-self.height // self.spacing)
 
     @property
     def cols(self) -> int:
-        """Columns of the grid."""
+        """Number of columns of the grid."""
         return -(-self.width // self.spacing)
 
     @property
     def plane(self) -> int:
-        """Pixels of the picture that holds it, or of the volume."""
+        """Number of pixels of the picture that holds the grid, or of the volume."""
         return prod(self.pixels)
 
     @property
     def within(self) -> Part:
-        """Where it lies in the whole; the whole lies in itself."""
+        """The position of the grid in the whole lattice; the whole is at (0, 0)."""
         return self.part or Part(0, 0, self.rows, self.cols, self.spacing, self.width)
 
     @property
@@ -157,13 +158,13 @@ class Grid:
 
     @property
     def around(self) -> tuple[bool, bool]:
-        """Whether rows, and columns, wrap around: on a torus, where the grid is as large as the whole."""
+        """Whether rows wrap around, and whether columns do: on a torus, if the grid is as large as the whole."""
         whole = self.within
         return self.torus and self.rows == whole.rows, self.torus and self.cols == whole.cols
 
     @cached_property
     def struct(self) -> np.void:
-        """The grid as kernels take it, of the type `LATTICE`."""
+        """The grid as a kernel argument, of the type `LATTICE`."""
         whole, numbers, deep = self.within, np.zeros((), LATTICE), self.size // (self.rows * self.cols)
         for name, value in {
             **{"layers": deep, "high": self.rows, "height": self.height},
@@ -178,10 +179,11 @@ class Grid:
         return struct
 
     def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
-        """Return a window of this lattice, which lies in a picture of its own, site by site.
+        """Return a window of this lattice in a picture of its own, with one pixel for each site.
 
-        ``top`` and ``left`` are row and column of its first site; on a torus they may lie anywhere, and the window goes
-        on across the seam. Raises ValueError if it is larger than the whole or, on an open lattice, reaches beyond it.
+        ``top`` and ``left`` are row and column of its first site; on a torus they may have any value, and the window
+        continues across the seam. Raises ValueError if it is larger than the whole or, on an open lattice, reaches
+        beyond it.
         """
         whole = self.within
         if not (0 < rows <= whole.rows and 0 < cols <= whole.cols):
@@ -195,12 +197,12 @@ class Grid:
 
     @property
     def whole(self) -> Grid:
-        """The lattice that this is a window of, site by site; itself where it is no window."""
+        """The whole lattice of this window, with one pixel for each site; the grid itself if it is no window."""
         return self.window(-self.within.top, -self.within.left, *self.within[2:4]) if self.part else self
 
     @property
     def flat(self) -> Grid:
-        """The same sites as a lattice of their own, numbered 0 .. rows * cols - 1."""
+        """The same sites as a separate lattice, numbered 0 .. rows * cols - 1."""
         return Grid.of(self.shape, 1, self.torus)
 
     @property
@@ -219,7 +221,7 @@ class Grid:
         return whole[..., row[:, None], col[None, :]]
 
     def sites(self) -> NDArray[np.int32]:
-        """Pixel index of every site, (size,), row by row."""
+        """Return the pixel index of every site, (size,), row by row."""
         row = np.arange(self.rows, dtype=np.int32)[:, None] * np.int32(self.width)
         col = np.arange(self.cols, dtype=np.int32)[None, :]
         layer = np.arange(self.size // (self.rows * self.cols), dtype=np.int32)[:, None, None]
@@ -231,7 +233,7 @@ class Grid:
         return np.ravel_multi_index(tuple(line * self.spacing for line in place), self.pixels).astype(np.int64)
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-        """Return the pixel indices in the whole picture of sites of this grid; they key random numbers."""
+        """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""
         if self.layers > 1:
             return sites.astype(np.int64)
         whole = self.within
@@ -242,18 +244,18 @@ class Grid:
         return places
 
     def view(self, picture: NDArray[Any]) -> NDArray[Any]:
-        """Return the sites of this grid as a view of a picture (..., H, W), without older pictures below it.
+        """Return a view of the sites of this grid in a picture (..., H, W), without older pictures below it.
 
-        Or as a view of a volume (..., D, H, W).
+        For a volume, a view of (..., D, H, W).
         """
         if self.layers > 1:
             return picture[..., :: self.spacing, :: self.spacing, :: self.spacing]
         return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, and for the site itself.
+        """Return each neighbour's pixel index, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
-        If there are tiles, `plane` is added to that of a neighbour in another tile.
+        If there are tiles, `plane` is added to the index of a neighbour in another tile.
         """
         if self.layers > 1:
             return self._among_layers(sites, offsets)
@@ -283,7 +285,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sublattice:
-    """The sites n (a, 0) + m (b, c), (row, column); its a * c cosets are the colours of a lattice colouring."""
+    """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring."""
 
     a: int
     b: int
@@ -311,9 +313,9 @@ class Sublattice:
 
 @lru_cache(maxsize=64)
 def coloring_of_layers(order: int) -> tuple[int, int, int]:
-    """Return (m, a, b) of fewest colours m so that (a layer + b row + column) mod m differs among neighbours.
+    """Return (m, a, b) with the fewest colours m for which (a layer + b row + column) mod m differs among neighbours.
 
-    Neighbours are the sites of a ball, the neighbourhood of an order in three dimensions. Order 8 needs 21 colours.
+    The neighbourhood of ``order`` in three dimensions is a ball. Order 8 needs 21 colours.
     """
     layer, row, col = parts_of(neighbourhood_offsets(order, 3).astype(np.int64))
     for m in range(2, 8 * (isqrt(order) + 1) ** 3):
@@ -329,10 +331,10 @@ def coloring_of_layers(order: int) -> tuple[int, int, int]:
 def coloring_sublattice(
     order: int, rows: int | None = None, cols: int | None = None, limit: int | None = None
 ) -> Sublattice | None:
-    """Return the sublattice of fewest cosets whose shortest vector is longer than a neighbourhood reaches.
+    """Return the sublattice with the fewest cosets whose shortest vector is longer than sqrt(``order``).
 
-    ``rows`` and ``cols`` are those of a torus that the pattern must fit; without them, it is the best of the plane.
-    ``limit`` is the most cosets to look at; a square pattern needs no more than the default, (isqrt(order) + 1)**2.
+    ``rows`` and ``cols`` are the size of a torus that the pattern must fit; without them, the result is the best of the
+    plane. ``limit`` is the most cosets to try; a square pattern needs at most the default, (isqrt(order) + 1)**2.
     Index 2 for order 1, 4 for 2, 9 for 8, 20 for 18; None if no torus of this size has one.
     """
     for index in range(1, (limit or (isqrt(order) + 1) ** 2) + 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The maps of a material in one folder: what each is, by its name, and normals of length 1."""
+"""The maps of a material in one folder: the role of each file by its name, and normals of length 1."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ ROLES = {
     "opacity": "opacity alpha transparency",
     "packed": "orm arm metallicroughness",
 }
-"""What a map is, and the words at the end of its name that say so."""
+"""The roles of maps, and the words at the end of a name that give the role."""
 
 NORMALS = ("normal", "normal-dx")
 
 READABLE = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".ppm", ".pgm", ".npy")
 UNREADABLE = (".exr", ".hdr", ".tga", ".dds", ".psd")
-"""How names of pictures end whose formats are not read; files of other names are no pictures."""
+"""Suffixes of picture formats that are not read; files with other unknown suffixes are no pictures."""
 
 _WORDS = {word: role for role, words in ROLES.items() for word in words.split()}
 _PARTS = re.compile(r"[0-9]+(?:k|K|px|bit)?|[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _AFTER = re.compile(r"[0-9]+(?:k|px|bit)?|maps?|texture|tex|png|jpg")
-"""Words that may stand after the one that says what a map is."""
+"""Words that may follow the word of the role."""
 
 
 class Maps(NamedTuple):
-    """The maps of a folder: the file of each role, and names of pictures whose role is unknown."""
+    """The maps of a folder: the file of each role, and the names of pictures with an unknown role."""
 
     files: dict[str, Path]
     unknown: list[str]
 
 
 def map_role(name: str | os.PathLike[str]) -> str | None:
-    """Return what a map is, one of `ROLES`, by the last word of its file's name, or None.
+    """Return the role of a map, one of `ROLES`, by the last word of its file's name, or None.
 
-    Case does not matter. Words are parted by anything but letters and digits, or begin with a capital letter; a size
-    such as ``2K`` may stand after them.
+    Case does not matter. Words are separated by anything but letters and digits, or begin with a capital letter; a size
+    such as ``2K`` may follow.
 
     Examples
     --------
@@ -65,9 +65,9 @@ def map_role(name: str | os.PathLike[str]) -> str | None:
 
 
 def find_maps(folder: str | os.PathLike[str]) -> Maps:
-    """Find the maps of the material in a folder, by their names.
+    """Return the maps of the material in a folder, by their names.
 
-    Hidden files, folders within, and files that are no pictures are passed over.
+    Hidden files, subfolders, and files that are no pictures are ignored.
 
     Raises
     ------
@@ -97,20 +97,20 @@ def find_maps(folder: str | os.PathLike[str]) -> Maps:
 
 
 def unit_normals(pixels: NDArray[Any], where: NDArray[np.bool_]) -> NDArray[Any]:
-    """Return a normal map whose vectors have the length 1 at some pixels; its other values are unchanged.
+    """Return a normal map with vectors of length 1 at the pixels ``where``; its other values are unchanged.
 
     Parameters
     ----------
     pixels : ndarray, (rows, cols, channels)
-        Red, green and blue are x, y and z, from -1 to 1: 0 to full scale of unsigned integers; of floats 0 to 1 if none
-        is negative. Further channels are unchanged, and so is a map of fewer than three.
+        Red, green and blue are x, y and z, from -1 to 1. In unsigned integers this is 0 to full scale; in floats
+        without a negative one, 0 to 1. Further channels are unchanged, and so is a map with fewer than three.
     where : ndarray of bool, (rows, cols)
 
     Returns
     -------
     ndarray
-        The shape and type of `pixels`; unsigned integers are rounded. A vector shorter than 0.01 has no direction, and
-        is unchanged.
+        An array of the shape and type of `pixels`; unsigned integers are rounded. A vector shorter than 0.01 has no
+        direction, and is unchanged.
     """
     if pixels.ndim < 3 or pixels.shape[2] < 3 or pixels.dtype.kind not in "uf":
         return pixels

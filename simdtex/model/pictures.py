@@ -19,18 +19,18 @@ class Pictures:
     Parameters
     ----------
     pixels : tuple of (rows, cols, C) arrays
-        Of any sizes; NaN where a pixel is unknown. Or one volume (layers, rows, cols, C).
+        Pictures of any sizes, NaN where a pixel is unknown; or one volume (layers, rows, cols, C).
     unknown : tuple of (rows, cols) bool arrays, optional
-        Unknown pixels in addition to NaN: nothing is taken from there, and they are no neighbours.
+        Unknown pixels in addition to NaN: they are never taken, and are no neighbours.
     usable : tuple of (rows, cols) bool arrays, optional
-        Where pixels may be taken from; all of them are neighbours. None: everywhere.
+        True for pixels that may be taken; all pixels are neighbours. None: all may be taken.
     categorical : tuple of C bools, optional
         Whether the numbers of a variable (a channel) name categories. None: none do.
     weights : tuple of C floats, optional
-        Of the variables, each brought to the same spread. None: all are on one scale, as colours are.
+        Weights of the variables, which are scaled to the same spread. None: all are on one scale, as colours are.
     shares : tuple of floats, optional
-        How much of the output each picture is to be used for; they need not add up to 1. None: every pixel of all
-        pictures counts alike.
+        The share of the output for each picture; they need not add up to 1. None: the pixels of all pictures have equal
+        weights.
     """
 
     pixels: tuple[NDArray[Any], ...]
@@ -42,7 +42,7 @@ class Pictures:
     known: tuple[Mask, ...] | None = field(init=False)
 
     def __post_init__(self) -> None:
-        """Complete unknown pixels by the nearest known one, so that a neighbourhood can be looked at."""
+        """Replace unknown pixels by the nearest known one, so that every neighbourhood has values."""
         gaps = [unknown_in(picture) for picture in self.pixels]
         if self.unknown:
             gaps = [gap | more for gap, more in zip(gaps, self.unknown, strict=True)]
@@ -51,7 +51,7 @@ class Pictures:
             return
         if any(gap.all() for gap in gaps):
             raise ValueError("a sample has no known pixel; leave it out")
-        object.__setattr__(self, "unknown", tuple(gaps))  # completed pixels no longer tell, and `replace` asks again
+        object.__setattr__(self, "unknown", tuple(gaps))  # lost in completed pixels; for `replace`
         object.__setattr__(self, "known", tuple(~gap for gap in gaps))
         object.__setattr__(self, "pixels", tuple(completed(*pair) for pair in zip(self.pixels, gaps, strict=True)))
 
@@ -62,11 +62,11 @@ class Pictures:
 
     @property
     def clean(self) -> bool:
-        """Whether there is one picture, and all of it is known and may be used."""
+        """Whether there is only one picture, whose pixels are all known and may be taken."""
         return len(self.pixels) == 1 and self.known is None and self.usable is None
 
     def categories(self, variable: int) -> NDArray[Any] | None:
-        """Return the categories of a variable in ascending order; None if it has none."""
+        """Return the categories of a variable in ascending order; None if it is not categorical."""
         if not (self.categorical and self.categorical[variable]):
             return None
         return np.unique(np.concatenate([self.values(variable, number) for number in range(len(self.pixels))]))
@@ -78,7 +78,7 @@ class Pictures:
 
     @property
     def channels(self) -> int:
-        """Channels of working levels: one for a variable, and one for each of its categories if these are 3 or more."""
+        """Number of channels of working levels: one for a variable, or one for each category if these are 3 or more."""
         found = [self.categories(variable) for variable in range(self.pixels[0].shape[-1])]
         return sum(1 if those is None or len(those) < 3 else len(those) for those in found)
 
@@ -90,7 +90,7 @@ def kind(picture: NDArray[Any]) -> str:
 
 
 def check_alike(name: str, picture: NDArray[Any], other: str, like: NDArray[Any]) -> None:
-    """Raise unless two pictures with a channel axis have the same type and as many channels."""
+    """Raise unless two pictures with a channel axis have the same type and number of channels."""
     if (picture.dtype, picture.shape[-1]) != (like.dtype, like.shape[-1]):
         raise ValueError(f"{name} has {kind(picture)} and {other} {kind(like)}; convert them to one type")
 
@@ -107,7 +107,7 @@ def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
     """Return the picture (rows, cols, C) with each unknown pixel replaced by the nearest known one."""
     if not unknown.any():
         return picture
-    from scipy.ndimage import distance_transform_edt  # only where something is unknown: it takes long to load
+    from scipy.ndimage import distance_transform_edt  # only for unknown pixels, since it loads slowly
 
     nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     filled: NDArray[Any] = np.ascontiguousarray(picture[tuple(nearest)])

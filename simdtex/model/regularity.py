@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lattice that a regular texture repeats on, and the phases that guide an output by it.
+"""The lattice on which a regular texture repeats, and the phases on it that guide an output.
 
 A near-regular texture (Liu, Collins and Tsin 2004) looks alike at all points of a lattice. Every pixel of the sample
 and of the output has two phases on that lattice; their cosines and sines are a guide, so that a candidate comes from
-the same place within a cell. The lattice is found from whole numbers, and the guide's levels are rounded.
+the same place within a cell. The lattice is computed from integers, and the guide's levels are rounded.
 """
 
 from __future__ import annotations
@@ -23,37 +23,37 @@ from simdtex.model.structure import principal
 from simdtex.options import shown
 
 LEAST_SIDE = 32
-"""Rows and columns that a picture needs for its lattice to be looked for."""
+"""The fewest rows and columns of a picture whose lattice is searched."""
 
 SEEN = 0.55
-"""Share of the rows, and of the columns, by which a picture is compared with itself, at most."""
+"""The largest lag of the autocorrelation, as a share of the rows and of the columns."""
 
 LEAST_PEAK, APART, MOST_PEAKS = 0.08, 4, 80
-"""Of a peak of the autocorrelation: its least height, its pixels from lag 0 at least, and how many are looked at."""
+"""Peaks of the autocorrelation: the least height, the least distance from lag 0 in pixels, and the most peaks used."""
 
 LEAST_CELL, MOST_BASES = 30, 48
-"""Pixels of a cell at least, and how many lattices are followed through the autocorrelation."""
+"""The fewest pixels of a cell, and the most lattices that are followed through the autocorrelation."""
 
 RISE, INSIDE = 0.12, (0.35, 0.5, 0.65)
-"""By how much the autocorrelation at the end of a basis vector exceeds that within it, and where: not along stripes."""
+"""The least rise of the autocorrelation to the end of a basis vector from these shares of it: excludes stripes."""
 
 ALIKE = 0.8
-"""Share of the greatest strength from which on the smallest cell is taken."""
+"""Share of the greatest strength that a lattice needs; of those, the one with the smallest cell is taken."""
 
 LEAST_STRENGTH, SIGNIFICANT = 0.15, 4.5
-"""Mean autocorrelation over the nodes of a lattice at least, and how many standard errors that must be."""
+"""The least mean autocorrelation over the nodes of a lattice, and the same in standard errors."""
 
 MOST_STRAIN = 0.15
-"""How much a lattice is deformed to fit a torus at most."""
+"""The largest deformation of a lattice to fit a torus."""
 
 NOTICED = 0.01
-"""Deformation from which on a size that fits better is named."""
+"""Deformation above which a message names a size that fits better."""
 
 HARMONICS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """Waves of a lattice by which the phases of two pictures are compared."""
 
 STEPS = 64
-"""Phases to a period that are tried."""
+"""Number of phases tried in a period."""
 
 WAVES = 4
 """Channels of the guide: cosine and sine of each of two phases."""
@@ -62,10 +62,10 @@ ROUND, FINE = 2.0**20, 2.0**16
 """Cosines are rounded to 1 / ROUND, vectors to 1 / FINE of a pixel: libraries differ in their last bits by less."""
 
 TOGETHER = 32
-"""Rows whose cosines are computed at a time: their numbers stay in the processor's cache."""
+"""Number of rows whose cosines are computed together, so that they stay in the processor's cache."""
 
 SMALLEST = 4
-"""Pixels of a cell that is given, at least."""
+"""The fewest pixels of a cell that the user gives."""
 
 LATTICES = ("auto", "none")
 """The names of the option ``lattice``."""
@@ -80,16 +80,16 @@ class Lattice(NamedTuple):
 
     @property
     def basis(self) -> NDArray[np.float64]:
-        """Its vectors as the rows of a matrix (2, 2)."""
+        """The vectors of the lattice as the rows of a matrix (2, 2)."""
         return np.array([self.first, self.second])
 
     @property
     def cell(self) -> float:
-        """Pixels of a cell."""
+        """Number of pixels of a cell."""
         return abs(self.first[0] * self.second[1] - self.first[1] * self.second[0])
 
     def phases(self, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.float64]:
-        """Return both coordinates of pixels on the lattice, (2, ...): whole numbers at its points."""
+        """Return both coordinates of pixels on the lattice, (2, ...), which are integers at its points."""
         (a, b), (c, d) = self.first, self.second
         y, x, area = row - self.origin[0], col - self.origin[1], a * d - b * c
         return np.stack([(y * d - x * c) / area, (x * a - y * b) / area])
@@ -115,13 +115,13 @@ class Lattice(NamedTuple):
         return None if found is None else _lattice(found)._replace(origin=self.origin)
 
     def deformation(self, basis: NDArray[np.float64]) -> float:
-        """Return the norm of what another basis (2, 2) of the same nodes adds to the plane, as a share of it."""
+        """Return the deformation to another basis (2, 2) of the same nodes: the norm of the strain of the plane."""
         return sqrt(float(((_inverse(self.basis) @ basis - np.eye(2)) ** 2).sum()))
 
     def fitting(self, shape: tuple[int, int]) -> tuple[int, int]:
         """Return rows and columns near ``shape`` of a torus that holds the lattice almost undeformed.
 
-        Of the sizes within a quarter of ``shape``: deformed by 1 % counts as much as larger or smaller by 20 %.
+        Among the sizes within a quarter of ``shape``, a deformation of 1 % is as bad as a change in size of 20 %.
         """
         best = []
         for axis, wanted in enumerate(shape):
@@ -134,9 +134,9 @@ class Lattice(NamedTuple):
 
 
 class Phases(NamedTuple):
-    """The phases of a sample's pictures and of the output as a guide: ``pictures`` and ``output`` are their lattices.
+    """The phases of the sample's pictures and of the output as a guide: ``pictures`` and ``output`` are their lattices.
 
-    ``weight`` is the variance of the guide in units of the sample's.
+    ``weight`` is the variance of the guide in units of the sample's variance.
     """
 
     pictures: tuple[Lattice, ...]
@@ -144,14 +144,14 @@ class Phases(NamedTuple):
     weight: float = 1.0
 
     def waves(self, spread: float, top: int) -> Waves:
-        """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels', summed over channels.
+        """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels, summed over channels.
 
-        A cosine has the variance 1/2, and the guide has `WAVES` of them.
+        Each of the guide's `WAVES` cosines has the variance 1/2.
         """
         return Waves(*self, min(sqrt(2 * self.weight * spread / WAVES), top / 2))
 
     def statistics(self, shape: tuple[int, int]) -> dict[str, Any]:
-        """Return the vectors of the output's lattice, the deformation of the sample's, and a size that needs less."""
+        """Return the vectors of the output's lattice, the deformation to it, and a size that needs less deformation."""
         sample = self.pictures[0]
         vectors = [list(self.output.first), list(self.output.second)]
         deformation = sample.deformation(self.output.basis)
@@ -171,7 +171,7 @@ class Waves(NamedTuple):
         return self._levels(self.pictures[number], row, col)
 
     def at(self, grid: Grid) -> NDArray[np.uint16]:
-        """Return the guide (4, rows, cols) of the output at the sites of a lattice, or of a window of it."""
+        """Return the guide (4, rows, cols) of the output at the sites of a lattice or a window of it."""
         whole = grid.within
         row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
         col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
@@ -194,7 +194,7 @@ class Waves(NamedTuple):
 
 
 def parse_lattice(value: Any) -> Lattice | str | None:
-    """Return the lattice that two vectors or a text of four numbers give, ``"auto"``, or None for ``"none"``."""
+    """Return the lattice given by two vectors or by a text of four numbers, ``"auto"``, or None for ``"none"``."""
     if isinstance(value, str) and value in LATTICES:
         return None if value == "none" else value
     remedy = 'give "auto", "none", or two vectors in pixels: ((dy, dx), (dy, dx)), or the text "DY,DX,DY,DX"'
@@ -220,7 +220,7 @@ def phases(
     lattice: str | Lattice,
     known: tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.int32] | None] | None = None,
 ) -> Phases | None:
-    """Return the phases that guide an output; None if its sample has no lattice, or ``auto`` finds none that fits.
+    """Return the phases that guide an output; None if the sample has no lattice, or ``"auto"`` finds none that fits.
 
     Parameters
     ----------
@@ -229,12 +229,12 @@ def phases(
     shape : (int, int)
         Rows and columns of the output.
     torus : bool
-        Whether the output wraps around: then its lattice is deformed to fit.
+        Whether the output wraps around; its lattice is then deformed to fit.
     lattice : "auto" or Lattice
-        The lattice of the largest picture; ``auto``: the one that it has by its autocorrelation.
+        The lattice of the largest picture; ``"auto"`` finds it in its autocorrelation.
     known : tuple, optional
-        Values (H, W, C) of the output, where they are known (H, W), and where in the sample they are from (H, W, 2 or
-        3), -1 or None if nowhere: they fix the phases of the output.
+        Values (H, W, C) of the output, the mask (H, W) of known ones, and their positions in the sample (H, W, 2 or 3),
+        -1 or None if they are from elsewhere. They determine the phases of the output.
     """
     planes, masks = plain(pictures)
     largest = max(range(len(planes)), key=lambda number: (planes[number].size, -number))
@@ -267,7 +267,7 @@ def phases(
 
 
 def lattice_sentence(lattice: dict[str, Any] | None) -> str:
-    """Return how much a regular sample is deformed to fit its output, and what size fits; "" if by 1 % or less.
+    """Return a sentence on the deformation of a regular sample and a size that fits better; "" if it is 1 % or less.
 
     ``lattice`` is the entry of `simdtex.run.Output.statistics`.
     """
@@ -281,9 +281,9 @@ def lattice_sentence(lattice: dict[str, Any] | None) -> str:
 
 
 def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArray[np.int64]], list[NDArray[np.bool_]]]:
-    """Return pictures in one channel of integers, 0 to about 255, and where they are known.
+    """Return pictures in one channel of integers, 0 to about 255, and the masks of known pixels.
 
-    The channel is the first principal component. ``like``: pictures that give the scale and the component.
+    The channel is the first principal component. ``like`` are the pictures that determine scale and component.
     """
     scale = like or pictures
     variables = [[p[..., v] for p in scale.pixels] for v in range(scale.pixels[0].shape[-1])]
@@ -303,10 +303,10 @@ def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArra
 
 
 def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | None:
-    """Return the lattice of a picture (rows, cols) of integers, known in part; None if it has none.
+    """Return the lattice of a picture (rows, cols) of integers, known where ``known``; None if it has none.
 
-    Of all pairs of peaks of the autocorrelation, reduced to the shortest vectors of their lattice, the one of the
-    smallest cell among those over whose nodes the mean autocorrelation is nearly the greatest.
+    Each pair of peaks of the autocorrelation is reduced to the shortest vectors of its lattice. Among the lattices
+    whose mean autocorrelation over the nodes is nearly the greatest, the result is the one with the smallest cell.
     """
     if min(picture.shape) < LEAST_SIDE or not known.any():
         return None
@@ -327,8 +327,8 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
 class Correlation(NamedTuple):
     """The autocorrelation of a picture.
 
-    ``values`` (2 m + 1, 2 n + 1), the lag (0, 0) in the middle; ``around`` the greatest of 3x3 lags; ``pixels`` that
-    are known.
+    ``values`` (2 m + 1, 2 n + 1), with the lag (0, 0) in the middle; ``around``, the greatest of 3x3 lags; ``pixels``,
+    the number of known pixels.
     """
 
     values: NDArray[np.float64]
@@ -344,7 +344,7 @@ class Correlation(NamedTuple):
 def autocorrelation(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Correlation:
     """Return the autocorrelation of the known pixels of a picture (rows, cols), normalised by the overlap at each lag.
 
-    The sums are whole numbers below 2**50, which the Fourier transform misses by far less than one half: rounded, they
+    The sums are integers below 2**50, and the error of the Fourier transform is far below one half, so the rounded sums
     are exact on every machine.
     """
     pixels = int(known.sum())
@@ -365,7 +365,7 @@ def autocorrelation(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Cor
 
 
 def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
-    """Return the greatest of the values around each, within a square."""
+    """Return the greatest value in a square of ``radius`` around each value."""
     for axis in (0, 1):
         padded = np.pad(values, [(radius, radius) if a == axis else (0, 0) for a in (0, 1)], constant_values=-np.inf)
         n = values.shape[axis]
@@ -374,10 +374,10 @@ def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
 
 
 def candidates(correlation: Correlation) -> NDArray[np.int64]:
-    """Return the bases (n, 2, 2) that pairs of peaks make, reduced, each once: those that rise towards both ends."""
+    """Return the reduced bases (n, 2, 2) of pairs of peaks, each once, along which the values rise to both ends."""
     values, (m, n) = correlation.values, correlation.reach
     peak = (values == _greatest(values, 2)) & (values > LEAST_PEAK)
-    peak[:2] = peak[-2:] = peak[:, :2] = peak[:, -2:] = False  # which are cut
+    peak[:2] = peak[-2:] = peak[:, :2] = peak[:, -2:] = False  # cut by the border
     y, x = np.nonzero(peak)
     height, y, x = values[peak], y - m, x - n
     use = ((y > 0) | ((y == 0) & (x > 0))) & (y * y + x * x >= APART**2)
@@ -408,7 +408,7 @@ def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         swap = (second**2).sum(1) < (first**2).sum(1)
         first[swap], second[swap] = second[swap], first[swap].copy()
         square = (first**2).sum(1)
-        times = (2 * (first * second).sum(1) + square) // np.maximum(2 * square, 1)  # the nearest whole number
+        times = (2 * (first * second).sum(1) + square) // np.maximum(2 * square, 1)  # the nearest integer
         times[2 * np.abs((first * second).sum(1)) <= square] = 0
         if not times.any():
             break
@@ -422,7 +422,7 @@ def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first `MOST_BASES` of bases (n, 2, 2) that differ from all before by two pixels or more."""
+    """Return the first `MOST_BASES` of bases (n, 2, 2) that differ from all earlier ones by two pixels or more."""
     kept: list[NDArray[np.int64]] = []
     for pair in pairs:
         if not kept or (np.abs(np.array(kept) - pair).max((1, 2)) >= 2).all():
@@ -438,7 +438,7 @@ def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, 
     The strength is the mean autocorrelation over all nodes but the origin.
     """
     basis, reach, away = pair.astype(np.float64), np.array(correlation.reach), 1
-    while True:  # farther and farther, as the vectors become exact
+    while True:  # up to farther nodes as the vectors become exact
         nodes, lags = _nodes(basis, reach, away)
         every = away > 2 * np.abs(nodes).max(initial=0)
         fitted = _least_squares(nodes, summits(correlation.values, lags))
@@ -460,7 +460,7 @@ def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, 
 def _nodes(
     basis: NDArray[np.float64], reach: NDArray[np.int64], away: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the nodes (n, 2) of a lattice but the origin, up to ``away`` steps from it, and their lags (n, 2)."""
+    """Return the nodes (n, 2) of a lattice within ``away`` steps, without the origin, and their lags (n, 2)."""
     limit = np.minimum(away, np.ceil(np.abs(_inverse(basis)).T @ reach)).astype(int)  # of the window's corners
     i, j = np.mgrid[-limit[0] : limit[0] + 1, -limit[1] : limit[1] + 1].reshape(2, -1)
     nodes = np.stack([i, j], 1)[(i != 0) | (j != 0)].astype(np.float64)
@@ -470,7 +470,7 @@ def _nodes(
 
 
 def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the peaks (n, 2) nearest to lags (n, 2), within two pixels, to a fraction of a pixel."""
+    """Return the peak nearest to each lag (n, 2), within two pixels, with subpixel accuracy, (n, 2)."""
     m, n = values.shape[0] // 2, values.shape[1] // 2
     at = np.rint(lags).astype(int) + np.array([m, n])
     for _ in range(2):
@@ -501,7 +501,7 @@ def harmonics(picture: NDArray[np.int64], known: NDArray[np.bool_], lattice: Lat
 
 
 def aligned(lattice: Lattice, wanted: NDArray[np.complex128], own: NDArray[np.complex128]) -> Lattice:
-    """Return the lattice moved so that a picture with the harmonics ``own`` has the phases of one with ``wanted``."""
+    """Return the lattice moved so that a picture with harmonics ``own`` has the phases of one with ``wanted``."""
     y, x = np.mgrid[:STEPS, :STEPS] / STEPS
     likeness = sum(
         (np.exp(2j * np.pi * (k * y + m * x)) * one * np.conj(other)).real
@@ -514,7 +514,7 @@ def aligned(lattice: Lattice, wanted: NDArray[np.complex128], own: NDArray[np.co
 def _continued(
     lattice: Lattice, pictures: Sequence[Lattice], place: NDArray[np.int32], known: NDArray[np.bool_]
 ) -> Lattice:
-    """Return the lattice of an output moved so that its known sites have the phases of where they are from."""
+    """Return the lattice of an output moved so that its known sites have the phases of their sources."""
     row, col = np.nonzero(known)
     source = place[known].astype(np.float64)
     number = source[:, 2].astype(int) if source.shape[1] > 2 else np.zeros(len(source), int)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sample as the model sees it: working grey levels, their variance, and the candidates of a level."""
+"""The sample in working grey levels, their variance, and the candidates of a level."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from simdtex.model.scale import Scale, highest
 from simdtex.model.structure import structure
 
 BLOCK = 64
-"""Candidates to a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
+"""Candidates in a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
 
 STEPS = 1023
-"""Highest level of the structure channel of 8-bit samples, which may vary more than they do."""
+"""Highest level of the structure channel of 8-bit samples, which may vary more than the pixels."""
 
 FINE = 8
-"""Steps to a working level, where that is no pixel of its own."""
+"""Steps in a working level, if working levels are not the pixels themselves."""
 
 UNSURE = 0.25
-"""Share of a candidate's neighbours that may be unknown; they are taken to be as the nearest known pixel."""
+"""Share of a candidate's neighbours that may be unknown; each has the value of the nearest known pixel."""
 
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
@@ -40,10 +40,10 @@ class NothingUsable(ValueError):
 class Places(NamedTuple):
     """The places of a level's candidates: the crossings of some rows and columns of the sample.
 
-    ``offsets`` (N, 2) the neighbourhood; ``spacing`` 2**level, by which it is spread; ``step`` pixels of the sample
-    from one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32 the pixel index of
-    each, row by row; ``allowed`` (n,) whether each is a candidate, or None if all are; ``reach`` (N,) int32 pixel
-    offset of each neighbour; ``layers`` of crossings, 1 of pictures: the rows of a volume are those of all its layers.
+    ``offsets`` (N, 2), the neighbourhood; ``spacing``, its spacing 2**level; ``step``, the pixels of the sample from
+    one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32, the pixel index of each,
+    row by row; ``allowed`` (n,), whether each is a candidate, or None if all are; ``reach`` (N,) int32, the pixel
+    offset of each neighbour; ``layers`` of crossings, 1 for pictures: a volume has the rows of all its layers.
     """
 
     offsets: NDArray[np.int32]
@@ -58,7 +58,7 @@ class Places(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the crossings, (rows, cols) or (layers, rows, cols)."""
+        """The shape of the crossings, (rows, cols) or (layers, rows, cols)."""
         sides = (self.row.size // self.layers, self.col.size)
         return sides if self.layers == 1 else (self.layers, *sides)
 
@@ -69,12 +69,12 @@ class Places(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """The sample positions p that a site may be taken from, at one level.
+    """The sample positions p that a site may take, at one level.
 
-    ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``positions`` (n rounded up to
-    blocks,) int32 pixel index of each p, row by row; ``size`` n; ``reach`` (N,) int32 pixel offset of each
-    neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``guides`` the last
-    channels that are guides.
+    ``pixels`` (C, rows * cols) float32, the working grey levels including the margin; ``positions`` (n rounded up to
+    blocks,) int32, the pixel index of each p, row by row; ``size``, n; ``reach`` (N,) int32, the pixel offset of each
+    neighbour; ``index_of`` (rows * cols,) int32, the index of a pixel in ``positions`` or -1; ``guides``, the number of
+    guide channels, which are the last.
     """
 
     pixels: Any
@@ -86,58 +86,59 @@ class Candidates(NamedTuple):
 
     @property
     def plane(self) -> int:
-        """Pixels of the sample with its margin."""
+        """Number of pixels of the sample with its margin."""
         return int(self.index_of.size)
 
     @property
     def made(self) -> int:
-        """Channels that are no guides."""
+        """Number of channels that are not guides."""
         return int(self.pixels.shape[0]) - self.guides
 
 
 class Sample:
     """A sample in working grey levels: one picture, several one below another, or the layers of one volume.
 
-    Pixels become working levels as `simdtex.model.scale` says. Pixels of the output are taken from the sample itself,
-    or moved from there by the finish in steps of an eighth of a level, so nothing is lost there.
+    `simdtex.model.scale` maps pixels to working levels. Pixels of the output are the sample's own, or differ from them
+    by the finish in steps of an eighth of a level, so the output has their full precision.
 
     Parameters
     ----------
     pixels : (height, width, channels) array, or Pictures
         As given by the user; any real type.
     values : int
-        Values to a neighbourhood: channels times neighbours.
+        Number of values of a neighbourhood: channels times neighbours.
     margin : int
-        Pixels by which each picture is continued, by reflection, on every side for the sake of the neighbourhoods of
-        its outer pixels. Nothing is ever taken from the margin itself.
+        Pixels by which each picture is continued by reflection on every side, for the neighbourhoods of its outer
+        pixels. The margin itself is never taken.
     weight : float
-        Of the structure channel (`simdtex.model.structure`), which is matched like the others and never shown; 0: none.
+        Weight of the structure channel (`simdtex.model.structure`), which is matched like the other channels and never
+        shown; 0: none.
     step : int
         Pixels from site to site at the coarsest level; every picture begins at a multiple.
     guides : sequence of AnyGuide
-        Their channels come after those.
+        Guides, whose channels come last.
     apart : int
-        Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
-        no other.
+        The least distance between two pictures in pixels, if that is more than their margins: within it, a pixel has
+        no neighbour in another picture.
     phases : Phases, optional
-        The guide by the sample's own lattice, which is no channel: `phases_at`.
+        The guide by the sample's own lattice, which is no channel, see `phases_at`.
 
     Attributes
     ----------
     shown : int
-        Channels of a picture, as far as the working levels show one.
+        Number of channels of working levels for the picture itself.
     channels : int
-        Channels that are matched: those, and the structure channel.
+        Number of matched channels: those, and the structure channel.
     guides : (G, H, W) uint16 array
         Working levels of the output's guides.
     waves : Waves or None
         The phases in working levels.
     guided : list of (G, rows, cols) uint16 arrays
-        Those of each picture's; empty without guides.
+        Working levels of the guides of each picture; empty without guides.
     boxes : list of (int, int, int)
-        Of each picture its first row, its rows and its columns.
+        First row, number of rows and number of columns of each picture.
     layer : int
-        Rows of a layer of a volume with its margin; 0: there are pictures.
+        Rows of a layer of a volume with its margin; 0 for pictures.
 
     Notes
     -----
@@ -186,7 +187,7 @@ class Sample:
 
     @classmethod
     def of_levels(cls, levels: NDArray[Any], count: int) -> Sample:
-        """Return a grey sample that is given in working levels 0 .. count - 1."""
+        """Return a grey sample from working levels 0 .. count - 1."""
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
         sample.top, sample.unit, sample.direct = count - 1, 1.0, True
@@ -237,30 +238,30 @@ class Sample:
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether a pixel (rows, cols), margins included, is one of the sample's that are known and may be used."""
+        """Mask (rows, cols), margins included, of the sample's pixels that are known and may be taken."""
         here = [np.ones(one.shape[1:], bool) for one in self.levels]
         for masks in (self.pictures.known, self.pictures.usable):
             here = [a & b for a, b in zip(here, masks, strict=True)] if masks else here
         return self._framed(here)
 
     def _framed(self, masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        """Return masks of all pictures as one of the sample with its margin, (rows, cols)."""
+        """Return the masks of all pictures as one mask of the sample with its margin, (rows, cols)."""
         return np.pad(self._stacked(masks, False), self.margin).reshape(self.rows, self.cols)
 
     @cached_property
     def variance(self) -> float:
-        """sigma^2 of equation (8): the mean over the matched channels of the variance of the working levels."""
+        """sigma^2 of equation (8): the variance of the working levels, averaged over the matched channels."""
         return variance(*(one[: self.channels] for one in self.levels))
 
     def spread(self, offsets: NDArray[np.integer[Any]], spacing: int) -> NDArray[np.int32]:
-        """Return offsets (N, 2) in sites of a level as rows and columns of the sample with its margin."""
+        """Return offsets (N, 2) from sites of a level in rows and columns of the sample with its margin."""
         layer, row, col = parts_of(offsets)
         return (np.stack([layer * self.layer + row, col], 1) * spacing).astype(np.int32)
 
     def _crossings(
         self, offsets: NDArray[np.int32], spacing: int, step: int
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-        """Return rows and columns of places, without the margin, and which have their whole neighbourhood inside."""
+        """Return rows and columns of places, without the margin, and a mask of those with a whole neighbourhood."""
         apart = [part * spacing for part in parts_of(offsets)]
 
         def whole(at: NDArray[np.int32], axis: int, first: int, size: int) -> NDArray[np.bool_]:
@@ -291,12 +292,13 @@ class Sample:
         offsets : (N, 2) int32 array
             The neighbourhood.
         spacing : int
-            2**level, by which the neighbourhood is spread.
+            The spacing 2**level of the neighbourhood.
         phases : {"decimated", "all"}
             The pixels of the decimated sample, equation (10), or every pixel.
         edges : {"whole", "reflect", "auto"}
-            Those whose neighbourhood lies in their picture, equation (4); all, if the margin is wide enough; or the
-            former at the finest level, if they are three quarters of all or more, else the latter.
+            ``"whole"``: places whose neighbourhood lies in their picture, equation (4). ``"reflect"``: all, if the
+            margin is wide enough. ``"auto"``: whole at the finest level, if those are three quarters of all places or
+            more, else reflect.
 
         Raises
         ------
@@ -328,11 +330,11 @@ class Sample:
         return self._places[key]
 
     def _sure(self, offsets: NDArray[np.int32], row: NDArray[np.int32], col: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return which crossings have few unknown neighbours, all in pixels of the sample with its margin."""
+        """Return the mask of crossings with few unknown neighbours; ``row`` and ``col`` include the margin."""
         assert self.pictures.known is not None
         missing = self._framed([~known for known in self.pictures.known])
         lines = np.flatnonzero(missing.any(1))
-        near = (row + offsets[:, 0].max() >= lines[0]) & (row + offsets[:, 0].min() <= lines[-1])  # who can see one
+        near = (row + offsets[:, 0].max() >= lines[0]) & (row + offsets[:, 0].min() <= lines[-1])  # with one in reach
         count = np.zeros((int(near.sum()), col.size), np.int16)
         for a, b in offsets:
             count += missing[np.ix_(row[near] + a, col + b)]
@@ -341,7 +343,7 @@ class Sample:
         return found
 
     def fair(self, places: Places) -> NDArray[np.int64] | None:
-        """Return how much each place is to be used, (n,) whole numbers in one unit; None if all alike."""
+        """Return the fair use of each place, (n,) integers in one unit; None if it is the same for all."""
         allowed = places.allowed
         if allowed is None:
             return None
@@ -356,7 +358,7 @@ class Sample:
         return fair
 
     def picture_of(self, source: NDArray[np.integer]) -> NDArray[np.intp]:
-        """Return the number of the picture that pixel indices lie in, or below whose first row they lie."""
+        """Return the number of the picture of each pixel index: the last one that begins at or above it."""
         tops = np.array([top for top, *_ in self.boxes])
         row = np.asarray(source) // self.cols - self.margin
         found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
@@ -373,13 +375,13 @@ class Sample:
         return found
 
     def planes(self, machine: Any) -> Any:
-        """Return the working levels as an array (C, rows * cols) of a machine, float32."""
+        """Return the working levels on a machine, (C, rows * cols) float32."""
         return machine.put(self.working.astype(np.float32))
 
     def candidates(self, machine: Any, places: Places, planes: Any | None = None, every: bool = False) -> Candidates:
-        """Return the candidates of a level as arrays of a machine, which may have the planes already.
+        """Return the candidates of a level as arrays of a machine; ``planes`` are the working levels if it has them.
 
-        With ``every`` the list is that of all places, and ``index_of`` knows the candidates among them.
+        With ``every`` the list has all places, and ``index_of`` has only the candidates among them.
         """
         positions = places.positions
         index_of = np.full(self.rows * self.cols, -1, np.int32)
@@ -392,18 +394,18 @@ class Sample:
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # a guide's site itself
+            machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # the site itself, for guides
             machine.put(index_of),
             len(self.guides),
         )
 
     @property
     def first(self) -> int:
-        """Pixel index of the first pixel that is not of the margin."""
+        """Pixel index of the first pixel outside the margin."""
         return int(self.margin * ((self.layer + 1) * self.cols + 1))
 
     def _coordinates(self, source: NDArray[np.int32]) -> tuple[NDArray[np.int32], ...]:
-        """Return row and column of pixel indices, without the margin; of a volume layer, row and column."""
+        """Return row and column of pixel indices, without the margin; for a volume, layer, row and column."""
         row, col = np.divmod(source, np.int32(self.cols))
         lines = (*np.divmod(row, np.int32(self.layer)), col) if self.layer else (row, col)
         return tuple(line - np.int32(self.margin) for line in lines)
@@ -411,7 +413,7 @@ class Sample:
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return (row, column) in the user's sample of pixel indices, on a last axis; -1 for a pixel without source.
 
-        Of several pictures, the number of the picture is the third; of a volume, the layer is the first.
+        With several pictures the result is (row, column, number of the picture), with a volume (layer, row, column).
         """
         place = np.stack(self._coordinates(source), -1)
         if len(self.boxes) > 1:
@@ -431,13 +433,13 @@ class Sample:
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
-        """Return the picture (rows, cols, C) that working levels and sources stand for, in the sample's own type.
+        """Return the picture (rows, cols, C) of working levels and sources, in the sample's own type.
 
-        ``values`` (C, rows, cols) are working levels, of which the structure channel does not show; ``source`` (rows,
-        cols) are pixel indices in the sample. A pixel is the source's, plus what the working level differs from the
-        source's own.
+        ``values`` (C, rows, cols) are working levels, of which the structure channel is not shown; ``source`` (rows,
+        cols) are pixel indices in the sample. A pixel is its source pixel plus the difference of the working level from
+        that of the source.
         """
-        source = np.maximum(source, self.first)  # what is from nowhere differs from the first pixel
+        source = np.maximum(source, self.first)  # without a source: the difference from the first pixel
         own, usual = self.own(source), self.working[: self.shown, source]
         if not self.direct or (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
@@ -450,7 +452,7 @@ class Sample:
         return own
 
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
-        """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); those of the margin are reflections."""
+        """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""
         lines = np.stack(self._coordinates(position[:, None] + reach))
         number = np.zeros(position.size, np.intp) if self.layer else self.picture_of(position)
         sides = np.array([one.shape[1:] for one in self.levels])[number].T[..., None]
@@ -464,7 +466,7 @@ class Sample:
         return found
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
-        """Return the pixels (rows, cols, C) of some sources, plus the differences from `simdtex.ops.finish`.
+        """Return the pixels (rows, cols, C) of ``source``, plus the differences from `simdtex.ops.finish`.
 
         ``source`` (rows, cols) are pixel indices; ``by`` (C, rows, cols) are working levels of 8-bit samples, and
         `FINE`-ths of a working level of others.
@@ -478,12 +480,12 @@ class Sample:
 
     @property
     def fine(self) -> int:
-        """Steps to a working level in which a finished picture differs from its sources."""
+        """Steps in a working level by which a finished picture differs from its sources."""
         return 1 if self.top == 255 else FINE
 
 
 def variance(*pictures: NDArray[np.integer]) -> float:
-    """Return the mean over channels of the variance of working levels (C, rows, cols) of one or several pictures."""
+    """Return the variance of working levels (C, rows, cols) of one or several pictures, averaged over channels."""
     n, total, channels = sum(levels[0].size for levels in pictures), 0.0, len(pictures[0])
     for c in range(channels):  # integers: the same sum on every machine
         planes = [levels[c].astype(np.int64) for levels in pictures]
@@ -495,9 +497,9 @@ def variance(*pictures: NDArray[np.integer]) -> float:
 def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:
     """Return pixels of a sample plus a difference, as the closest legal ones; a difference of 0 keeps the pixel.
 
-    Legal are 0 to 255 for 8 bits, and what lies between the sample's smallest and largest pixel otherwise.
+    Legal are 0 to 255 for 8 bits, otherwise the range from the sample's smallest to its largest pixel.
     """
-    with np.errstate(over="ignore"):  # what is beyond the largest double is brought back
+    with np.errstate(over="ignore"):  # values beyond the largest double are clipped
         values = own.astype(np.float64) + by
     if pixels.dtype == np.bool_:
         legal: NDArray[Any] = values > 0.5
@@ -505,7 +507,7 @@ def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]
         legal = np.clip(values, float(pixels.min()), float(pixels.max())).astype(pixels.dtype)
     else:
         bounds = np.iinfo(pixels.dtype)
-        most = float(bounds.max)  # which may be one more than the type holds
+        most = float(bounds.max)  # may be one above the range of the type
         most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
         legal = np.clip(np.rint(values), bounds.min, most).astype(pixels.dtype)
         legal = legal if pixels.dtype == np.uint8 else np.clip(legal, pixels.min(), pixels.max())

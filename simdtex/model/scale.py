@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From pixels to working levels: the whole numbers that equation (12) compares.
+"""From pixels to working levels: the integers that equation (12) compares.
 
-Eight-bit pixels are their own levels. Other types are stretched over 0..top, all channels alike, as colours are. With
-weights each variable is brought to the same spread, times its weight. A variable of categories has a channel for each,
-0 or as high as makes any two categories differ alike: then (12) counts the neighbours that differ.
+Eight-bit pixels are their own levels. Other types are stretched over 0..top, all channels on one scale, like colours.
+With weights each variable is scaled to the same spread, times its weight. A categorical variable has a channel for each
+category, whose level is 0 or one height, so that all pairs of categories differ by the same amount: (12) then counts
+the neighbours that differ.
 """
 
 from __future__ import annotations
@@ -18,15 +19,15 @@ from numpy.typing import NDArray
 from simdtex.model.pictures import Pictures
 
 EXACT = 12
-"""Bits of a working level at most."""
+"""The most bits of a working level."""
 
 
 class Scale:
-    """How the pixels of a sample become working levels.
+    """The map from the pixels of a sample to working levels.
 
-    ``values`` is the number of values to a neighbourhood: channels of working levels times neighbours. ``top`` is the
-    highest working level; ``direct`` says whether the channels of working levels are those of the pixels, and ``unit``
-    is then 1 of them in the pixels' own unit.
+    ``values`` is the number of values of a neighbourhood: channels of working levels times neighbours. ``top`` is the
+    highest working level; ``direct`` is True if the channels of working levels are those of the pixels, and ``unit`` is
+    then one working level in the pixels' own unit.
     """
 
     def __init__(self, pictures: Pictures, values: int) -> None:
@@ -52,14 +53,14 @@ class Scale:
 
     @property
     def units(self) -> NDArray[np.float64]:
-        """What 1 of each channel of working levels is in the pixels' own unit, (channels,); 0 of a category."""
+        """One working level of each channel in the pixels' own unit, (channels,); 0 for a category."""
         if self.direct:
             return np.full(self._channels, self.unit)
         return np.array([unit for one in self._variables for unit in (one.step,) * one.channels])
 
     @property
     def owners(self) -> list[int]:
-        """The variable that each channel of working levels is of."""
+        """The variable of each channel of working levels."""
         if self.direct:
             return list(range(self._channels))
         return [variable for variable, one in enumerate(self._variables) for _ in range(one.channels)]
@@ -76,7 +77,7 @@ class Scale:
 
 
 class _Stretched:
-    """A variable on 0..top."""
+    """A variable stretched over 0..top."""
 
     scale, channels = 0.0, 1
 
@@ -93,12 +94,12 @@ class _Stretched:
 
     @property
     def steepness(self) -> float:
-        """How high its highest level is, over its spread."""
+        """The highest level divided by the spread."""
         return self.top / self.spread if self.spread else 0.0
 
     @property
     def step(self) -> float:
-        """What 1 of its levels is in the pixels' own unit."""
+        """One of its levels in the pixels' own unit."""
         return self.unit * self.spread / self.scale if self.scale else 0.0
 
     def stretched(self, pixels: NDArray[Any]) -> NDArray[np.int64]:
@@ -106,7 +107,7 @@ class _Stretched:
         return stretch(np.clip(pixels, *self.ends), self.top, self.ends)[0]
 
     def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
-        """Return the variable's one channel."""
+        """Return the one channel of the variable."""
         if not self.spread:
             return np.zeros((1, *plane.shape), np.int64)
         found: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
@@ -114,7 +115,7 @@ class _Stretched:
 
 
 class _Categories:
-    """A variable that names categories; one of two is a channel that has 0 or the highest level."""
+    """A categorical variable; with two categories it has one channel, of level 0 or the highest."""
 
     scale = step = 0.0
 
@@ -122,8 +123,8 @@ class _Categories:
         self.categories, counts = np.unique(values, return_counts=True)
         share = [int(n) for n in counts]
         total = sum(share)
-        differing = 1 - sum(n * n for n in share) / total**2  # of any two pixels
-        alike = 1 if len(share) == 2 else 2  # channels in which they then differ
+        differing = 1 - sum(n * n for n in share) / total**2  # share of pairs of pixels
+        alike = 1 if len(share) == 2 else 2  # number of channels in which two categories differ
         self.channels = 1 if len(share) < 3 else len(share)
         self.steepness = sqrt(2 / (alike * differing)) if differing else 0.0
 
@@ -136,14 +137,14 @@ class _Categories:
 
 
 def highest(values: int) -> int:
-    """Return the highest level for which the distance of (12) over so many values is exact in float64."""
+    """Return the highest level for which the distance of (12) over ``values`` values is exact in float64."""
     return int(2 ** min(EXACT, int((33 - log2(values)) / 2)) - 1)
 
 
 def stretch(pixels: NDArray[Any], top: int, ends: tuple[Any, Any] | None = None) -> tuple[NDArray[np.int64], float]:
     """Return pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit.
 
-    ``ends`` what becomes 0 and top; None: the least and the greatest pixel.
+    ``ends`` are the pixels that become 0 and top; None: the least and the greatest pixel.
     """
     low, high = ends or (pixels.min(), pixels.max())
     if pixels.dtype.kind in "iu":

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Soft data: how probable each category, and each training image, is at every site of an output.
+"""Soft data: the probability of each category, and of each training image, at every site of an output.
 
 A probability p of a kind whose share of the sample's pixels is q costs its candidates
 
     w N C sigma^2 / 16 (m - ln(p / q)),    m the greatest ln(p / q) of the site,
 
-beside their distance: w is the option ``soft_weight``. So what is as probable as its share costs nothing, at every site
-alike. A candidate of a kind of probability 0 costs more than all else that a candidate may cost: it is taken where
-all that a site weighs are such.
+in addition to their distance, where w is the option ``soft_weight``. So there is no cost where all probabilities equal
+the shares. The cost of a kind with probability 0 exceeds all other costs: its candidates are taken only where a site
+evaluates no others.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from numpy.typing import NDArray
 from simdtex.model.sample import Sample
 
 EXCLUDED = np.float32(2.0**40)
-"""The cost of what has the probability 0: distances are below 2**33."""
+"""The cost of a kind with probability 0: distances are below 2**33."""
 
 UNIT = 1 / 16
-"""What w = 1 is, over the distance of neighbourhoods: categories are then about as frequent as they are probable."""
+"""The cost for w = 1 in units of N C sigma^2: the frequency of a category is then about its probability."""
 
 STEPS = 1024
-"""Steps of ln(p / q) to 1, so that the last bit of a platform's logarithm does not matter."""
+"""Steps of ln(p / q) in 1, so that the last bit of a platform's logarithm does not matter."""
 
 LEAST = 1e-3
-"""The share of the output that is fair for each training image, at least."""
+"""The least fair share of the output for each training image."""
 
 
 class Kind(NamedTuple):
     """Kinds of candidates.
 
-    ``of`` (n,) the kind of each candidate, ``shares`` (kinds,) of the sample's pixels that may be taken, and
-    ``probability`` (kinds, H, W) of each at each site; NaN where nothing is said.
+    ``of`` (n,), the kind of each candidate; ``shares`` (kinds,), the share of each kind in the sample's pixels that may
+    be taken; and ``probability`` (kinds, H, W) of each kind at each site, NaN where it is not given.
     """
 
     of: NDArray[np.intp]
@@ -57,7 +57,7 @@ class Soft:
     images : (training images, H, W) float64 array, optional
         The probability of each training image.
 
-    The numbers of a site add up to 1, or are NaN where nothing is said.
+    The probabilities of a site add up to 1, or are NaN where they are not given.
     """
 
     categories: NDArray[np.float64] | None = None
@@ -65,19 +65,19 @@ class Soft:
 
     @property
     def rows(self) -> int:
-        """How many kinds there are."""
+        """Number of kinds."""
         return sum(len(one) for one in (self.categories, self.images) if one is not None)
 
     @property
     def shares(self) -> tuple[float, ...] | None:
-        """The share of the output that each training image is to have; None if nothing is said of them."""
+        """The share of the output for each training image; None without probabilities of these."""
         if self.images is None:
             return None
         told = self.images[:, ~np.isnan(self.images[0])]
         return tuple(max(LEAST, float(one.sum()) / max(1, one.size)) for one in told)
 
     def kinds(self, sample: Sample, source: NDArray[np.integer]) -> NDArray[np.uint16]:
-        """Return the kinds of pixels (n,) of the sample, by their indices: rows of `costs`, (kinds of a pixel, n)."""
+        """Return the kinds of pixels (n,) of the sample as indices of rows of `costs`, (kinds of a pixel, n)."""
         found, before = [], 0
         for kind in self._all(sample, source):
             found.append(kind.of + before)
@@ -85,11 +85,9 @@ class Soft:
         return np.stack(found).astype(np.uint16)
 
     def costs(self, sample: Sample, step: int, rate: float) -> NDArray[np.float32]:
-        """Return what each kind costs at the sites (step i, step j), (kinds, sites' rows, sites' columns).
+        """Return the cost of each kind at the sites (step i, step j), (kinds, [layers of sites,] rows, columns).
 
-        Those of a volume have layers, too.
-
-        ``rate`` is w N C sigma^2. What counts at a coarse level is the probability at the site itself.
+        ``rate`` is w N C sigma^2. A coarse level uses the probability at the site itself.
         """
         found = []
         for kind in self._all(sample, np.zeros(0, np.intp)):
@@ -103,7 +101,7 @@ class Soft:
         return np.concatenate(found)
 
     def _all(self, sample: Sample, source: NDArray[np.integer]) -> Iterator[Kind]:
-        """Yield the kinds by category, and those by training image, as far as something is said of them."""
+        """Yield the kinds by category, and those by training image, if their probabilities are given."""
         inside = np.flatnonzero(sample.inside)
         if self.categories is not None:
             categories = sample.pictures.categories(0)
@@ -116,7 +114,7 @@ class Soft:
 
 
 def _shares(of: NDArray[np.intp], kinds: int) -> NDArray[np.float64]:
-    """Return the share of each kind; one that does not occur has that of one pixel."""
+    """Return the share of each kind; a kind that does not occur has the share of one pixel."""
     counts = np.maximum(np.bincount(of, minlength=kinds), 1)
     shares: NDArray[np.float64] = counts / counts.sum()
     return shares

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The source map: for every output pixel, the sample position it was taken from.
 
-With it the arrangement of one synthesis carries over to any other map of the same material, and
-it shows what was copied from where. It is an integer array (rows, cols, 2) of (row, column), or
-(rows, cols, 3) of (row, column, sample) of several samples, counted from 0. A pixel
-that was given and not taken from any sample has no source: its row and column are -1.
+It carries the arrangement of one synthesis over to any other map of the same material, and shows which parts are
+copies. It is an integer array (rows, cols, 2) of (row, column) or, with several samples, (rows, cols, 3) of (row,
+column, sample), counted from 0. A pixel that was given and not taken from any sample has no source: its row and column
+are -1.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def apply_source_map(
     other_map: ArrayLike | Sequence[ArrayLike],
     sample_shape: tuple[int, ...] | Sequence[tuple[int, ...]] | None = None,
 ) -> NDArray[Any]:
-    """Arrange another map of the material as the sample was arranged, pixel for pixel.
+    """Return another map of the material in the arrangement of the output, pixel for pixel.
 
     Parameters
     ----------
@@ -44,23 +44,23 @@ def apply_source_map(
         The (row, column) in the sample of every output pixel, or (row, column, sample) of several samples; row and
         column are -1 where a pixel has no source.
     other_map : array_like, (sample rows, sample cols) or (sample rows, sample cols, channels)
-        A normal, height or other map laid over the sample; any type, any number of channels. For a source map of
-        several samples a list or tuple of such maps, one for each sample, all of one type and number of channels.
+        A normal, height or other map of the sample; any type, any number of channels. For a source map of several
+        samples, a list or tuple of such maps, one for each sample, all of one type and number of channels.
     sample_shape : (rows, cols), optional
-        The size of the sample; a list of sizes where `other_map` is a list. Without it, only that every position lies
-        within `other_map` is checked.
+        The size of the sample; a list of sizes if `other_map` is a list. None checks only that every position lies
+        within `other_map`.
 
     Returns
     -------
     ndarray, (rows, cols) or (rows, cols, channels)
-        The type of `other_map`; its values unchanged (a normal map's vectors are not turned, for
-        pixels are moved and never turned).
+        An array of the type of `other_map` with its values unchanged; the vectors of a normal map are not turned, since
+        pixels are moved and never turned.
 
     Raises
     ------
     ValueError
-        `other_map` is not as large as the sample, there are not as many maps as samples, a pixel has no source, or an
-        argument has another shape.
+        The size of `other_map` is not that of the sample, the numbers of maps and samples differ, a pixel has no
+        source, or an argument has the wrong shape.
     """
     positions = checked(source)
     maps, shapes = _maps(positions, other_map, sample_shape)
@@ -126,7 +126,7 @@ def _check_size(name: str, values: NDArray[Any], places: SourceMap, shape: tuple
 
 
 def save_source_map(path: PathLike, source: ArrayLike) -> None:
-    """Write a source map, whole or not at all.
+    """Write a source map to a file, which is complete or not written at all.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
     Raises
     ------
     ValueError
-        The path cannot be written, `source` is no source map, or a PNG cannot hold it.
+        The path cannot be written, `source` is not a source map, or a PNG cannot hold it.
     """
     check_writable(path, suffixes=SOURCE_SUFFIXES)
     positions = checked(source)
@@ -159,19 +159,19 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
 
 
 def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceMap:
-    """Read a source map that `save_source_map` wrote.
+    """Return the source map of a file that `save_source_map` wrote.
 
     Parameters
     ----------
     path : path
         ``.npz``, ``.npy`` or ``.png``.
     max_pixels : int, optional
-        Pixels that are read at most. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most pixels to read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
     ndarray of int32, (rows, cols, 2) or (rows, cols, 3)
-        A ``.png`` whose blue is 0 throughout is of one sample, (rows, cols, 2).
+        A ``.png`` with blue 0 everywhere has one sample, (rows, cols, 2).
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sample in integers that do not depend on its contrast, as pyramids take it."""
+"""The sample in integers that do not depend on its contrast, for pyramids."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ TOP = 2**20
 """The largest pixel. Sums of a pyramid of up to 30 levels then fit 32 bits (kernels/laplacian.cl)."""
 
 BLOCK = 2**18
-"""Values that are turned into pixels together."""
+"""Number of values that are converted to pixels together."""
 
 LUMA = (13933, 46871, 4732)
 """Shares of red, green and blue in the luminance, in 2**-16: 0.2126, 0.7152, 0.0722 (ITU-R BT.709)."""
 
 
 class Stretched:
-    """A sample stretched over 0..2**20, so that neither contrast nor a constant makes a difference.
+    """A sample stretched over 0..2**20, which removes the effect of contrast and of an added constant.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Stretched:
     planes : (channels, rows, cols) int32 array
         All channels on one scale.
     unit : float
-        1 of it in the pixels' own unit.
+        1 on the stretched scale in the pixels' own unit.
     """
 
     def __init__(self, pixels: NDArray[Any]) -> None:
@@ -44,7 +44,7 @@ class Stretched:
 
     @property
     def luminance(self) -> NDArray[np.int32]:
-        """(1, rows, cols): of three channels that of red, green and blue as they come, else their mean."""
+        """The luminance of red, green and blue if there are three channels, else their mean, (1, rows, cols)."""
         planes = self.planes.astype(np.int64)
         if len(planes) == 3:
             total = np.tensordot(np.array(LUMA), planes, 1)
@@ -52,15 +52,15 @@ class Stretched:
         return np.asarray((2 * planes.sum(0) + len(planes)) // (2 * len(planes)), np.int32)[None]
 
     def picture(self, values: NDArray[np.int32], source: NDArray[np.int32] | None = None) -> NDArray[Any]:
-        """Return the picture that values stand for, projected onto legal pixels of the sample's type.
+        """Return the picture of stretched values, projected onto legal pixels of the sample's type.
 
         Parameters
         ----------
         values : (channels, rows, cols) int32 array
-            On the stretched scale; they may lie beyond it.
+            Values on the stretched scale; they may lie beyond it.
         source : (rows, cols) int32 array, optional
-            Pixel of the sample that each was taken from. Where the value is still that pixel's, the result is the
-            pixel to the last bit, whatever its type.
+            Index of the sample pixel that each was taken from. Where the value is unchanged, the result is that pixel,
+            to the bit, whatever its type.
 
         Returns
         -------

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The structure channel: how far each pixel of a sample is inside its bright or its dark parts.
+"""The structure channel: the distance of each pixel of a sample from the border of its bright or its dark part.
 
-A channel more for equation (12) to match, so that a thin joint is felt before it is seen: Lefebvre and Hoppe (2006).
-Its sign tells a bright stripe from a dark one. All sums are of integers, so every machine has the same bits.
+Equation (12) matches it as an additional channel, so that a thin joint has an effect at a distance: Lefebvre and Hoppe
+(2006). Its sign distinguishes bright parts from dark ones. All sums are of integers: the same bits on every machine.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 REACH = 16
-"""Pixels beyond which all distances are alike."""
+"""The distance in pixels beyond which all distances are equal."""
 
 BINOMIAL = (1, 4, 6, 4, 1)
 """Weights of the smoothing, in 1/16: standard deviation 1."""
 
 BOXES = (19, 21, 21)
-"""Widths of the running sums, one after another, that make the surroundings: standard deviation 10."""
+"""Widths of the successive running sums of the surroundings: standard deviation 10."""
 
 SQUARINGS = 12
-"""Squarings of a covariance: its 4096th power is its first principal component."""
+"""Number of squarings of a covariance: its 4096th power gives the first principal component."""
 
 
 def structure(
@@ -38,23 +38,23 @@ def structure(
     weight : float
         Standard deviation of the channel, in units of the sample's.
     variance : float
-        Of the sample, in working levels squared.
+        Variance of the sample, in working levels squared.
     top : int
         Highest working level.
 
     Returns
     -------
     list of (rows, cols) uint16 arrays
-        One for each picture, on one scale: 0 in the middle of the widest dark part; all alike if no pixel is brighter
-        than its surroundings.
+        One array for each picture, on one scale: 0 in the middle of the widest dark part; constant if no pixel is
+        brighter than its surroundings.
 
     Notes
     -----
     A pixel is bright if the first principal component of the sample, smoothed by (1 4 6 4 1)/16 along rows and columns,
-    exceeds the mean of its surroundings, which is nearly a Gaussian of standard deviation 10. The distance of a bright
-    pixel is that to the nearest dark one, less half a pixel; the distance of a dark pixel is minus that to the nearest
-    bright one. Neither counts beyond `REACH`. Where the channel would leave 0..top, its weight is less. Cost: 4 `REACH`
-    passes over the sample.
+    exceeds the mean of its surroundings, nearly a Gaussian of standard deviation 10. The value of a bright pixel is the
+    distance to the nearest dark one, less half a pixel; the value of a dark pixel is minus the distance to the nearest
+    bright one, plus half a pixel. Both are limited to `REACH`. If the channel would leave 0..top, its weight is
+    reduced. Cost: 4 `REACH` passes over the sample.
     """
     smooth = [np.stack([smoothed(channel) for channel in levels]) for levels in pictures]
     by = principal(smooth)
@@ -77,8 +77,8 @@ def structure(
 def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
     """Return the first principal component of pictures (C, rows, cols) of integers: (C,) weights, -127 to 127.
 
-    The weights add up to 0 or more; of two that do not, the first is positive. Whole numbers throughout: no library's
-    eigenvectors, whose last bits differ from machine to machine.
+    The weights add up to 0 or more; if both signs do, the first weight is positive. All arithmetic is on integers,
+    since the last bits of a library's eigenvectors differ from machine to machine.
     """
     channels = len(pictures[0])
     flat = [one.reshape(channels, -1).astype(np.int64) for one in pictures]
@@ -97,13 +97,13 @@ def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
     most = max(map(abs, vector))
     if not most:
         return np.ones(channels, np.int64)
-    weights = [(254 * value + most) // (2 * most) for value in vector]  # the nearest; halves up
+    weights = [(254 * value + most) // (2 * most) for value in vector]  # rounded, halves up
     sign = -1 if sum(weights) < 0 or (sum(weights) == 0 and next(filter(None, weights)) < 0) else 1
     return np.array(weights, np.int64) * sign
 
 
 def smoothed(channel: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return 256 times a channel (rows, cols) smoothed by `BINOMIAL`; the outermost pixels stand for all beyond."""
+    """Return 256 times a channel (rows, cols) smoothed by `BINOMIAL`; edge pixels continue beyond the border."""
     found = channel.astype(np.int64)
     for axis in (0, 1):
         around = np.pad(found, [(2, 2) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
@@ -117,7 +117,7 @@ def smoothed(channel: NDArray[np.integer]) -> NDArray[np.int64]:
 def surroundings(component: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """Return the sums of each pixel's surroundings (rows, cols), and the sum of their weights.
 
-    Beyond its borders the picture goes on as its mirror image.
+    The mirror image continues the picture beyond its borders.
     """
     total = 1
     for width in BOXES:
@@ -131,7 +131,7 @@ def surroundings(component: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
 
 
 def _signed(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the distance to the border between bright and dark, below 0 in the dark, in 1/256 of a pixel."""
+    """Return the distance to the border between bright and dark, negative in the dark, in 1/256 of a pixel."""
     squared = np.where(bright, distance(~bright), distance(bright))
     apart = np.rint(np.sqrt(squared.astype(np.float64)) * 256).astype(np.int64) - 128
     found: NDArray[np.int64] = np.where(bright, apart, -apart)
@@ -140,8 +140,8 @@ def _signed(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the squared distance of each pixel from the nearest marked one, at most REACH**2; (rows, cols)."""
-    along = np.where(marked, 0, REACH).astype(np.int64)  # by hand: importing SciPy's takes as long as a default run
-    for _ in range(REACH):  # along columns first, then every row looks up to REACH to either side
+    along = np.where(marked, 0, REACH).astype(np.int64)  # not SciPy's, whose import takes as long as a default run
+    for _ in range(REACH):  # along columns first, then over up to REACH to either side in a row
         along[1:] = np.minimum(along[1:], along[:-1] + 1)
         along[:-1] = np.minimum(along[:-1], along[1:] + 1)
     squared = along * along

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 def sums_around(values: NDArray[Any], reach: int) -> NDArray[np.int64]:
-    """Return the sum of whole numbers over 2 reach + 1 places along each axis around each, clipped to the array."""
+    """Return the sum of integers over 2 reach + 1 places along each axis around each place, clipped to the array."""
     found: NDArray[np.int64] = values.astype(np.int64)
     for axis, n in enumerate(values.shape):
         running = np.zeros((*found.shape[:axis], n + 1, *found.shape[axis + 1 :]), np.int64)

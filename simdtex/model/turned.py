@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turned and scaled copies of pictures, and which copy is wanted at which site.
+"""Turned and scaled copies of pictures, and the probability of each copy at each site.
 
 A rotation is rounded to the nearest eighth of a turn, and a scale to the nearest of 2**-1, 2**-1/2, 1, 2**1/2 and 2.
-Quarter turns at the scale 1 are exact; a pixel of any other copy is the nearest pixel of the picture. What a copy has
-beyond the borders of its picture is a mirror image, which nothing is taken from.
+Quarter turns at the scale 1 are exact; a pixel of any other copy is the nearest pixel of the picture. Beyond the
+borders of its picture a copy is a mirror image, whose pixels are never taken.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from numpy.typing import NDArray
 from simdtex.model.pictures import Mask, Pictures
 
 EIGHTHS = 8
-"""Turns that there are."""
+"""Number of rotations."""
 
 HALVES = 2
-"""Square roots of 2 by which a picture is enlarged, or reduced, at most."""
+"""The most factors of sqrt(2) by which a picture is enlarged or reduced."""
 
 MOST = 64
-"""Copies of all pictures together, at most."""
+"""The most copies of all pictures together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Copy:
     """A copy of a picture.
 
-    ``image`` the number of the picture; ``row`` and ``col`` (rows, cols) int32 where in it each pixel of the copy is
-    from; ``inside`` (rows, cols) whether that is no mirror image.
+    ``image``, the number of the picture; ``row`` and ``col`` (rows, cols) int32, the position in it of each pixel of
+    the copy; ``inside`` (rows, cols), False in the mirror image.
     """
 
     image: int
@@ -42,12 +42,12 @@ class Copy:
     inside: Mask
 
     def of(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        """Return the copy of an array that belongs to the picture, (rows, cols, ...)."""
+        """Return the copy of an array (rows, cols, ...) that belongs to the picture."""
         return np.ascontiguousarray(pictures[self.image][self.row, self.col])
 
 
 def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Copy:
-    """Return the copy of a picture of this shape, turned by eighths from x to y, and enlarged by sqrt(2)**halves.
+    """Return the copy of a picture of ``shape``, turned by ``eighths`` from x to y and enlarged by sqrt(2)**halves.
 
     x grows with the column and y with the row.
     """
@@ -61,7 +61,7 @@ def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Co
     y, x = ((np.arange(side) - (side - 1) / 2) / by for side in sides)
     down = cos * y[:, None] - sin * x[None, :] + (rows - 1) / 2
     along = sin * y[:, None] + cos * x[None, :] + (cols - 1) / 2
-    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (down, along))  # halves up, however they come out
+    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (down, along))  # halves up, even if inexact
     inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
     return Copy(image, _mirrored(row, rows), _mirrored(col, cols), inside)
 
@@ -73,7 +73,7 @@ def _mirrored(at: NDArray[np.int64], side: int) -> NDArray[np.int32]:
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """The copies that maps want: ``copies``, and the ``probability`` (copies, H, W) of each at each site, or NaN."""
+    """The ``copies`` that maps require, and the ``probability`` (copies, H, W) of each at each site, or NaN."""
 
     copies: tuple[Copy, ...]
     probability: NDArray[np.float64]
@@ -89,10 +89,10 @@ class Turned:
         return Pictures(tuple(one.of(pictures.pixels) for one in copies), unknown, usable)
 
     def sources(self, place: NDArray[np.int32], several: bool) -> NDArray[np.int32]:
-        """Return where in the pictures themselves a source map of the copies points to; -1 where from nowhere.
+        """Return the source map in the pictures themselves from one of the copies; -1 stays -1.
 
-        ``place`` (..., 3) row, column and number of the copy, or (..., 2) of one copy; with ``several`` pictures the
-        number of the picture is last.
+        ``place`` is (..., 3), row, column and number of the copy, or (..., 2) with one copy; with ``several`` pictures
+        the last number of the result is that of the picture.
         """
         number = place[..., 2] if place.shape[-1] == 3 else np.where(place[..., 0] < 0, np.int32(-1), np.int32(0))
         found = np.full((*place.shape[:-1], 2 + several), -1, np.int32)
@@ -109,7 +109,7 @@ def turned(
     rotation: NDArray[np.float64] | None,
     scale: NDArray[np.float64] | None,
 ) -> Turned:
-    """Return the copies that are wanted anywhere.
+    """Return the copies that any site requires, and their probabilities.
 
     Parameters
     ----------
@@ -117,9 +117,9 @@ def turned(
     images : (pictures, H, W) float64 array
         The probability of each picture, adding up to 1, or NaN.
     rotation : (H, W) float64 array, optional
-        Degrees from x to y; NaN: any that is wanted elsewhere.
+        Degrees from x to y; NaN: any rotation of another site.
     scale : (H, W) float64 array, optional
-        1/2 to 2; NaN likewise.
+        1/2 to 2; NaN: any scale of another site.
     """
     shape = images.shape[1:]
     turns = np.zeros(shape) if rotation is None else np.floor(rotation / (360 / EIGHTHS) + 0.5) % EIGHTHS

@@ -18,7 +18,7 @@ PIECE = 8  # side of a piece of the sample, pixels
 
 
 class MostUsed(NamedTuple):
-    """The piece that is used most: how many times its fair share, its first pixel and its size, see `effective_use`."""
+    """The most used piece: its use over its fair share, its first pixel and its size, see `effective_use`."""
 
     times_fair_share: float
     row: int
@@ -39,7 +39,7 @@ class Use(NamedTuple):
 
 
 def checked(source: ArrayLike) -> SourceMap:
-    """Return a source map as (rows, cols, 2 or 3) int32; raise if it is none."""
+    """Return a source map as (rows, cols, 2 or 3) int32; raise if ``source`` is not one."""
     unmasked("the source map", source)
     positions = np.asarray(source)
     if (
@@ -66,7 +66,7 @@ def checked(source: ArrayLike) -> SourceMap:
 
 
 def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | None = None) -> NDArray[np.intp]:
-    """Return how many output pixels each pixel of the sample was taken for.
+    """Return the number of output pixels that were taken from each pixel of the sample.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
     sample_shape : (rows, cols)
         The size of the sample, pixels.
     sample : int, optional
-        The sample that is counted, from 0; needed where the source map is of several.
+        The sample that is counted, from 0; required if the source map has several.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
 def effective_use(
     source: ArrayLike, sample_shape: tuple[int, ...], piece: int = PIECE, *, sample: int | None = None
 ) -> Use:
-    r"""Return how evenly the output uses the pieces of its sample, and which one it uses most.
+    r"""Return how evenly the output uses the pieces of its sample, and the most used piece.
 
     The sample is cut into pieces of about 8 x 8 pixels. With :math:`u_p` the number of output
     pixels taken from the piece p, of :math:`a_p` pixels, the effective share is
@@ -119,8 +119,8 @@ def effective_use(
 
        \frac{(\sum_p u_p)^2}{\sum_p a_p \sum_p u_p^2 / a_p} ,
 
-    which is :math:`(\sum u)^2 / (n \sum u^2)` where n pieces are equally large. It is the share of
-    the sample that would do if all of it were used alike.
+    which is :math:`(\sum u)^2 / (n \sum u^2)` for n equally large pieces. It is the share of
+    the sample that would suffice if all of it were used equally.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def effective_use(
         Side of a piece, pixels: each side of the sample is cut into as many parts as come nearest
         to this length, which differ by one pixel at most.
     sample : int, optional
-        The sample whose use is measured, from 0, by the pixels taken from it alone; needed where the source map is of
+        The sample whose use is measured, from 0, by the pixels taken from it alone; required if the source map has
         several.
 
     Returns
@@ -153,14 +153,14 @@ def effective_use(
 
     Notes
     -----
-    About 1 ms for an output of 256 x 256 pixels. Where pieces are taken by chance a piece of n
+    Cost: about 1 ms for an output of 256 x 256 pixels. If pieces are taken at random, the use of a piece with n
     output pixels varies by sqrt(n), so a small output has a lower share than a large one.
     """
     return use_of(counts(source, sample_shape, sample=sample), piece)
 
 
 def use_of(uses: NDArray[np.intp], piece: int = PIECE) -> Use:
-    """Return `effective_use` from `counts`, which add up over the parts of a source map."""
+    """Return `effective_use` from ``uses``, the `counts`, which add up over the parts of a source map."""
     if piece < 1:
         raise ValueError(f"piece is {piece}: give its side in pixels, 1 or more")
     if not uses.any():
@@ -175,6 +175,6 @@ def use_of(uses: NDArray[np.intp], piece: int = PIECE) -> Use:
 
 
 def _starts(length: int, piece: int) -> NDArray[np.intp]:
-    """Return where the parts of a side begin."""
+    """Return the begin of each part of a side."""
     parts = max(1, round(length / piece))
     return np.arange(parts) * length // parts

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Active sites, those of a temperature above 0: counted and listed on the machine, so that the plane stays there."""
+"""Active sites, with a temperature above 0: counted and listed on the machine, without a copy to the host."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import Grid
 
 CHUNK = 256
-"""Sites that a work-item counts."""
+"""The most sites that a work-item counts."""
 
 
 @Operation
 def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[int, int]:
-    """Return how many sites are active, and the sum of their temperatures in 1/1024."""
+    """Return the number of active sites, and the sum of their temperatures in 1/1024."""
     if machine is None:
         t = grid.view(temperature)
         return int((t > 0).sum()), int(t.sum(dtype=np.int64))
@@ -27,10 +27,10 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
 
 
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Cut the groups of a list, which begin at ``starts``, into stretches of at most `CHUNK` sites.
+    """Return the stretches, of at most `CHUNK` sites, of the groups of a list, which begin at ``starts``.
 
-    Returns the place of each stretch's first site and the list's end, (stretches + 1,); and the number of the first
-    stretch of each group and of all stretches, (groups + 1,).
+    The first result is the position of each stretch's first site, and the end of the list, (stretches + 1,); the second
+    is the number of the first stretch of each group, and the number of stretches, (groups + 1,).
     """
     pieces = -(-np.diff(starts) // CHUNK)
     firsts = np.concatenate([[0], np.cumsum(pieces)])
@@ -45,7 +45,7 @@ def among(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return the active sites of a list in its order, and the bounds of its groups among them.
 
-    ``sites`` (S,) int32 pixel indices, group after group; ``starts`` and ``firsts`` as of `stretches`.
+    ``sites`` (S,) int32 are pixel indices, group after group; ``starts`` and ``firsts`` come from `stretches`.
     """
     if machine is None:
         active = temperature.ravel()[sites] > 0

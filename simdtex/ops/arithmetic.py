@@ -13,7 +13,7 @@ def fma32(a: Any, b: Any, c: Any) -> NDArray[np.float32]:
     """Return a * b + c in float32, rounded once.
 
     The product of two float32 is exact in float64. The sum is rounded to odd there, which makes the second
-    rounding, to float32, the right one (Boldo and Melquiond, 2008).
+    rounding, to float32, correct (Boldo and Melquiond, 2008).
     """
     product = np.asarray(a, np.float64) * np.asarray(b, np.float64)
     c = np.asarray(c, np.float64)
@@ -29,7 +29,7 @@ def fma32(a: Any, b: Any, c: Any) -> NDArray[np.float32]:
 
 
 def exp32(x: Any) -> NDArray[np.float32]:
-    """exp(x) for -87 < x <= 0, bit for bit as on the device; relative error below 2.5e-7."""
+    """Return exp(x) for -87 < x <= 0, bit for bit as on the device; relative error below 2.5e-7."""
     x = np.asarray(x, np.float32)
     k = np.rint(x * np.float32(1.44269502))
     r = fma32(k, np.float32(-0.693145752), x)
@@ -42,7 +42,7 @@ def exp32(x: Any) -> NDArray[np.float32]:
 
 
 def log32(x: Any) -> NDArray[np.float32]:
-    """log(x) for 1 <= x < 2**24, bit for bit as on the device; absolute error below 1.2e-6."""
+    """Return log(x) for 1 <= x < 2**24, bit for bit as on the device; absolute error below 1.2e-6."""
     bits = np.asarray(x, np.float32).view(np.int32)
     k = (bits - np.int32(0x3F3504F3)) >> 23
     r = (bits - (k << 23)).view(np.float32) - np.float32(1)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The candidates of a pixel and a draw of one of them, De Bonet's equations (8) to (12).
 
-The pixels of the levels above the one that is sampled are called nodes. Candidates are numbered as the scan meets
-them: from the top down, parents before children, the children of a node row by row.
+The pixels of the levels above the sampled level are called nodes. Candidates are numbered in the order of the scan:
+from the top down, parents before children, the children of a node row by row.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 
 TOGETHER = 2**22
-"""Pixels times candidates that the twin looks at together."""
+"""The most pixels times candidates that the twin processes together."""
 
 
 class Structure(NamedTuple):
-    """The parent structures of the sample's pyramid, equation (8), and what they are compared by.
+    """The parent structures of the sample's pyramid, equation (8), and the thresholds of their comparison.
 
     ``features`` (nodes, M) int32, of the levels from 1 on, level after level; ``threshold`` (levels, M) uint32, the
-    largest difference that passes; ``lattice`` (levels, 4) int32: rows, columns, where the level begins in
-    ``features``, and the sum of 1 if its last row, and 2 if its last column, stands for fewer pixels of the sample than
-    the others.
+    largest difference that passes; ``lattice`` (levels, 4) int32: rows, columns, the first row of the level in
+    ``features``, and the sum of 1 if its last row, and 2 if its last column, represents fewer pixels of the sample than
+    all others.
     """
 
     features: Array
@@ -37,8 +37,8 @@ class Sampled(NamedTuple):
     """The output's pyramid so far, made of tiles laid out like the sample's.
 
     ``source`` (pixels,) int32, level after level: the pixel of the sample's level that each was copied from; ``counts``
-    (pixels, 2) int32: candidates of each, and nodes it was compared with; ``lattice`` (levels, 4) int32: rows, columns,
-    where the level begins in the other two, 0.
+    (pixels, 2) int32: the candidates of each, and the nodes that it was compared with; ``lattice`` (levels, 4) int32:
+    rows, columns, the first pixel of the level in ``source`` and ``counts``, 0.
     """
 
     source: Array
@@ -49,7 +49,7 @@ class Sampled(NamedTuple):
 def _drawn(
     structure: Structure, sampled: Sampled, level: int, sites: NDArray[np.intp], match: bool, seed: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Choice (S,) and counts (S, 2) of some sites."""
+    """Return the choice (S,) and the counts (S, 2) of ``sites``."""
     tile = structure.lattice[level, :2]
     i, j = np.divmod(sites, sampled.lattice[level, 1])
     p, q = i % tile[0], j % tile[1]
@@ -83,7 +83,7 @@ def _drawn(
 
 
 def _whole(node: NDArray[np.intp], parent: NDArray[np.intp], count: int, ragged: int) -> NDArray[np.bool_]:
-    """Return whether nodes have all the pixels below them that pixels' parents have, (S, nodes), along one axis."""
+    """Return whether nodes have as many pixels below them as the pixels' parents, (S, nodes), along one axis."""
     last = count - 1
     return np.asarray((node[None] != last) | (parent[:, None] == last) | (ragged == 0))
 
@@ -91,7 +91,7 @@ def _whole(node: NDArray[np.intp], parent: NDArray[np.intp], count: int, ragged:
 def _children(
     row: NDArray[np.intp], col: NDArray[np.intp], lattice: NDArray[np.int32]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Parent, row and column of the children that there are of some nodes, node by node, row by row."""
+    """Return parent, row and column of the existing children of nodes, node by node, row by row."""
     child_row = (2 * row[:, None] + [0, 0, 1, 1]).ravel()
     child_col = (2 * col[:, None] + [0, 1, 0, 1]).ravel()
     there = (child_row < lattice[0]) & (child_col < lattice[1])
@@ -108,12 +108,12 @@ def candidates(
     match: bool,
     seed: int,
 ) -> Sampled:
-    """Draw a candidate for each of some pixels; ``sampled`` is changed in place.
+    """Draw a candidate for each of the pixels ``sites``; ``sampled`` is changed in place and returned.
 
-    With ``match`` a candidate's row and column are even or odd as the pixel's are, and its parent stands for as many
-    pixels of the sample as the pixel's parent does, which those at its edge may not; without, any child of a node that
-    passes is one. Cost: at most nodes x M comparisons for four pixels, and about a sixteenth of that more for each that
-    is drawn from many candidates; 12 bytes of memory a pixel.
+    Without ``match``, any child of a node that passes is a candidate. With ``match`` its row and column must also have
+    the parity of the pixel's, and its parent must represent as many pixels of the sample as the pixel's parent, which
+    may fail at the edge. Cost: at most nodes x M comparisons for four pixels, and about a sixteenth more for each pixel
+    that is drawn from many candidates; 12 bytes of memory per pixel.
     """
     if machine is None:
         begin = int(sampled.lattice[level, 2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The costs of each candidate, added to distances that are kept."""
+"""The costs of each candidate, added to stored distances."""
 
 from __future__ import annotations
 

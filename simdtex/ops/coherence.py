@@ -14,14 +14,14 @@ from simdtex.ops.neighbourhood import Field
 
 
 def sources(r: NDArray[np.int32], field: Field) -> NDArray[np.int32]:
-    """Return the sources of neighbours (N, S); -1 for no neighbour, or one that no relaxation has touched."""
+    """Return the sources of neighbours (N, S); -1 without a neighbour, or for one that no relaxation has touched."""
     touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
     found: NDArray[np.int32] = np.where(touched, field.source.ravel()[r], np.int32(-1))
     return found
 
 
 def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the number of the candidate that continues the source of neighbour k, (N, S); -1 if there is none."""
+    """Return the number of the candidate that continues the source of each neighbour, (N, S); -1 if there is none."""
     p = source - candidates.reach[: len(source), None]
     inside = (source >= 0) & (p >= 0) & (p < candidates.index_of.size)
     numbers: NDArray[np.int32] = np.where(inside, candidates.index_of[np.where(inside, p, 0)], -1)
@@ -39,7 +39,7 @@ def coherence(
     grid: Grid,
     factor: np.float32,
 ) -> Distances:
-    """Multiply the distance of candidates that continue a neighbour's source by a factor, a device in place."""
+    """Return distances, times ``factor`` for candidates that continue a neighbour's source. A device works in place."""
     if machine is None:
         p = continuing(candidates, sources(grid.neighbours(sites, offsets), field))
         k, s = np.nonzero(p >= 0)

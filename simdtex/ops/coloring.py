@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Colouring of a lattice so that no two neighbours share a colour: sets of i.i.d. sites, equation (14).
 
-A colour is a formula of a site's row and column, but for the sites along the seam of a torus that cuts through the
-pattern; those alone are kept in a list. So any window of a lattice is coloured without looking at the rest of it.
+A colour is a formula of a site's row and column, except along the seam of a torus that cuts through the pattern; a list
+holds the colours of those sites. So any window of a lattice is coloured without the rest of the lattice.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from simdtex.model.lattice import (
 UNCOLORED = -1
 
 VAST = 2**17
-"""Rows and columns together beyond which a pattern that fits is taken, if there is one, without a look at the seam.
+"""Rows plus columns beyond which a pattern that fits is used, if any, without a greedy colouring of the seam.
 
-It has a few more colours, and the other takes minutes to find."""
+It has a few more colours, but the greedy colouring takes minutes."""
 
 TOGETHER = 2**20
-"""Neighbours that are looked at together."""
+"""The most neighbours that are processed together."""
 
 
 class Plan(NamedTuple):
-    """How a lattice is coloured.
+    """The colouring of a lattice.
 
-    ``pattern`` whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols + column of the sites
-    that have colours of their own, ``own`` (n,) int32 these; ``compact`` (colours before,) int32 the number of each
-    colour among those that are used, ``colors``.
+    ``pattern``, the sublattice whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols +
+    column of the sites with separate colours, and ``own`` (n,) int32, those colours; ``compact`` (colours before,)
+    int32, the number of each colour among the used ones; ``colors``, the number of used colours.
     """
 
     pattern: Sublattice
@@ -50,15 +50,15 @@ class Plan(NamedTuple):
 
 
 def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
-    """Return the colours of a level's lattice, or of a window of one: (rows, cols) int32, 0 .. colours - 1.
+    """Return the colours of a level's lattice, or of a window of it: (rows, cols) int32, 0 .. colours - 1.
 
     A volume's lattice, (layers, rows, cols), has the modular colouring of `coloring_of_layers`.
 
-    The best lattice colouring of the plane if the size of the lattice takes it without a seam. Else either a lattice
-    colouring with more colours that fits, or the best one with its clashes along the seam coloured greedily, whichever
-    has fewer colours; of a vast lattice the former, if there is one. A window's sites have the colours that they have
-    in the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a
-    few tens of rounds along its seam.
+    A picture's lattice has the best lattice colouring of the plane if its size admits that without a seam. Otherwise it
+    has either a lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
+    greedily, whichever has fewer colours; a vast lattice has the former, if any. A window's sites have their colours in
+    the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a few
+    tens of rounds along its seam.
     """
     if grid.layers > 1:
         m, *by = coloring_of_layers(order)
@@ -91,16 +91,16 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Pl
         most = max(best.index, seamless.index - 1) if seamless else inf
         own = _greedy(rows, cols, offsets, best, seam, priority, most)
     if own is None:
-        assert seamless is not None  # else greedy colours have no limit
+        assert seamless is not None  # otherwise greedy colours have no limit
         best, seam, own = seamless, none, none.astype(np.int32)
     used = _used(rows, cols, offsets, best, seam, own)
     return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
 
 
 def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return the colour of sites, their coset of the sublattice spanned by (a, 0) and (b, c) (row, column).
+    """Return the colours of sites: their cosets of the sublattice spanned by (a, 0) and (b, c) (row, column).
 
-    Two sites of one coset differ by a sublattice vector, none of which is as short as a neighbour's offset.
+    Two sites of one coset differ by a sublattice vector, and each of those is longer than any neighbour's offset.
     """
     a, b, c = pattern.a, pattern.b, pattern.c
     turned = (row % a).astype(np.int32) + (-(col // c) * b % a).astype(np.int32)
@@ -124,7 +124,7 @@ def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
 
 
 def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
-    """Return the later of any two sites that are neighbours across the seam and of one coset."""
+    """Return the later site of each pair of neighbours across the seam in one coset."""
     site = _along(rows, cols, int(offsets.max()))
     clash = [np.zeros(0, bool)]
     for here in _pieces(site, len(offsets)):
@@ -139,7 +139,7 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
 
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
-    """Return sites in pieces, small enough to look at all their neighbours together."""
+    """Return sites in pieces that are small enough to process all their neighbours together."""
     return np.array_split(sites, 1 + sites.size * neighbours // TOGETHER)
 
 
@@ -152,10 +152,10 @@ def _greedy(
     priority: NDArray[np.int64],
     most: float,
 ) -> NDArray[np.int32] | None:
-    """Parallel greedy colouring (Jones and Plassmann) of the sites of a torus that have no colour.
+    """Return the parallel greedy colouring (Jones and Plassmann) of the sites of a torus without a colour.
 
     In each round every site whose priority is above those of all its uncoloured neighbours takes the lowest colour
-    that no neighbour has. None where some site needs the colour ``most`` or a higher one.
+    that no neighbour has. The result is None if some site needs the colour ``most`` or a higher one.
     """
     n = bare.size
     taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
@@ -195,7 +195,7 @@ def _used(
     seam: NDArray[np.int64],
     own: NDArray[np.int32],
 ) -> NDArray[np.bool_]:
-    """Return which colours are used."""
+    """Return a mask of the used colours."""
     used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
     used[own] = True
     radius = int(offsets.max())

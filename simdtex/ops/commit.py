@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The end of a step: the new values of the sites that have relaxed go into the field, all at once."""
+"""The end of a step: the new values of all relaxed sites are written into the field together."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from simdtex.ops.neighbourhood import Field
 
 @Operation
 def commit(machine: Launcher | None, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
-    """Write what sites have become into the field, in place."""
+    """Write the new values and temperatures of sites into the field, in place, and return it."""
     channels = len(relaxed.values)
     if machine is None:
         field.values.reshape(len(field.values), -1)[:channels, sites] = relaxed.values

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a candidate costs a site beside its distance: use, place on a lattice, data between the sites, and kind."""
+"""The costs of a candidate in addition to its distance: use, phase on a lattice, data between the sites, and kind."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from simdtex.ops.arithmetic import fma32
 class Phased(NamedTuple):
     """Cosines and sines of the phases of a regular sample (`simdtex.model.regularity`).
 
-    Candidate and site are as far apart in phase at every neighbour as at the site itself, so it is enough to look
-    there. ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``certain``
-    the factor of their differences, whose square is the number of neighbours that they count for; ``free`` how much of
-    the cost is not counted, so that all candidates within half a step of a phase are alike.
+    The phase difference between candidate and site is the same at every neighbour, so only the site itself is compared.
+    ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``certain``, the
+    factor of their differences, whose square is the number of neighbours that they represent; ``free``, the part of the
+    cost that is subtracted, so that all candidates within half a step of a phase cost nothing.
     """
 
     candidates: Array
@@ -31,7 +31,7 @@ class Phased(NamedTuple):
     free: np.float32
 
     def cost(self, numbers: NDArray[np.integer], sites: NDArray[np.int32]) -> NDArray[np.float32]:
-        """Return how far the candidates of these numbers, (slots, S or 1), are from the phases of sites (S,)."""
+        """Return the cost of the phases of candidates ``numbers`` (slots, S or 1) at sites (S,)."""
         d = np.zeros((len(numbers), sites.size), np.float32)
         for y, x in zip(self.candidates, self.sites.reshape(len(self.sites), -1), strict=True):
             e = (x[sites].astype(np.float32) - y[np.maximum(numbers, 0)]) * self.certain
@@ -41,11 +41,11 @@ class Phased(NamedTuple):
 
 
 class Scattered(NamedTuple):
-    """Conditioning data that lie between the sites of a level, each compared where it lies.
+    """Conditioning data between the sites of a level, each compared at its own position.
 
-    ``begin`` (H * W + 1,) int32: those of the site at pixel index s are begin[s] .. begin[s + 1] - 1; ``reach`` (n,)
-    int32 is the pixel offset of each in the sample, ``values`` (n, C) uint16 its grey levels, `UNKNOWN` in channels
-    that tell nothing; ``certain`` the factor of the differences.
+    ``begin`` (H * W + 1,) int32: the data of the site at pixel index s are begin[s] .. begin[s + 1] - 1; ``reach`` (n,)
+    int32 is the pixel offset of each datum in the sample, ``values`` (n, C) uint16 are its grey levels, `UNKNOWN` in
+    unknown channels; ``certain`` is the factor of the differences.
     """
 
     begin: Array
@@ -56,7 +56,7 @@ class Scattered(NamedTuple):
     def cost(
         self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
     ) -> NDArray[np.float32]:
-        """Return how far the candidates of these numbers, (slots, S or 1), are from the data around sites (S,)."""
+        """Return the distance of candidates ``numbers`` (slots, S or 1) from the data around sites (S,)."""
         d = np.zeros((len(numbers), sites.size), np.float32)
         first, end = self.begin[sites], self.begin[sites + 1]
         place = np.broadcast_to(candidates.positions[np.maximum(numbers, 0)], d.shape)
@@ -71,17 +71,17 @@ class Scattered(NamedTuple):
 
 
 class Kinds(NamedTuple):
-    """What candidates of each kind cost at each site: soft data (`simdtex.model.soft`).
+    """The cost of each kind of candidates at each site: soft data (`simdtex.model.soft`).
 
-    ``candidates`` (kinds of a candidate, n rounded up to blocks) uint16 by number: rows of ``sites``, (rows, H, W)
-    float32 of 0 or more.
+    ``sites`` (kinds, H, W) float32 are the costs, 0 or more; ``candidates`` (kinds of a candidate, n rounded up to
+    blocks) uint16 are the kinds of each candidate, by its number.
     """
 
     candidates: Array
     sites: Array
 
     def cost(self, numbers: NDArray[np.integer], sites: NDArray[np.int32]) -> NDArray[np.float32]:
-        """Return what the candidates of these numbers, (slots, S or 1), cost at sites (S,) for their kinds."""
+        """Return the cost of the kinds of candidates ``numbers`` (slots, S or 1) at sites (S,)."""
         d = np.zeros((len(numbers), sites.size), np.float32)
         for kind in self.candidates:
             d += self.sites.reshape(len(self.sites), -1)[kind[np.maximum(numbers, 0)], sites]
@@ -109,7 +109,7 @@ class Costs(NamedTuple):
         phased = self.phased or Phased(nothing, nothing, np.float32(0), np.float32(0))
         scattered = self.scattered or Scattered(nothing, nothing, nothing, np.float32(0))
         kinds = self.kinds or Kinds(nothing, nothing)
-        listed = max(phased.candidates.shape[1], kinds.candidates.shape[1])  # both are as long, where there are both
+        listed = max(phased.candidates.shape[1], kinds.candidates.shape[1])  # of equal length if there are both
         area = max(prod(phased.sites.shape[1:]), prod(kinds.sites.shape[1:]))
         return (
             *(self.penalty, phased.candidates, listed, phased.sites, area),
@@ -121,7 +121,7 @@ class Costs(NamedTuple):
     def terms(
         self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
     ) -> Iterator[tuple[str, NDArray[np.float32]]]:
-        """Yield each cost of the candidates of these numbers, (slots, S or 1), by its name, in NumPy."""
+        """Yield each cost of candidates ``numbers`` (slots, S or 1) by its name, in NumPy."""
         yield "use", self.penalty[np.maximum(numbers, 0)]
         if self.phased:
             yield "lattice", self.phased.cost(numbers, sites)
@@ -137,7 +137,7 @@ class Costs(NamedTuple):
         sites: NDArray[np.int32],
         candidates: Candidates,
     ) -> NDArray[np.float32]:
-        """Return distances (slots, S) with all costs of the candidates of these numbers, (slots, S or 1), in NumPy."""
+        """Return distances (slots, S) plus all costs of candidates ``numbers`` (slots, S or 1), in NumPy."""
         for _, cost in self.terms(numbers, sites, candidates):
             d = d + cost
         return d

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The least squared distance of a neighbourhood to the exemplars of each class."""
+"""The least squared distance of a neighbourhood from the exemplars of each class."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.ops.arithmetic import log32
 
 TOGETHER = 4
-"""A class has a multiple of so many exemplars (kernels/exemplars.cl)."""
+"""The number of exemplars of a class is a multiple of this (kernels/exemplars.cl)."""
 
 LOGS = 256
-"""Units of a logarithm of a distance."""
+"""Units in 1 of the logarithm of a distance."""
 
 PART = 2**14
-"""Sites that the twin compares at a time."""
+"""The most sites that the twin compares together."""
 
 
 class Exemplars(NamedTuple):
-    """Neighbourhoods y that stand for classes: ``doubled`` (M, K) float32 are -2 y, ``squares`` (M,) float32 |y|^2.
+    """Neighbourhoods y that represent classes: ``doubled`` (M, K) float32 are -2 y, ``squares`` (M,) float32 |y|^2.
 
-    ``starts`` (classes + 1,) int32 is where each class begins among them.
+    ``starts`` (classes + 1,) int32 is the first exemplar of each class, and M.
     """
 
     doubled: Array
@@ -44,7 +44,7 @@ def stacked(machine: Machine, classes: list[NDArray[np.float32]]) -> Exemplars:
 def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Array:
     """Return log(d^2 + 1) of the nearest exemplar of each class, (classes, S) uint16 in 1/256.
 
-    ``features`` (K, S) float32 are whole numbers of which no sum of products reaches 2^24. Cost: S M K multiply-adds.
+    ``features`` (K, S) float32 are integers, whose sums of products stay below 2^24. Cost: S M K multiply-adds.
     """
     count, classes = features.shape[1], known.starts.shape[0] - 1
     if machine is None:

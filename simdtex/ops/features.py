@@ -10,16 +10,16 @@ from simdtex.ops.arithmetic import exp32, fma32, log32
 from simdtex.ops.laplacian import within
 
 SIXTEENTHS = 16
-"""Units of a level's values to one of 0..255."""
+"""Units of a level's values in 1 of the scale 0..255."""
 
 
 @Operation
 def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Array, contrast: bool) -> Array:
-    """Return the neighbourhoods of sites, (B * N, S) float32, all whole numbers.
+    """Return the neighbourhoods of sites, (B * N, S) float32 with integer values.
 
     ``levels`` (B, rows, cols) uint16 are bands in sixteenths of 0..255, mirrored beyond the border; ``sites`` (S,)
     int32 are row * cols + column; ``offsets`` (N, 2) int32 are the site itself and its neighbours. Raw values are
-    rounded to 0..255. With ``contrast`` each band has its mean taken away, and the whole vector z becomes
+    rounded to 0..255. With ``contrast`` the mean of each band is subtracted, and the whole vector z becomes
     40 log(1 + |z| / 5) z / |z|. Cost: O(S B N).
     """
     bands, rows, cols = levels.shape

@@ -10,7 +10,7 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.laplacian import within
 
 UNIT_BITS = 14
-"""Taps are whole multiples of 2**-14."""
+"""Taps are integer multiples of 2**-14."""
 
 
 SIDE, SIGMA = 3, 0.7
@@ -18,16 +18,16 @@ SIDE, SIGMA = 3, 0.7
 
 
 def bank(orientations: int) -> NDArray[np.int32]:
-    """Return first and second derivatives of a Gaussian in a number of directions: edges and lines.
+    """Return first and second derivatives of a Gaussian in ``orientations`` directions: edges and lines.
 
-    The derivatives have the angles pi a / n, a = 0 .. n-1, n the orientations, from the column axis towards the row
+    The derivatives have the angles pi a / n, a = 0 .. n-1, with n orientations, from the column axis towards the row
     axis.
 
     Returns
     -------
     (2 n, `SIDE`, `SIDE`) int32 array
-        In 2**-14, the n first derivatives first; to be correlated with a picture. The positive taps of each add up to
-        about 1, all of them to 0.
+        Filters for correlation in units of 2**-14, the n first derivatives first. The positive taps of a filter add up
+        to about 1, and all its taps to 0.
     """
     y, x = np.mgrid[:SIDE, :SIDE] - SIDE // 2
     gauss = np.exp(-(x * x + y * y) / (2 * SIGMA * SIGMA))

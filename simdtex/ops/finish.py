@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The finish: each pixel becomes the weighted mean of its neighbours' sources, continued to it, so that seams blend.
+"""The finish: each pixel becomes the weighted mean of its neighbours' sources, continued to it, which blends seams.
 
 x_s = sum_r w_r Y[p_r + (s - r)] / sum_r w_r, w_r = exp(-|r - s|^2 / 2 sd^2): the average over overlapping pieces of
-Kwatra et al. (2005). Where all continue one another it is Y[p_s] itself. A given neighbour
-whose source does not reach s adds by how much the source of s misses it: Y[p_s] + (x_r - Y[p_s + (r - s)]).
+Kwatra et al. (2005). Where all sources continue one another, x_s is Y[p_s] itself. For a given neighbour whose source
+does not reach s, the term is Y[p_s] plus the error of the source of s at that neighbour: x_r - Y[p_s + (r - s)].
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from simdtex.ops.neighbourhood import Field
 
 @cache
 def around(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return offsets (N, 2), the site itself among them, and weights (N,) in 1/1024 of a Gaussian cut off at 2.5 sd."""
+    """Return offsets (N, 2), including the site itself, and weights (N,) in 1/1024 of a Gaussian cut off at 2.5 sd."""
     radius = ceil(2.5 * sd)
     row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
     squared = row * row + col * col
@@ -44,9 +44,9 @@ def finish(
 ) -> NDArray[np.int16]:
     """Return the difference of pixels from their sources, (channels, count), on the host.
 
-    Of the sites of some ``rows`` of the grid, in working levels of 8-bit samples and in 1/8 of a working level of
-    others. The ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, the sample's, are of the
-    machine. Cost: N channels gathers a site.
+    It has the sites of ``rows`` of the grid, in working levels for 8-bit samples and in 1/8 of a working level for all
+    others. ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, those of the sample, are arrays of
+    the machine. Cost: N channels gathers per site.
     """
     offsets, weights = around(sd)
     first, count = rows.start * grid.cols, len(rows) * grid.cols

@@ -12,7 +12,7 @@ from simdtex.ops.lcpdf import Distances
 
 @Operation
 def histogram(machine: Launcher | None, distances: Distances, candidates: Candidates, greys: int) -> Array:
-    """Return how many candidates of each grey level match a site's neighbourhood exactly, (S, greys) uint32."""
+    """Return the number of candidates of each grey level that match a site exactly, (S, greys) uint32."""
     if machine is None:
         grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
         found = np.zeros((distances.sites, greys), np.uint32)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Heat-bath relaxation of Ising spins: a draw from the conditional distribution of a site, by integers alone.
 
-Spins are 0 (down) or 1 (up) in a (chains, H, W) uint8 array; where tiles read an older picture, it stands below in a
-(chains, 2 H, W) array (`simdtex.ops.snapshot`). Chains are copies of the lattice that know nothing of one another: the
-same number of them at each temperature, temperature after temperature. A chain's random numbers are keyed by its place
-among those of its temperature, so what happens at one temperature does not depend on which others there are.
+Spins are 0 (down) or 1 (up) in a (chains, H, W) uint8 array; if tiles read an older picture, that is below in a
+(chains, 2 H, W) array (`simdtex.ops.snapshot`). Chains are independent copies of the lattice, with the same number at
+each temperature, temperature after temperature. The random numbers of a chain are keyed by its index within its
+temperature, so the chains of a temperature do not depend on the other temperatures.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from simdtex.model.lattice import Grid
 
 
 def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
-    """Return the probabilities of up, in integers of 2**-32: (temperatures, N + 1, N + 1) uint32.
+    """Return the probabilities of spin up, in units of 2**-32: (temperatures, N + 1, N + 1) uint32.
 
     P(up) = 1 / (1 + exp(-2 S / T)), rounded, for a site with n neighbours on the lattice of which u are up, S = 2 u -
     n, and temperatures in units of J / k_B. Probabilities that round to 1 are 1 - 2**-32.
@@ -31,7 +31,7 @@ def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray
 
     members, up = np.indices((neighbours + 1, neighbours + 1))
     field = 2.0 * (2 * up - members)
-    with np.errstate(over="ignore"):  # a temperature of next to nothing: the probabilities are 0, 1/2 and 1
+    with np.errstate(over="ignore"):  # at a tiny temperature the probabilities are 0, 1/2 and 1
         chance = expit(field / np.asarray(temperatures, np.float64)[:, None, None])
     whole: NDArray[np.uint32] = np.minimum(np.rint(chance * 2.0**32), 2.0**32 - 1).astype(np.uint32)
     return whole
@@ -52,7 +52,7 @@ def ising_relax(
     seed: int,
     turn: int,
 ) -> Array:
-    """Return the new spins of the sites of a step, (chains, S) uint8, from the old ones.
+    """Return the new spins of the sites of a step, (chains, S) uint8.
 
     Cost: O(chains S N), 10 rounds of Philox each.
     """
@@ -77,8 +77,8 @@ def ising_relax(
 
 @Operation
 def ising_commit(machine: Launcher | None, spins: Array, sites: Array, relaxed: Array) -> Array:
-    """Write the new spins of a step, in place."""
-    chains = int(spins.shape[0])  # of any temperature
+    """Write the new spins of a step, in place, and return all spins."""
+    chains = int(spins.shape[0])  # at all temperatures
     if machine is None:
         spins.reshape(chains, -1)[:, sites] = relaxed
         return spins
@@ -92,10 +92,10 @@ def ising_commit(machine: Launcher | None, spins: Array, sites: Array, relaxed: 
 def ising_sequence(
     machine: Launcher | None, spins: Array, queue: Array, offsets: Array, grid: Grid, chances: Array, seed: int
 ) -> Array:
-    """Take steps of one site each, in place.
+    """Relax one site after another, in place, and return all spins.
 
-    ``queue`` (Q, 2) int32 is the site and the turn of each step, in order. The same bits as Q times `ising_relax` and
-    `ising_commit`, in one launch.
+    ``queue`` (Q, 2) int32 is the site and the turn of each step, in order. The bits are those of Q times `ising_relax`
+    and `ising_commit`, in one launch.
     """
     if machine is None:
         for site, turn in queue:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Laplacian pyramid of Burt and Adelson in integers, De Bonet's equations (5) and (6).
 
-Pictures are (planes, rows, cols) int32. A level has half the rows and columns of the one below it, rounded up. Sums
-stay within 32 bits where what is reduced is below 2**23, and what is collapsed below 2**25.
+Pictures are (planes, rows, cols) int32. A level has half the rows and columns of the one below it, rounded up. Sums fit
+32 bits if the input of a reduction is below 2**23, and that of a collapse below 2**25.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from simdtex.machine.interface import Array, Launcher, Operation
 
 
 def half(shape: tuple[int, ...]) -> tuple[int, int]:
-    """Return rows and columns of the level above a level of this shape."""
+    """Return rows and columns of the level above a level of ``shape``."""
     return -(-shape[0] // 2), -(-shape[1] // 2)
 
 
 def within(index: NDArray[np.intp], n: int, torus: bool) -> NDArray[np.intp]:
-    """Return indices within 0 .. n-1, as on a torus or in a mirror on the outer pixels (kernels/common/border.h)."""
+    """Return indices within 0 .. n-1: on a torus, or mirrored at the outer pixels (kernels/common/border.h)."""
     period = n if torus else max(1, 2 * n - 2)
     index = index % period
     return np.where(index < n, index, period - index)
@@ -30,7 +30,7 @@ def within(index: NDArray[np.intp], n: int, torus: bool) -> NDArray[np.intp]:
 def _expanded(
     coarse: NDArray[np.int32], shape: tuple[int, ...], tile: tuple[int, ...], torus: bool
 ) -> NDArray[np.int64]:
-    """Return 2up(G_{i+1}) at a level of this shape, made of tiles of another shape."""
+    """Return 2up(G_{i+1}) at a level of ``shape``, made of tiles of shape ``tile``."""
     g = coarse.astype(np.int64)
     for axis in (1, 2):
         n = g.shape[axis]
@@ -43,7 +43,7 @@ def _expanded(
 
 
 def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> NDArray[np.int64]:
-    """Return L_i of the output, (planes, rows, cols): pieces of the sample that meet fade into each other."""
+    """Return L_i of the output, (planes, rows, cols), with blended seams between pieces of the sample."""
     rows, cols = band.shape[1:]
     place, total = np.divmod(source, np.int32(cols)), np.zeros((len(band), *source.shape), np.int64)
     for a, b in product((-1, 0, 1), repeat=2):
@@ -57,7 +57,7 @@ def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> 
 
 
 def shifted(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the neighbours of n pixels in a line on one side, and their offsets; an end may be its own."""
+    """Return the neighbours on one side of n pixels in a line, and their offsets; an end pixel may be its own."""
     own = np.arange(n)
     near = own + by
     return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - own)
@@ -65,7 +65,7 @@ def shifted(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.
 
 @Operation
 def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Array:
-    """Return G_{i+1} of G_i, equation (6). Cost: 25 multiply-adds a pixel of it."""
+    """Return G_{i+1} from G_i, equation (6). Cost: 25 multiply-adds per pixel of G_{i+1}."""
     if machine is None:
         g = fine.astype(np.int64)
         for axis in (1, 2):
@@ -85,7 +85,7 @@ def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Arra
 
 @Operation
 def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: bool) -> Array:
-    """Return L_i of G_i and G_{i+1}, equation (5)."""
+    """Return L_i from G_i and G_{i+1}, equation (5)."""
     planes, rows, cols = fine.shape
     if machine is None:
         return (fine - _expanded(coarse, (rows, cols), (rows, cols), torus)).astype(np.int32)
@@ -98,12 +98,12 @@ def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: 
 def laplacian_collapse(
     machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool, blend: bool = False
 ) -> Array:
-    """Return G_i of L_i and G_{i+1}.
+    """Return G_i from L_i and G_{i+1}.
 
-    ``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size. With
-    ``blend`` there are no hard seams: where neighbours are not neighbours in the band, a pixel of L_i is the mean, by
-    (1, 2, 1) / 4 in each direction, of the pixels of the band at which each neighbour's piece would go on; elsewhere it
-    is the band's own pixel, to the bit.
+    ``source`` (rows, cols) int32 are the pixels of ``band`` that form L_i, whose size may differ. With ``blend`` there
+    are no hard seams: where neighbours are not neighbours in the band, a pixel of L_i is the mean, weighted by
+    (1, 2, 1) / 4 in each direction, of the pixels of the band that continue each neighbour's piece; elsewhere it is the
+    pixel of the band, to the bit.
     """
     if machine is None:
         own = _joined(band, source, torus) if blend else band.reshape(len(band), -1)[:, source]

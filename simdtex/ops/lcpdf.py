@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The local conditional probability density function, equations (6) to (8) and (12), on the machine.
 
-`distance` gives d_p for every site and candidate, `take` a draw or the nearest candidate, `density` the whole function.
+`distance` returns d_p for every site and candidate, `take` a draw or the nearest candidate, `density` the function.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from simdtex.ops.arithmetic import exp32, fma32
 from simdtex.ops.neighbourhood import Neighbourhoods
 
 NO_WEIGHT = np.float32(28)
-"""exp(-28) 2**40 < 1."""
+"""The exponent from which a weight is 0: exp(-28) 2**40 < 1."""
 
 
 class Distances(NamedTuple):
-    """``distance`` (candidates, P) d_p of equation (12); ``nearest`` (blocks, P), devices only; ``sites`` S."""
+    """``distance`` (candidates, P), d_p of equation (12); ``nearest`` (blocks, P), on devices only; ``sites``, S."""
 
     distance: Array
     nearest: Array
@@ -33,17 +33,17 @@ class Distances(NamedTuple):
 
 
 class Relaxed(NamedTuple):
-    """``choice`` (S,) pixel index in the sample; ``values`` (C, S) working grey levels."""
+    """Relaxed sites: ``choice`` (S,), pixel indices in the sample; ``values`` (C, S), working grey levels."""
 
     choice: Array
     values: Array
 
 
 class Window(NamedTuple):
-    """The Gaussian of equation (7) at a bandwidth h, as tables over whole grey levels.
+    """The Gaussian of equation (7) at a bandwidth h, as tables over integer grey levels.
 
-    ``scale`` 1 / 2h^2; ``noise`` (2 radius + 1,) uint32 cumulative probabilities of the steps -radius..radius in
-    2**-32; ``gauss`` (radius + 1,) float32 exp(-k^2 / 2h^2); ``top`` the highest legal level.
+    ``scale``, 1 / 2h^2; ``noise`` (2 radius + 1,) uint32, the cumulative probabilities of the steps -radius..radius in
+    2**-32; ``gauss`` (radius + 1,) float32, exp(-k^2 / 2h^2); ``top``, the highest legal level.
     """
 
     scale: np.float32
@@ -56,8 +56,8 @@ class Window(NamedTuple):
 class Choice(NamedTuple):
     """The choice of a site among its candidates, step 6.2.2.2.
 
-    ``draws`` whether it draws from the LCPDF, or takes the nearest candidate; ``density`` whether it draws a grey level
-    of the Parzen density, or a pixel of the sample; ``window`` of equation (7).
+    ``draws``: whether it draws from the LCPDF, or takes the nearest candidate; ``density``: whether it draws a grey
+    level of the Parzen density, or a pixel of the sample; ``window``: that of equation (7).
     """
 
     draws: bool
@@ -76,8 +76,8 @@ class Key(NamedTuple):
 def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> float:
     """Return h_opt of equation (8).
 
-    ``variance`` is sigma^2, the mean marginal variance, ``candidates`` n, the number of sample data, and ``dimensions``
-    d = channels (N + 1).
+    ``variance`` is sigma^2, the mean marginal variance; ``candidates`` is n, the number of sample data; and
+    ``dimensions`` is d = channels (N + 1).
     """
     return sqrt(variance) * pow(4 / (candidates * (2 * dimensions + 1)), 1 / (dimensions + 4))
 
@@ -85,8 +85,8 @@ def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> floa
 def window(bandwidth: float, top: int) -> Window:
     """Return the tables for a bandwidth h in working grey levels.
 
-    h below 10^-10, or 0 for a constant sample, stands for that: any difference then weighs nothing already, and
-    1 / 2h^2 stays finite. The tables end before the Gaussian falls below 2**-33, so they hold no subnormal number.
+    h below 10^-10, for example 0 for a constant sample, is replaced by 10^-10: any difference then has no weight, and
+    1 / 2h^2 is finite. The tables end before the Gaussian falls below 2**-33, so they hold no subnormal number.
 
     math.exp is rounded to 2**-24 or coarser here, so the last bit of a platform's libm does not matter.
     """
@@ -95,7 +95,7 @@ def window(bandwidth: float, top: int) -> Window:
     radius = min(top, int(h * sqrt(2 * log(2.0**33))))
     gauss = [exp(-k * k / (2 * h * h)) for k in range(radius + 1)]
     steps = gauss[:0:-1] + gauss
-    sums = list(accumulate(steps))  # Python 3.12's own sum() rounds in another way
+    sums = list(accumulate(steps))  # sum() of Python 3.12 rounds differently
     noise = [min(2**32 - 1, round(partial / sums[-1] * 2**32)) for partial in sums]
     noise[-1] = 2**32 - 1
     return Window(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
@@ -113,7 +113,7 @@ def distance(machine: Launcher | None, near: Neighbourhoods, candidates: Candida
             for c, y in enumerate(candidates.pixels):
                 u = certain if certain.ndim == 1 else certain[c]
                 e = weighted[k, c] - u * y[position + offset][:, None].astype(np.float64)
-                d = (e * e + d).astype(np.float32)  # fits 53 bits, so this is the device's fma: see Sample
+                d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
         return Distances(d, None, sites)
     terms, _, padded = near.weighted.shape
     blocks = candidates.positions.size // BLOCK
@@ -140,9 +140,9 @@ def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint
 
 
 def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: Choice) -> NDArray[np.uint64]:
-    """Return what a draw is in proportion to: weights, of a density times the legal share of each pixel's kernel.
+    """Return the masses of a draw: the weights or, for a density, times the legal share of each pixel's kernel.
 
-    ``w`` (slots, S) weights; ``pixels`` (C, slots, S or 1) grey levels of the candidates.
+    ``w`` (slots, S) are the weights; ``pixels`` (C, slots, S or 1) the grey levels of the candidates.
     """
     for plane in pixels if choice.density else ():
         _, mass = legal(plane, choice.window)
@@ -158,9 +158,9 @@ def drawn(
     choice: Choice,
     key: Key,
 ) -> NDArray[np.intp]:
-    """Return the slot (S,) that each site draws, with a probability in proportion to its mass (`masses`).
+    """Return the slot (S,) that each site draws, with a probability proportional to its mass (`masses`).
 
-    ``places`` (S,) of the sites in the whole picture.
+    ``places`` (S,) are the sites' pixel indices in the whole picture.
     """
     cumulative = np.cumsum(masses(w, pixels, choice), 0, dtype=np.uint64)
     lo, hi, *_ = random.draw4(*key, places, random.DRAW, 0)
@@ -169,7 +169,7 @@ def drawn(
 
 
 def stepped(x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: Window, key: Key) -> NDArray[np.uint16]:
-    """Return grey levels drawn from the kernel of equation (7) around those of channel c."""
+    """Return grey levels drawn from the kernel of equation (7) around the grey levels ``x`` of channel ``c``."""
     low, mass = legal(x, win)
     bits = random.draw4(*key, places, random.DRAW, 1 + c)[0].astype(np.uint64)
     u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
@@ -193,7 +193,7 @@ def taken(
     choice: Choice,
     key: Key,
 ) -> Relaxed:
-    """Return what each site takes of the candidates of these numbers, (slots, S or 1), in NumPy."""
+    """Return the choice of each site among the candidates ``numbers`` (slots, S or 1), in NumPy."""
     d = distances.distance
     if choice.draws:
         pixels = candidates.pixels[:, candidates.positions[np.maximum(numbers, 0)]]
@@ -218,7 +218,7 @@ def take(
     choice: Choice,
     key: Key,
 ) -> Relaxed:
-    """Return a draw from the LCPDF for each site, or its nearest candidate, of several the first."""
+    """Return a draw from the LCPDF for each site, or the first of its nearest candidates."""
     if machine is None:
         numbers = np.arange(candidates.size)[:, None]
         return taken(numbers, distances, candidates, grid.places(sites), choice, key)
@@ -253,7 +253,7 @@ def smoothed(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
 
 @Operation
 def density(machine: Launcher | None, distances: Distances, candidates: Candidates, win: Window) -> Array:
-    """Return the density of one channel at each grey level up to a factor, (S, greys) float32."""
+    """Return the density of one channel at each grey level, up to a factor, (S, greys) float32."""
     shape = (distances.sites, win.top + 1)
     if machine is None:
         w = weights(distances.distance, win.scale)
@@ -282,7 +282,7 @@ def _defines(machine: Launcher, candidates: Candidates) -> dict[str, int]:
 
 
 def _weighing(distances: Distances, win: Window) -> list[Any]:
-    """Return the arguments that every kernel on distances begins with."""
+    """Return the first arguments of every kernel on distances."""
     blocks, padded = distances.nearest.shape
     shape = [blocks, distances.sites, padded]
     return [distances.distance, distances.nearest, *shape, win.scale]

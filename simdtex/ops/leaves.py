@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Features of neighbourhoods, and candidates gathered into leaves of like features: a search tree's lowest level.
+"""Features of neighbourhoods, and leaves of candidates with similar features: the lowest level of a search tree.
 
-Features are projections on the principal axes of the sample's neighbourhoods. They only serve to tell which candidates
-cannot win, so no bit of a result depends on them.
+Features are projections on the principal axes of the sample's neighbourhoods. They only exclude candidates that cannot
+be the nearest, so no bit of a result depends on them.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array
 
 FEATURES, FEW, LEAF = 16, 8, 64
-"""As in kernels/nearest.cl."""
+"""The constants of kernels/nearest.cl."""
 LANES = 16
-"""Leaves are filled up to a multiple of this."""
+"""The number of leaves is padded to a multiple of this."""
 FAR = np.float32(1e18)
-"""A feature of what is no candidate; its square is finite."""
+"""The feature of a slot without a candidate; its square is finite."""
 LEAST, MOST = 512, 512
-"""Candidates from which on, and values of a neighbourhood up to which, it pays."""
+"""The fewest candidates, and the most values of a neighbourhood, for which leaves save time."""
 
 
 class Leaves(NamedTuple):
-    """What `nearest_leaves` reads: see kernels/nearest.cl.
+    """The input of `nearest_leaves`: see kernels/nearest.cl.
 
     ``axes`` (values, FEATURES), ``box`` (FEW, 2, number), ``rows`` (FEATURES, number * LEAF) float32; ``order``
-    (number * LEAF,) int32; ``number`` of leaves; ``middle`` grey level; ``blur``.
+    (number * LEAF,) int32; ``number`` of leaves; ``middle`` grey level; ``blur``, the error of features.
     """
 
     axes: Array
@@ -44,14 +44,14 @@ class Leaves(NamedTuple):
 def grow(
     machine: Any, working: NDArray[np.uint16], positions: NDArray[np.int32], reach: NDArray[np.int32], top: int
 ) -> Leaves | None:
-    """Return the leaves of a level, or None if a search along rows is as good.
+    """Return the leaves of a level, or None if a search along rows is as fast.
 
-    ``working`` (C, pixels) grey levels of the sample, 0 to ``top``; ``positions`` (n,) pixel index of each candidate;
-    ``reach`` (N,) pixel offset of each neighbour.
+    ``working`` (C, pixels) are grey levels of the sample, 0 to ``top``; ``positions`` (n,) the pixel index of each
+    candidate; ``reach`` (N,) the pixel offset of each neighbour.
 
-    With D values to a neighbourhood, of at most `top` / 2 about the middle, float32 sums of D products err by less than
-    (D + 2) 2**-24 sqrt(D) top per feature; `blur` is four times that for each of 16 features together. Cost: n D 16 fma
-    and a sort of n for each halving down to `LEAF`. Memory: 80 bytes per candidate.
+    With D values in a neighbourhood, at most ``top`` / 2 from the middle, the error of a float32 sum of D products is
+    below (D + 2) 2**-24 sqrt(D) top per feature; `blur` is four times that for all 16 features together. Cost: n D 16
+    fma, and a sort of n for each halving down to `LEAF`. Memory: 80 bytes per candidate.
     """
     values = reach.size * len(working)
     if positions.size < LEAST or not FEATURES <= values <= MOST:
@@ -80,7 +80,7 @@ def grow(
 
 
 def _halve(some: NDArray[np.int64], features: NDArray[np.float32]) -> list[NDArray[np.int64]]:
-    """Halves along the feature that varies most, down to leaves; all but the last are full."""
+    """Return the leaves by halving along the feature that varies most; all leaves but the last are full."""
     if some.size <= LEAF:
         return [some]
     here = features[some]

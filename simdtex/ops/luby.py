@@ -13,17 +13,17 @@ from simdtex.model.lattice import Grid
 UNDECIDED, IN, OUT = 0, 1, 2
 
 ROUNDS = 4
-"""Rounds between two looks at what is left; further rounds change nothing."""
+"""Rounds between two checks for the end; further rounds change nothing."""
 
 
 @Operation
 def luby(
     machine: Launcher | None, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
 ) -> NDArray[np.uint8]:
-    """Return the members of the set, (rows, cols) uint8, on the host: a schedule wants them there.
+    """Return the members of the set, (rows, cols) uint8, on the host, where a schedule needs them.
 
-    ``active`` (rows, cols) uint8 says which sites may be members. The set is that of the greedy choice in the order of
-    priorities, so it does not depend on the rounds. Cost: O(rows cols N) a round, some 5 to 10 rounds.
+    ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
+    priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
     sites = grid.size
     if machine is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Histogram matching of every segment: Heeger and Bergen's match-histogram, by rank and by lookup, in integers.
 
-Segments are rows of a (segments, n) int32 array. T targets serve segments // T segments in a row each.
+Segments are rows of a (segments, n) int32 array. Each of T targets is for segments // T consecutive segments.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.sort import local, run_length
 
 FRACTION = 20
-"""Bits of a fraction of a bin."""
+"""Number of bits of the fraction of a bin."""
 
 BINS = 256
-"""Bins of a histogram in the paper."""
+"""Number of bins of a histogram in the paper."""
 
 
 def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[np.int32]:
-    """Return the inverse of a target's cdf, in a table (bins + 1,) int32.
+    """Return the inverse of a target's cdf as a table (bins + 1,) int32.
 
     The target's values are sorted, smallest first. The table holds the least value at which the cdf reaches 0, 1 /
     bins, 2 / bins, ... 1, rounded to the nearest, halves up; the target's histogram has 2 to 4096 equal bins over its
-    range, even within each.
+    range, uniform within each.
     """
     low, high = int(sorted_values[0]), int(sorted_values[-1])
     width, m = high - low, len(sorted_values)
@@ -32,7 +32,7 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     below = np.concatenate(([0], np.cumsum(np.bincount(number, minlength=bins))))
     table = [low]
     for i in range(1, bins + 1):
-        rank = i * m  # in values / bins, so that it is whole
+        rank = i * m  # in values / bins, so that it is an integer
         b = int(np.searchsorted(below[1:] * bins, rank))
         before, after = int(below[b]) * bins, int(below[b + 1]) * bins
         here, unit = b * (after - before) + rank - before, (after - before) * bins
@@ -41,7 +41,7 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
 
 
 def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins: int) -> NDArray[np.int64]:
-    """Return the bins of values so far above the least; the greatest stands at the end of the last."""
+    """Return the bins of values ``above`` the least; the greatest value is at the end of the last bin."""
     number: NDArray[np.int64] = np.minimum(above * bins // np.maximum(width, 1), bins - 1)
     return number
 
@@ -50,8 +50,8 @@ def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins
 def match_ranks(machine: Launcher | None, order: Array, targets: Array) -> Array:
     """Return values with the histograms of the targets, (segments, n) int32.
 
-    ``order`` (segments, n) comes from `simdtex.ops.sort.sort`, ``targets`` (T, m) int32 are sorted. Out of n, the value
-    of rank k becomes the target's of rank (2 k + 1) m // (2 n) out of m.
+    ``order`` (segments, n) comes from `simdtex.ops.sort.sort`, ``targets`` (T, m) int32 are sorted. The value of rank k
+    among n becomes the target's value of rank (2 k + 1) m // (2 n) among m.
     """
     (segments, n), m = order.shape, targets.shape[1]
     each = segments // targets.shape[0]
@@ -69,8 +69,8 @@ def match_ranks(machine: Launcher | None, order: Array, targets: Array) -> Array
 def match_lookup(machine: Launcher | None, values: Array, tables: Array) -> Array:
     """Return values with the histograms of the targets, through tables (T, bins + 1) int32, each from `inverse_cdf`.
 
-    A segment's cdf is that of as many equal bins over its own range, even within each. The place of a value in its bin,
-    and then in the table, is rounded down to 2**-20 of a bin; the result is linear between entries, rounded to the
+    A segment's cdf is that of as many equal bins over its own range, uniform within each. The place of a value in its
+    bin, and then in the table, is rounded down to 2**-20 of a bin; the result is linear between entries, rounded to the
     nearest, halves up. A constant segment takes the middle of the table, the target's median. 2 to 4096 bins.
     """
     (segments, n), bins = values.shape, tables.shape[1] - 1
@@ -123,7 +123,7 @@ def distance(machine: Launcher | None, before: Array, after: Array) -> Array:
 
 
 def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int, tuple[int, ...]]:
-    """Return the runs of a segment, no shorter than the table of each, and their shape as kernels take it."""
+    """Return the number of runs of a segment, each at least as long as its table, and the shape for kernels."""
     length = min(n, max(run_length(machine, segments, n), table))
     runs = -(-n // length)
     return runs, (segments, n, runs, length)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ICM over sample positions: each site's nearest candidate, found without keeping a distance.
+"""ICM over sample positions: each site's nearest candidate, found without storing distances.
 
-The twin weighs everything and takes the least. A device first weighs the few candidates that continue a neighbour's
-source, and then skips candidates that are proved to lie beyond the best so far: ``docs/concepts/search.rst``.
+The twin evaluates all candidates and takes the nearest. A device first evaluates the few candidates that continue a
+neighbour's source, and then skips candidates that a bound excludes: ``docs/concepts/search.rst``.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
 
 CHECK = 4
-"""Neighbours between two looks at the bound; every neighbourhood of a picture has a multiple of 4, of a volume of 2."""
+"""Neighbours between two checks of the bound; in a picture their number is a multiple of 4, in a volume of 2."""
 
 TAIL = 1024
-"""Values after a strip that may be read where the candidates' rows end; nothing comes of them."""
+"""Values after a strip that may be read at the end of the candidates' rows, without an effect."""
 
 
 class Strip(NamedTuple):
-    """The sample's pixels that the candidates of a level and their neighbours are, row by row.
+    """The pixels of a level's candidates and of their neighbours, row by row.
 
     ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
     the list, is pixel ``first`` + i ``pitch`` + j, and ``thick`` pixels further in the next layer, every ``high`` rows;
-    ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
-    the bytes of the neighbourhood's own; ``leaves()`` the candidates by features, made when first asked for.
+    ``reach`` (N,) int32, the pixel offset of each neighbour; ``offsets``, the offsets of the neighbourhood as bytes;
+    ``leaves()``, the candidates by features, made at the first call.
     """
 
     pixels: Array
@@ -72,17 +72,17 @@ def strip_of(machine: Machine, sample: Sample, places: Places) -> Strip:
 
 
 def slack(terms: int) -> np.float32:
-    """Return the factor by which a sum of so many squares may exceed the same sum in another order, generously.
+    """Return an upper bound of the ratio of a sum of ``terms`` squares to the same sum in another order.
 
-    Either differs from the exact sum by a factor within (1 + 2**-24)**terms, so they differ by less than
-    1 + 4 terms 2**-24; rounding the product of bound and factor is within the rest.
+    Each differs from the exact sum by a factor within (1 + 2**-24)**terms, so their ratio is below 1 + 4 terms 2**-24;
+    the margin also covers the rounding of the product of bound and factor.
     """
     return np.float32(1 + (terms + 2) * 2.0**-22)
 
 
 @lru_cache(maxsize=16)
 def _spread(offsets: bytes) -> NDArray[np.int32]:
-    """Return an order of neighbours in which each is far from those before: close ones differ by much the same."""
+    """Return an order of neighbours in which each is far from earlier ones, since close ones differ alike."""
     place = np.stack(parts_of(np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)), 1)
     gap = np.full(len(place), np.iinfo(np.int64).max)
     order = []
@@ -105,7 +105,7 @@ def nearest(
     discount: np.float32,
     costs: Costs,
 ) -> Relaxed:
-    """Return the nearest candidate of each site by its distance, discounted for coherence, plus its other costs.
+    """Return the nearest candidate of each site, by its distance, discounted for coherence, plus all other costs.
 
     ``discount`` is 1 / (1 + coherence).
     """

@@ -15,9 +15,9 @@ from simdtex.model.lattice import Grid
 
 
 class Field(NamedTuple):
-    """State of the relaxation.
+    """The arrays over sites of the relaxation.
 
-    ``values`` (C, H, W) uint16 working grey levels; ``source`` (H, W) int32 pixel index in the sample;
+    ``values`` (C, H, W) uint16, working grey levels; ``source`` (H, W) int32, pixel indices in the sample;
     ``temperature`` (H, W) uint16 in 1/1024.
     """
 
@@ -27,11 +27,11 @@ class Field(NamedTuple):
 
 
 class Confidences(NamedTuple):
-    """The number of guides, and how much each value counts: kernels/common/confidence.h.
+    """The number of guides, and the confidences of values: kernels/common/confidence.h.
 
-    ``guides`` their number, the last channels; ``own`` whether each value has a confidence of its own, as guides have
-    and values that may be unknown; ``centre`` the confidence of a guide at the site itself; ``hard`` that of hard data,
-    which are not taken from the sample.
+    ``guides``, the number of guide channels, which are the last; ``own``, whether each value has its own confidence, as
+    for guides and unknown values; ``centre``, the confidence of a guide at the site itself; ``hard``, that of hard
+    data, which are not taken from the sample.
     """
 
     guides: int = 0
@@ -49,9 +49,9 @@ USUAL = Confidences()
 
 
 class Neighbourhoods(NamedTuple):
-    """``confidence`` (N, P) u = 1 - t_r; ``weighted`` (N, C, P) x_r u; ``sites`` S of the P columns.
+    """Neighbourhoods: ``confidence`` (N, P), u = 1 - t_r; ``weighted`` (N, C, P), x_r u; ``sites``, S of the P columns.
 
-    If each value has a confidence of its own, ``confidence`` is (N, C, P); with guides, the site itself is the last of
+    If each value has its own confidence, ``confidence`` is (N, C, P); with guides, the site itself is the last of
     N + 1.
     """
 
@@ -63,7 +63,7 @@ class Neighbourhoods(NamedTuple):
 def gathered(
     sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, confidences: Confidences
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Return values (terms, C, S) and confidences (terms, C or 1, S) of neighbours r (N, S), and of a guide's site."""
+    """Return values (terms, C, S) and confidences (terms, C or 1, S) of neighbours r (N, S), and of guides at sites."""
     u = (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024)
     if confidences.own:
         u = np.where((r >= 0) & (field.source.ravel()[r] < 0), u * confidences.hard, u)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""White noise, from which the pyramid method begins."""
+"""White noise, from which the pyramid method starts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from simdtex.machine.interface import Array, Launcher, Operation
 
 @Operation
 def noise(machine: Launcher | None, planes: int, n: int, seed: int, level: int) -> Array:
-    """Return (planes, n) int32, all 32 bits uniform.
+    """Return white noise (planes, n) int32, uniform over all 32 bits.
 
     Plane p has word p % 4 of the draws of turn p // 4 at sites 0 .. n-1.
     """

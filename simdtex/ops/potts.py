@@ -8,12 +8,12 @@ import numpy as np
 from simdtex.machine.interface import Array, Launcher, Operation
 
 WEIGHTS = 16
-"""Units of the weight of votes."""
+"""Units in 1 of the weight of votes."""
 
 
 @Operation
 def potts(machine: Launcher | None, sites: Array, evidence: Array, votes: Array, weight: int, labels: Array) -> Array:
-    """Give sites their most probable class, in place: the greatest evidence plus weight times votes, first of equals.
+    """Set sites to the class with the greatest evidence plus weight times votes, first of equals, in place.
 
     ``sites`` (S,) int32; ``evidence`` (classes, rows, cols) int32 and ``votes`` (classes, rows, cols) uint32, both in
     2**-18; ``weight`` in 1/16; ``labels`` (rows, cols) uint8. Cost: O(S classes).

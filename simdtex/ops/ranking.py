@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Histogram matching by rank, from values to values: `sort`, `match_ranks` and `distance` as one operation."""
+"""Histogram matching by rank: `sort`, `match_ranks` and `distance` in one operation."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from simdtex.ops.matching import distance, match_ranks
 from simdtex.ops.sort import SCRATCH, local, sort
 
 COUNTERS = 3 * 2**11
-"""Of a segment: for 11 bits in each of three passes."""
+"""Counters of a segment, for 11 bits in each of three passes."""
 
 SHORT, LONG = 2**15, 2**22
-"""Values of a segment that one work-item sorts, if segments are few and if they are many."""
+"""The most values of a segment that one work-item sorts, if segments are few and if they are many."""
 
 
 def alone(machine: Launcher, segments: int, n: int) -> bool:
-    """Return whether one work-item is to sort a whole segment; it changes no bit.
+    """Return whether one work-item sorts a whole segment; it changes no bit.
 
-    It saves a dozen launches. A long segment is divided on a GPU, or where cores would go without one.
+    It saves a dozen launches. A long segment is divided on a GPU, or if cores would be idle.
     """
     if machine.info.kind == "gpu":
         return False
@@ -28,11 +28,11 @@ def alone(machine: Launcher, segments: int, n: int) -> bool:
 
 @Operation
 def ranking(machine: Launcher | None, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
-    """Return values (segments, n) int32 with the histograms of the targets, and how far they have moved.
+    """Return values (segments, n) int32 with the histograms of the targets, and the distances they have moved.
 
     ``values`` (segments, n) int32, equal ones in the order of the permutation ``first`` (n,) int32; ``targets`` (T, m)
     int32 are sorted. The second result, (segments,) int64, is the sum of |before - after| over each segment. Cost: two
-    to four passes over the values, 16 bytes of scratch for each of 2**22 at a time.
+    to four passes over the values, and 16 bytes of scratch for each of 2**22 values together.
     """
     if machine is None:
         matched = match_ranks.reference(sort.reference(values, first), targets)

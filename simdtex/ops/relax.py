@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Step 6.2.2 of Algorithm 1: the relaxation of a site, for all sites of a step in parallel.
 
-A `Relaxation` says how a site relaxes: its neighbourhood, which candidates are proposed (`Everything` or `Listed`),
-the choice among them, and how it cools. `relax` does so in place, step after step; `relax_apart` leaves the field as
-it is. The twins compose the parts one after another. A device does the same in one kernel, ``kernels/relax.cl``, or in
-several if there are more candidates than a work-item can keep.
+A `Relaxation` defines how a site relaxes: its neighbourhood, the proposed candidates (`Everything` or `Listed`), the
+choice among them, and its cooling. `relax` works in place, step after step; `relax_apart` does not change the field.
+The twins call the parts one after another. A device executes one kernel, ``kernels/relax.cl``, or several kernels if
+there are more candidates than a work-item can keep.
 """
 
 from __future__ import annotations
@@ -31,33 +31,33 @@ from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
 
 AGAIN = np.float32(4)
-"""Penalty of a candidate that is a neighbour's source, over that of continuing it: as in kernels/relax.cl."""
+"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/relax.cl."""
 
 KEPT = 1024
-"""Distances that a work-item can keep; more candidates are weighed by several kernels."""
+"""The most distances that a work-item can keep; several kernels evaluate more candidates."""
 
 EXHAUSTIVE = 64
-"""Candidates of a level up to which a coherent search weighs all of them."""
+"""The most candidates of a level that a coherent search evaluates exhaustively."""
 
 SUGGESTING = 12
-"""Nearest neighbours that suggest a candidate each, in a coherent search: as in kernels/relax.cl."""
+"""Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/relax.cl."""
 
 
 class Everything(NamedTuple):
-    """The exact search: every candidate of the level is proposed; ``strip`` has their pixels row by row."""
+    """The exact search, which proposes every candidate of the level; ``strip`` has their pixels row by row."""
 
     candidates: Candidates
     strip: Strip
 
     @property
     def slots(self) -> int:
-        """Candidates that a site weighs."""
+        """Number of candidates that a site evaluates."""
         return self.candidates.size
 
     def weighed(
         self, sites: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
     ) -> tuple[NDArray[np.int64], Distances]:
-        """Return numbers (slots, 1) of the candidates, and their distances with all penalties."""
+        """Return the numbers (slots, 1) of the candidates, and their distances with all costs."""
         near = neighbourhood.reference(sites, field, relaxation.offsets, relaxation.grid, relaxation.confidences)
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
@@ -70,7 +70,7 @@ class Everything(NamedTuple):
     def add_novelty(
         self, d: NDArray[np.float32], sites: NDArray[np.int32], field: Field, relaxation: Relaxation
     ) -> None:
-        """Add to distances (slots, S), in place, what candidates cost that continue or repeat a neighbour's source."""
+        """Add to distances (slots, S), in place, the cost of continuing or repeating a neighbour's source."""
         source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
         same = np.where(source >= 0, self.candidates.index_of[source], -1)
         for pair in zip(continuing(self.candidates, source), same, strict=True):  # in canonical order
@@ -80,9 +80,9 @@ class Everything(NamedTuple):
 
 
 class Listed(NamedTuple):
-    """The coherent search: a few candidates are proposed, those that neighbours suggest and some more.
+    """The coherent search, which proposes the candidates that neighbours suggest and a few more.
 
-    ``square`` their pixels side by side; ``neighbours`` N; ``chance`` candidates at random.
+    ``square``: the candidates' pixels side by side; ``neighbours``: N; ``chance``: the number of random candidates.
     """
 
     candidates: Candidates
@@ -92,13 +92,13 @@ class Listed(NamedTuple):
 
     @property
     def slots(self) -> int:
-        """Most candidates that a site weighs."""
+        """The most candidates that a site evaluates."""
         return min(most_listed(self.neighbours, self.chance), self.candidates.size)
 
     def weighed(
         self, sites: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
     ) -> tuple[NDArray[np.int64], Distances]:
-        """Return numbers (slots, S) of the candidates, -1 past the last, and their distances, infinity there."""
+        """Return the numbers (slots, S) of the candidates, -1 in empty slots, and their distances, infinity there."""
         r = relaxation.grid.neighbours(sites, relaxation.offsets)
         numbers, suggested = self._list(sites, r, field, relaxation, turn)
         offsets = relaxation.offsets
@@ -111,7 +111,7 @@ class Listed(NamedTuple):
     def _list(
         self, sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the numbers, and which of them neighbours suggest."""
+        """Return the numbers of the candidates, and a mask of those that neighbours suggest."""
         numbers = np.full((self.slots + 1, sites.size), -1)  # one more for a repeated number
         size = np.zeros(sites.size, np.int64)
 
@@ -134,7 +134,7 @@ class Listed(NamedTuple):
 
 
 def most_listed(neighbours: int, chance: int) -> int:
-    """Return the most candidates that a coherent search proposes: suggestions, the present source, random ones."""
+    """Return the most candidates that a coherent search proposes: suggestions, the current source, random ones."""
     return min(SUGGESTING, neighbours) + 1 + max(1, chance)
 
 
@@ -158,7 +158,7 @@ LEVEL = np.dtype(
 
 
 def constants(grid: Grid, **values: Any) -> np.void:
-    """Return a value of the type `LEVEL` with the grid and the fields that are given by name; the others are 0."""
+    """Return a value of the type `LEVEL` with the grid and the fields ``values``; all other fields are 0."""
     numbers = np.zeros((), LEVEL)
     numbers["lattice"] = grid.struct
     for name, value in values.items():
@@ -168,13 +168,13 @@ def constants(grid: Grid, **values: Any) -> np.void:
 
 
 class Relaxation(NamedTuple):
-    """How a site relaxes.
+    """The definition of a site's relaxation.
 
-    ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``discount`` 1 / (1 + coherence),
-    the factor of the distance of candidates that continue a neighbour's source; ``novelty`` the penalty for each
-    neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``costs`` of
-    each candidate; ``choice`` among them; ``confidences`` how much values count; ``xi`` of equation (13) in 1/1024;
-    ``seed`` and ``level`` the keys of its random numbers.
+    ``grid`` and ``offsets``: its lattice and neighbourhood; ``proposal``: the candidates; ``discount``: 1 / (1 +
+    coherence), the factor of the distance of candidates that continue a neighbour's source; ``novelty``: the penalty
+    for each neighbour whose source the candidate continues, and `AGAIN` times that for each whose source it is;
+    ``costs`` of each candidate; ``choice`` among them; ``confidences`` of values; ``xi`` of equation (13) in 1/1024;
+    ``seed`` and ``level``: the keys of its random numbers.
     """
 
     grid: Grid
@@ -199,7 +199,7 @@ class Relaxation(NamedTuple):
 def relax_apart(
     machine: Launcher | None, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
 ) -> tuple[Relaxed, Array]:
-    """Return new values and temperatures of any sites that relax together, and leave the field as it is."""
+    """Return new values and temperatures of sites that relax together, without a change of the field."""
     if machine is None:
         key, places = Key(relaxation.seed, relaxation.level, turn), relaxation.grid.places(sites)
         proposal = relaxation.proposal
@@ -230,11 +230,11 @@ def relax(
     relaxation: Relaxation,
     turn: int,
 ) -> Field:
-    """Relax sites step after step, in place.
+    """Relax sites step after step, in place, and return the field.
 
     Sites ``steps[0, 0]`` to ``steps[0, 1]`` - 1 of a list relax together, then those of ``steps[1]``, and so on; no two
-    that relax together may be neighbours. ``steps`` (steps, 2) int64; ``weighed`` (H, W) int32 counts the candidates
-    that each site has weighed, of `Listed`. Cost: candidates weighed x |N| x C x 2 fma.
+    that relax together may be neighbours. ``steps`` (steps, 2) int64; ``weighed`` (H, W) int32 counts the candidates of
+    `Listed` that each site has evaluated. Cost: evaluated candidates x |N| x C x 2 fma.
     """
     if machine is None:
         most = max(1, 2**20 // relaxation.proposal.slots)
@@ -256,7 +256,7 @@ def relax(
 
 
 def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxation, turn: int) -> tuple[Relaxed, Array]:
-    """Relax by the exact search in several kernels."""
+    """Return new values and temperatures by the exact search in several kernels."""
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     assert isinstance(proposal, Everything)
     candidates = proposal.candidates
@@ -278,7 +278,7 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
 def _fused(
     machine: Launcher, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
 ) -> tuple[str, dict[str, int], list[Any]]:
-    """Return the kernel of a relaxation, its -D constants, and its arguments but for its results."""
+    """Return the kernel of a relaxation, its -D constants, and its arguments without its results."""
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     candidates, window, confidences = proposal.candidates, choice.window, relaxation.confidences
     level: dict[str, Any] = {
@@ -298,7 +298,7 @@ def _fused(
         strip = proposal.strip
         level |= {"first": strip.first, "pitch": strip.pitch, "size": strip.pixels.shape[1]}
         level |= {"strip_rows": strip.rows, "strip_cols": strip.cols, "strip_high": strip.high, "thick": strip.thick}
-        most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
+        most = 256 if proposal.slots <= 256 else KEPT  # so that few programs suffice
         defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
         name, own = "relax_all", [strip.pixels, strip.reach, *costs, noise, key]
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A picture with an older copy of it below, which tiles that relax on their own read of one another."""
+"""A picture with an older copy below it, which independently relaxing tiles read of one another."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ TYPES = {"uint8": "uchar", "uint16": "ushort", "int32": "int"}
 
 @Operation
 def snapshot(machine: Launcher | None, picture: Array, height: int) -> Array:
-    """Return (..., height, W), or a stack made before, as a stack (..., 2 height, W)."""
+    """Return a picture (..., height, W), or an earlier stack, as a stack (..., 2 height, W) with a copy below."""
     if machine is None:
         now = picture[..., :height, :]
-        return np.ascontiguousarray(np.concatenate([now, now], -2))  # rows may have been laid out in any way
+        return np.ascontiguousarray(np.concatenate([now, now], -2))  # rows may have any memory layout
     *planes, rows, width = picture.shape
     plane, count = height * width, prod(planes)
     stacked = picture if rows == 2 * height else machine.empty((*planes, 2 * height, width), picture.dtype)

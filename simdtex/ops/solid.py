@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Blocks of solid textures: their Laplacian pyramid in integers, their slices the other ways, their mean.
+"""Blocks of solid textures: their Laplacian pyramid in integers, their slices in other directions, their mean.
 
 Blocks are (depth, rows, cols) int32 and wrap around. A level has half the slices, rows and columns of the one below it;
-an odd number of them is folded instead, see `simdtex.ops.fold`.
-Results are right where what is reduced is below 2**23 and what is expanded below 2**25, positive or negative.
+an odd number of them is folded instead, see `simdtex.ops.fold`. Results are correct if the input of a reduction is
+below 2**23 and that of an expansion below 2**25, positive or negative.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.fold import folded
 
 MOST_ITEMS = 2**21
-"""Work-items of a launch, about: so that none is long on a slow device."""
+"""About the most work-items of a launch, so that none takes long on a slow device."""
 
 MOST_BLOCKS = 4
-"""Blocks that `solid_mean` takes."""
+"""The most blocks of `solid_mean`."""
 
 
 def above(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the shape of the level above one of this shape."""
+    """Return the shape of the level above a level of ``shape``."""
     return tuple(n if n % 2 else n // 2 for n in shape)
 
 
@@ -33,14 +33,14 @@ def _weighted(near: list[NDArray[np.int64]], weights: Sequence[int]) -> NDArray[
 
 
 def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int64]:
-    """Return 2up(G_{i+1}) at a level of this shape."""
+    """Return 2up(G_{i+1}) at a level of ``shape``."""
     g, bits = coarse.astype(np.int64), 0
     for axis in range(3):
         n = g.shape[axis]
         bits += 4 if shape[axis] % 2 else 3
         if shape[axis] % 2:
             whole = np.empty_like(g)
-            whole[(slice(None),) * axis + (folded(n),)] = g  # back where they were
+            whole[(slice(None),) * axis + (folded(n),)] = g  # back at their places
             g = _weighted([np.roll(whole, -a, axis) for a in range(-2, 3)], (1, 4, 6, 4, 1))
             continue
         near = [np.roll(g, -a, axis) for a in (-1, 0, 1)]
@@ -67,7 +67,7 @@ def _launch_expanded(machine: Launcher, sign: int, known: Array, coarse: Array) 
 
 @Operation
 def solid_reduce(machine: Launcher | None, fine: Array) -> Array:
-    """Return G_{i+1} of the block G_i. Cost: 125 multiply-adds a voxel."""
+    """Return G_{i+1} from the block G_i. Cost: 125 multiply-adds per voxel."""
     if machine is None:
         g = fine.astype(np.int64)
         for axis in range(3):
@@ -84,7 +84,7 @@ def solid_reduce(machine: Launcher | None, fine: Array) -> Array:
 
 @Operation
 def solid_band(machine: Launcher | None, fine: Array, coarse: Array) -> Array:
-    """Return L_i of G_i and G_{i+1}. Cost: 12 multiply-adds a voxel of L_i."""
+    """Return L_i from G_i and G_{i+1}. Cost: 12 multiply-adds per voxel of L_i."""
     if machine is None:
         return (fine - _expanded(coarse, fine.shape)).astype(np.int32)
     return _launch_expanded(machine, -1, fine, coarse)
@@ -92,7 +92,7 @@ def solid_band(machine: Launcher | None, fine: Array, coarse: Array) -> Array:
 
 @Operation
 def solid_collapse(machine: Launcher | None, band: Array, coarse: Array) -> Array:
-    """Return G_i of L_i and G_{i+1}, to the bit if they are its own."""
+    """Return G_i from L_i and G_{i+1}: the original G_i, to the bit, if these are unchanged."""
     if machine is None:
         return (band + _expanded(coarse, band.shape)).astype(np.int32)
     return _launch_expanded(machine, 1, band, coarse)
@@ -100,7 +100,7 @@ def solid_collapse(machine: Launcher | None, band: Array, coarse: Array) -> Arra
 
 @Operation
 def solid_turn(machine: Launcher | None, block: Array, axes: Sequence[int]) -> Array:
-    """Return the block with its axes in this order, as `numpy.transpose` orders them.
+    """Return the block with its axes in the order ``axes``, as `numpy.transpose` does.
 
     (0, 1, 2) has the x-y slices one behind the other, (1, 0, 2) the x-z slices, (2, 0, 1) the y-z slices.
     """
@@ -116,9 +116,9 @@ def solid_turn(machine: Launcher | None, block: Array, axes: Sequence[int]) -> A
 
 @Operation
 def solid_mean(machine: Launcher | None, blocks: Sequence[Array]) -> Array:
-    """Return the mean of one to four int32 arrays of one shape, half rounded up.
+    """Return the mean of one to four int32 arrays of one shape, halves rounded up.
 
-    Of k arrays floor((2 sum + k) / (2 k)), for any values. The sum is taken in 64 bits.
+    For k arrays it is floor((2 sum + k) / (2 k)), for any values. The sum has 64 bits.
     """
     k = len(blocks)
     if machine is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The order of the values of every segment: a stable radix sort, the ties in a given order."""
+"""The order of the values of every segment: a stable radix sort, with ties in a given order."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from simdtex.machine.interface import Array, Launcher, Operation
 
 SCRATCH = 2**22
-"""Values that are sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
+"""Number of values sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
 
 DIGITS = 256
-"""Values of the 8 bits that a pass sorts by."""
+"""Number of values of the 8 bits that a pass sorts by."""
 
 
 def run_length(machine: Launcher, segments: int, n: int) -> int:
-    """Return how many values of a segment a work-item takes in turn; it changes no bit.
+    """Return the number of consecutive values of a segment for a work-item; it changes no bit.
 
-    Enough work-items to fill the device, but no run so short that its table of counters is the greater work.
+    There are enough work-items to fill the device, but a run takes more work than its table of counters.
     """
     on_gpu = machine.info.kind == "gpu"
     items, least = (2**13, 256) if on_gpu else (8 * max(1, machine.info.compute_units), 4096)
@@ -26,7 +26,7 @@ def run_length(machine: Launcher, segments: int, n: int) -> int:
 
 
 def local(machine: Launcher) -> tuple[int]:
-    """Work-items of a group where each takes a run: on a CPU a few long ones are to be shared out."""
+    """Return the work-items of a group if each takes a run; on a CPU 1, to distribute a few long runs."""
     return (64,) if machine.info.kind == "gpu" else (1,)
 
 

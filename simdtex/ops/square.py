@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sample as the square around a neighbourhood reads it: kernels/common/square.h."""
+"""The sample in the layout for reading the square around a neighbourhood: kernels/common/square.h."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from simdtex.model.sample import Places, Sample
 from simdtex.ops.arithmetic import fma32
 
 LANES = 16
-"""Partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
+"""Number of partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
 
 
 class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
-    ``at`` (n,) int32 the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
-    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there, ``deep``
-    from one layer to the next; ``disc`` (side, columns) float32, of a volume (side, side, columns), 1 on the
-    neighbourhood.
+    ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
+    columns that are a level's step apart side by side; ``down`` is the distance there from one row of the lattice to
+    the next, ``deep`` from one layer to the next; ``disc`` (side, columns) float32, for a volume (side, side, columns),
+    is 1 on the neighbourhood.
     """
 
     at: Array
@@ -39,10 +39,10 @@ class Square(NamedTuple):
         u: NDArray[np.float32],
         offsets: NDArray[np.int32],
     ) -> NDArray[np.float32]:
-        """Return equation (12) for each candidate, (slots, S), infinity for none; summed as a device does.
+        """Return equation (12) for each candidate, (slots, S), infinity in empty slots, summed as on a device.
 
-        ``numbers`` (slots, S), -1 for none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, C or
-        1, S), how certain each is; one more of both where the site itself is among ``offsets``.
+        ``numbers`` (slots, S) are -1 in empty slots; ``x`` (N, C, S) are grey levels of the neighbours, and ``u`` (N, C
+        or 1, S) their confidences; both have one more if the site itself is among ``offsets``.
         """
         radius = int(offsets[:, 1].max())
         layer, line, _ = parts_of(offsets)
@@ -61,7 +61,7 @@ class Square(NamedTuple):
 
 
 def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
-    """Lay out the candidates of a level."""
+    """Return the candidates of a level in this layout."""
     offsets, step = places.offsets, places.spacing
     radius, rows, cols = int(offsets[:, 1].max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
@@ -76,7 +76,7 @@ def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
     at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
     return Square(
         machine.put(at),
-        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read at the end, too
+        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read, even at the end
         step * step * wide,
         sample.layer * step * step * wide,
         machine.put(disc),

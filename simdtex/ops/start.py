@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture before the first level: every site a pixel of the sample at random, at temperature 1."""
+"""The picture before the first level: every site is a random pixel of the sample, at temperature 1."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simdtex.ops.neighbourhood import Field
 
 @Operation
 def start(machine: Launcher | None, pixels: Array, positions: Array, grid: Grid, seed: int) -> Field:
-    """Return a field whose sites are pixels of the sample at random positions."""
+    """Return a field whose sites are pixels of the sample at positions drawn from ``positions``."""
     (channels, plane), shape = pixels.shape, grid.pixels
     if machine is None:
         lo, hi, *_ = random.draw4(seed, 0, 0, grid.places(grid.sites()), random.START)

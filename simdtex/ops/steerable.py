@@ -3,8 +3,8 @@
 
 Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
 with an odd side, from `simdtex.ops.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
-this order, each step an fma. They are rounded to integers in the end, and must fit 32 bits. Taps are multiples of
-2**-24, so the twin has each step exactly in double precision, as long as sums stay below 2**28.
+this order, each step an fma. They are rounded to integers at the end, and must fit 32 bits. Taps are multiples of
+2**-24, so each step of the twin is exact in double precision if sums stay below 2**28.
 """
 
 from __future__ import annotations
@@ -19,33 +19,34 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.laplacian import within
 
 PADDED = 2**24
-"""Most float32 values that are laid out at a time, fewer where the machine's scratch memory is smaller."""
+"""The most float32 values that are padded together; fewer if the machine's scratch memory is smaller."""
 
 ROWS = {1: 4, 2: 4, 4: 2, 6: 2}
-"""Rows of a work-item by how many bands it makes: what is kept in registers."""
+"""Rows of a work-item by the number of its bands, so that its sums fit registers."""
 
 
 def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.float64]:
-    """Return the pictures, rounded to float32, with so many pixels beyond the border on each side."""
+    """Return the pictures, rounded to float32, with ``reach`` pixels beyond the border on each side."""
     row, col = (within(np.arange(-reach, n + reach), n, torus) for n in picture.shape[1:])
     return picture[:, row[:, None], col].astype(np.float32).astype(np.float64)
 
 
 def _fma(tap: Any, x: NDArray[np.float64], total: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a product plus a sum, exact in double precision, rounded once."""
+    """Return a product plus a sum, exact in double precision and rounded once."""
     result: NDArray[np.float32] = (tap.astype(np.float64) * x + total).astype(np.float32)
     return result
 
 
 def _up(n: int, unit: int) -> int:
-    """Return the next multiple of a unit."""
+    """Return n rounded up to a multiple of ``unit``."""
     return -(-n // unit) * unit
 
 
 def _pieces(machine: Launcher, planes: int, rows: int, line: int, extra: int, unit: int) -> Iterator[tuple[int, ...]]:
     """Yield planes, or rows of a plane, that fit in scratch memory: first plane, planes, first row, rows.
 
-    A row takes `line` values, and a piece `extra` rows more than its own, which are whole units.
+    A row takes ``line`` values, and a piece ``extra`` rows in addition to its own, whose number is a multiple of
+    ``unit``.
     """
     most = min(PADDED, machine.scratch // 4)
     together = max(1, most // ((_up(rows, unit) + extra) * line))
@@ -59,8 +60,8 @@ def _pieces(machine: Launcher, planes: int, rows: int, line: int, extra: int, un
 def steerable_split(machine: Launcher | None, picture: Array, taps: Array, torus: bool, step: int) -> Array:
     """Return the picture correlated with each of the filters, at every step-th row and column from 0.
 
-    ``step`` is 1 or 2: (bands, planes, rows, cols) int32, sizes rounded up. Beyond the border comes the other side of a
-    ``torus``, or the mirror image. Cost: side**2 multiply-adds a value.
+    The result is (bands, planes, rows, cols) int32, with sizes rounded up; ``step`` is 1 or 2. The picture continues
+    beyond its border as a ``torus`` or as its mirror image. Cost: side**2 multiply-adds per value.
     """
     planes, *size = picture.shape
     count, side, _ = taps.shape
@@ -102,8 +103,8 @@ def steerable_join(
     """Return the sum over all bands of all terms, (planes, rows, cols) int32.
 
     ``terms`` are (bands, taps, step): a band is spread over ``shape``, (rows, cols), with zeros between if the step is
-    2, and correlated with its filter turned by 180 degrees. Cost: side**2 multiply-adds a pixel and band; half as many
-    for a step of 2, but on a torus of an odd number of rows.
+    2, and correlated with its filter turned by 180 degrees. Cost: side**2 multiply-adds per pixel and band; half as
+    many for a step of 2, except on a torus with an odd number of rows.
     """
     planes, (rows, cols) = terms[0][0].shape[1], shape
     if machine is None:
@@ -130,7 +131,7 @@ def steerable_join(
             total = padded if len(terms) == 1 else machine.empty(together * some * across, np.float32)
         for number, (bands, taps, step) in enumerate(terms):
             count, own = taps.shape[:2]
-            # Every other row is zeros, but if the rows repeat after an odd number even ones meet odd ones.
+            # Every other row is zero, unless rows repeat after an odd number, where even rows meet odd ones.
             skip = 1 if rows == 1 or (torus and rows % 2) else step
             machine.launch(
                 "steerable_pad",

@@ -15,29 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 ORIENTATIONS = (1, 2, 4, 6)
-"""How many there may be."""
+"""The possible numbers of orientations."""
 
 UNIT = 2**24
-"""Taps are rounded to whole multiples of 2**-24, see `simdtex.ops.steerable`."""
+"""Taps are rounded to multiples of 2**-24, see `simdtex.ops.steerable`."""
 
 
 @dataclass(frozen=True)
 class Filters:
-    """The filters of a bank, float32, to be laid over the picture as they are, without turning (correlation).
+    """The filters of a bank, float32, for correlation with a picture.
 
     Attributes
     ----------
     high : (a, a) array
-        H0: what is finer than the first level.
+        H0, whose output is finer than the first level.
     low : (b, b) array
-        L0: what the levels are made of. Its taps add up to 1, with six orientations to 0.99918.
+        L0, whose output is the input of the levels. Its taps add up to 1, with six orientations to 0.99918.
     down : (c, c) array
         L1, between a level and the next, which has half the rows and columns. Its taps add up to 1, so numbers keep
-        their range; pyrtools takes twice as much, so its level k and its residue are 2**k times ours.
+        their range; those of pyrtools are twice as large, so its level k and its residue are 2**k times ours.
     bands : (orientations, d, d) array
-        B_i. Orientation i of n is at the angle pi i / n, from the column axis counter-clockwise as pictures are seen,
-        so towards lower rows. It answers to waves that run along its angle: 0 sees change along a row, so upright
-        lines. All are odd (they change their sign when turned by 180 degrees), but for one orientation the filter is
+        B_i. Orientation i of n has the angle pi i / n, counter-clockwise from the column axis as pictures are seen, so
+        towards lower row numbers. It responds to waves along its angle: 0 to changes along a row, so to vertical lines.
+        All are odd (their sign changes when turned by 180 degrees), except that the filter of a single orientation is
         even and has no direction. Signs are those of pyrtools.
     """
 
@@ -49,19 +49,19 @@ class Filters:
 
 @cache
 def filters(orientations: int) -> Filters:
-    """Return the bank of a number of orientations: 1, 2, 4 or 6.
+    """Return the bank with ``orientations`` orientations: 1, 2, 4 or 6.
 
     Raises
     ------
     ValueError
-        There is no bank of so many orientations.
+        There is no bank with that number of orientations.
     """
     if orientations not in ORIENTATIONS:
         raise ValueError(f"orientations is {orientations}; give one of {', '.join(map(str, ORIENTATIONS))}")
     high, low, down, *bands = (_numbers(text) for text in _BANKS[orientations])
     if orientations == 1:
         upright = [_even(bands[0])]
-    else:  # the others are turned by 90 degrees
+    else:  # the second half is the first half turned by 90 degrees
         first = [_odd(half) for half in bands]
         if orientations == 6:
             first.append(-first[1].T)
@@ -74,12 +74,12 @@ def filters(orientations: int) -> Filters:
 
 
 def _numbers(text: str) -> NDArray[np.float64]:
-    """Numbers that are given in millionths."""
+    """Return the numbers of a text in millionths."""
     return np.array([float(number) for number in text.split()]) / 1e6
 
 
 def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a filter that no mirror changes, from its taps at 0 <= x <= y, row by row from the centre."""
+    """Return a filter with all mirror symmetries, from its taps at 0 <= x <= y, row by row from the centre."""
     reach = int(np.sqrt(2 * octant.size)) - 1
     y, x = abs(np.mgrid[-reach : reach + 1, -reach : reach + 1])
     far, near = np.maximum(y, x), np.minimum(y, x)
@@ -88,7 +88,7 @@ def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _odd(half: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a filter that changes its sign when turned by 180 degrees, from its taps before the centre, in rows."""
+    """Return a filter whose sign changes when turned by 180 degrees, from its taps before the centre, in rows."""
     side = int(np.sqrt(2 * half.size + 1))
     return np.concatenate([half, [0.0], -half[::-1]]).reshape(side, side)
 
@@ -202,4 +202,4 @@ _BANKS = {
         """,
     ),
 }
-"""H0, L0, L1 and the bands that are not others turned, in millionths: `_even` and `_odd` unfold them."""
+"""H0, L0, L1 and the bands without their turned copies, in millionths: `_even` and `_odd` unfold them."""

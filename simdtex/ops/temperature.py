@@ -12,7 +12,7 @@ from simdtex.ops.neighbourhood import Field
 
 @Operation
 def temperature(machine: Launcher | None, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
-    """Return the new temperatures of sites in 1/1024, (S,) uint16; ``xi`` in 1/1024 too."""
+    """Return the new temperatures of sites in 1/1024, (S,) uint16; ``xi`` is in 1/1024, too."""
     if machine is None:
         r = grid.neighbours(sites, offsets)
         t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))

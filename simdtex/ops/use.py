@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Penalties on use: the sample's sites are to be used equally often, and one that is used more costs more."""
+"""Penalties on use, so that the sample's sites are used equally often: a site that is used more costs more."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from simdtex.model.sums import sums_around
 from simdtex.ops.neighbourhood import Field
 
 CAP = 4.0
-"""Excess of use over the fair share above which the penalty grows no more."""
+"""Excess of use over the fair share above which the penalty is constant."""
 
 
 @dataclass(frozen=True, eq=False)
 class FairUse:
-    """The places of a level's candidates, and how much use of each is fair.
+    """The places of a level's candidates, and the fair use of each.
 
-    ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around`` places from one to the edge of its
-    neighbourhood; ``fair`` (places,) int64 weight of each, 0 if no candidate, or None if all are alike; ``listed``
-    whether numbers run over the candidates alone, or over all places; ``kinds`` (places,) the category of each, and
-    ``wanted`` the share of each category in the output, if shares are asked for; ``strict`` the penalty of a category
-    that is used twice too often.
+    ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around``, the number of places from one to the edge
+    of its neighbourhood; ``fair`` (places,) int64, the weight of each, 0 if it is no candidate, or None if all are
+    equal; ``listed``, whether numbers count the candidates only, or all places; ``kinds`` (places,), the category of
+    each, and ``wanted``, the required share of each category in the output, if any; ``strict``, the penalty of a
+    category that is used twice too often.
     """
 
     shape: tuple[int, ...]
@@ -48,9 +48,9 @@ class FairUse:
 
 @Operation
 def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidates) -> NDArray[np.int32]:
-    """Return of how many known sites (t < 1) each candidate is the source, (n,), on the host.
+    """Return the number of sites with t < 1 whose source is each candidate, (n,), on the host.
 
-    Whole numbers, so the order in which sites are counted does not matter, and counts of tiles add up.
+    The counts are integers, so the order of counting does not matter, and counts of tiles add up.
     """
     if machine is None:
         known = grid.view(field.temperature) < 1024
@@ -72,13 +72,14 @@ def use_penalty(
 ) -> NDArray[np.float32]:
     """Return the penalty of each candidate during the next sweep, (n,) float32, to be added to its distance.
 
-    ``counts`` (n,) are from `use`; ``rate`` is lambda N C sigma^2, the sample's variance times neighbours and channels,
-    0: no candidate costs anything; and ``before`` (n or more,) is the penalty during the last sweep. The result is
-    lambda N C sigma^2 min(4, max(0, u - 1)), u the use of the square around a candidate over its fair share, and the
-    mean of that and of `before`, so that penalties settle. It is infinite at a place without a candidate.
+    ``counts`` (n,) are from `use`; ``rate`` is lambda N C sigma^2, lambda times the sample's variance times neighbours
+    and channels, 0: no penalty; and ``before`` (n or more,) is the penalty during the last sweep. The penalty is
+    lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of the square around a candidate over its fair share.
+    With ``before``, the result is the mean of both, so that penalties converge. It is infinite at a place without a
+    candidate.
 
-    Penalties are the potentials of a transport problem: to give all output sites the nearest candidates while each
-    candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the penalty of
+    Penalties are the potentials of a transport problem: giving all output sites the nearest candidates, with every
+    candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.
     """
     places, total = prod(fair_use.shape), int(counts.sum())
@@ -98,7 +99,7 @@ def use_penalty(
 
 
 def _of_kinds(used: NDArray[np.int64], fair_use: FairUse) -> NDArray[np.float32]:
-    """Return the penalty of places by their category, if it is used more than its share."""
+    """Return the penalty of places whose category is used more than its share."""
     assert fair_use.kinds is not None
     counts = np.bincount(fair_use.kinds, used, minlength=len(fair_use.wanted))
     cost = np.zeros(len(fair_use.wanted), np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sums over a Gaussian window around each site, of the sites with one label alone."""
+"""Sums over a Gaussian window around each site, over the sites with one label."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ TAPS = 2**9
 
 
 def gaussian(sd: float) -> NDArray[np.uint32]:
-    """Return the taps of a window, up to 3 standard deviations, in whole numbers that add up to `TAPS`."""
+    """Return the taps of a window, up to 3 standard deviations, as integers that add up to `TAPS`."""
     reach = max(1, int(3 * sd))
     place = np.arange(-reach, reach + 1)
     density = np.exp(-0.5 * (place / sd) ** 2)
-    ends = np.rint(np.cumsum(density) / density.sum() * TAPS)  # of what is summed, so that nothing is lost
+    ends = np.rint(np.cumsum(density) / density.sum() * TAPS)  # cumulative, so that rounding errors do not add up
     half = np.diff(ends[reach:])  # the taps to the right
     middle = TAPS - 2 * half.sum()
     return np.concatenate([half[::-1], [middle], half]).astype(np.uint32)
@@ -28,9 +28,9 @@ def gaussian(sd: float) -> NDArray[np.uint32]:
 def window(machine: Launcher | None, labels: Array, owner: Array, taps: Array, values: Array | None = None) -> Array:
     """Return the sums over the window of each site, (planes, rows, cols) uint32 in 2**-18.
 
-    ``labels`` (rows, cols) uint8; ``owner`` (planes,) int32 is the label that counts in each plane; ``values`` (planes,
-    rows, cols) uint16, below 2**13, or None where each is 1; ``taps`` (2 reach + 1,) uint32 come from `gaussian`.
-    Cost: two taps' worth of additions for each site and plane.
+    ``labels`` (rows, cols) uint8; ``owner`` (planes,) int32 is the label that is summed in each plane; ``values``
+    (planes, rows, cols) uint16, below 2**13, or None if each is 1; ``taps`` (2 reach + 1,) uint32 come from `gaussian`.
+    Cost: two additions per tap for each site and plane.
     """
     rows, cols = labels.shape
     planes, reach = owner.shape[0], taps.shape[0] // 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of a classification: labels, how well each class fits, and what was confused with what."""
+"""The report of a classification: labels, the fit of each class, and the confusion of classes."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def write_classification(
         See `simdtex.report.page.check_folder`.
     image : (rows, cols[, bands]) array
     labels : (rows, cols) uint8 array
-        0 unknown.
+        The labels, 0 unknown.
     output : simdtex.run.Output
-        Of `simdtex.classify`.
+        The output of `simdtex.classify`.
     truth : (rows, cols) array of integers, optional
-        The labels that are right, 0 to 255; one of no class where that is not known.
+        The true labels, 0 to 255; a label of no class where the true one is unknown.
     command : str
         The command line, if there is one.
     """
@@ -103,7 +103,7 @@ def _hex(colour: NDArray[np.uint8]) -> str:
 
 
 def confusion_matrix(labels: NDArray[Any], truth: NDArray[Any], count: int) -> NDArray[np.int64]:
-    """Return how many pixels of each true class (rows) are labelled as each (columns), (count, count).
+    """Return the number of pixels of each true class (rows) with each label (columns), (count, count).
 
     Classes are numbered from 0; pixels whose true class is ``count`` or more are left out.
     """

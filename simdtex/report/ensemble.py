@@ -57,15 +57,15 @@ def write_ensemble(
     data : array_like, (m, 3), optional
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
-        The values that stand for categories; by default the training image's own if they are integers and at most
-        16. An empty one says that the values are continuous.
+        The values that are categories; by default those of the training image if they are integers and at most 16. An
+        empty sequence means continuous values.
     command : str
         The command line, if there is one.
 
     Raises
     ------
     ValueError
-        The folder cannot be written, the arrays do not suit each other, or a datum lies outside.
+        The folder cannot be written, the arrays do not match, or a datum lies outside.
 
     Notes
     -----
@@ -335,9 +335,10 @@ def _copies(images: Array, own: Array, found: Summary) -> list[Part]:
 
 
 def _index_map(places: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
-    """Return where in a training image of so many columns each pixel is that lies in a copied window; -1 elsewhere.
+    """Return the position of each pixel of a copied window in a training image with ``cols`` columns; -1 elsewhere.
 
-    ``places`` (rows, cols) are the windows'. Of the windows that a pixel lies in, the one in whose middle it is counts.
+    ``places`` (rows, cols) are those of the windows. A pixel in several windows belongs to the one in whose middle it
+    is.
     """
     rows, wide = places.shape
     index = np.full((rows + WINDOW - 1, wide + WINDOW - 1), -1, np.int32)

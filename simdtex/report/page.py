@@ -91,7 +91,7 @@ def write_report(
     results: Mapping[str, Any],
     command: str = "",
 ) -> None:
-    """Write ``index.html``, every figure's PNG and ``results.json``, all of them or none.
+    """Write ``index.html``, the PNG of every figure and ``results.json``, either all of them or none.
 
     ``results`` becomes JSON with sorted keys and null for numbers that are not finite; the names of all files, the
     version and the command line are added. The page contains its pictures and its style, and runs no script. The files

@@ -16,7 +16,7 @@ INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
 DPI = 140
 
 
-# The palette of Okabe and Ito, told apart by every kind of colour vision, its yellow darkened for a white background.
+# The palette of Okabe and Ito, distinct for every kind of colour vision, its yellow darkened for a white background.
 _KNOWN = {
     "coloring": ("#0072B2", "o"),
     "coloring-fixed": ("#56B4E9", "s"),
@@ -48,7 +48,7 @@ def styles(schedules: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of this size in inches, without any global state."""
+    """Return an empty figure of ``width`` x ``height`` inches, without any global state."""
     figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Contact sheets: 8-bit pictures for the eye alone."""
+"""Contact sheets: 8-bit pictures for viewing only."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def contact_sheet(
     captions: Sequence[str] | None = None,
     scale: int | None = None,
 ) -> Picture:
-    """Arrange labelled pictures on one sheet, (rows, cols, 3) uint8, each under its label.
+    """Return labelled pictures on one sheet, (rows, cols, 3) uint8, each under its label.
 
     Pictures are (rows, cols[, channels]) of any size and type; types other than uint8 are stretched over their own
     range, channels past the third are not shown. By default as many ``columns`` as make the sheet about square.
@@ -102,14 +102,14 @@ def fitted(picture: Picture, side: int) -> Picture:
 
 
 def reduction(shape: tuple[int, ...], side: int | None = None) -> int:
-    """Return by which factor a picture of this shape is reduced to such a side, by default that of a sheet."""
+    """Return the factor that reduces a picture of ``shape`` to ``side``, by default to that of a sheet."""
     return -(-max(shape[:2]) // (side or MOST_SIDE))
 
 
 def parts(shape: tuple[int, ...], multiple: int = 1) -> Iterator[tuple[slice, slice]]:
-    """Yield squares that a picture of this shape consists of, row by row; their sides are about `PART`.
+    """Yield the squares that cover a picture of ``shape``, row by row; their sides are about `PART`.
 
-    They begin at a multiple of `multiple`, also where that is larger.
+    They begin at multiples of ``multiple``, even if that is larger.
     """
     side = multiple * max(1, PART // multiple)
     for top in range(0, shape[0], side):

@@ -23,7 +23,7 @@ PathLike = str | os.PathLike[str]
 Hits = tuple[NDArray[np.bool_], Floats, Floats]
 """Whether each ray meets the body; of those that do, the points and the outward normals there."""
 
-YAW, PITCH = radians(40.0), radians(28.0)  # how far the camera stands to the right of the first slice, and above it
+YAW, PITCH = radians(40.0), radians(28.0)  # angles of the camera to the right of the first slice, and above it
 AHEAD = np.array([cos(YAW) * cos(PITCH), sin(PITCH), -sin(YAW) * cos(PITCH)])
 TOWARDS = -np.sign(AHEAD)  # the octant nearest to the camera
 RIGHT = np.array([sin(YAW), 0.0, cos(YAW)])
@@ -33,11 +33,11 @@ AMBIENT, LAMP = 0.46, 0.60  # of the light
 BACKGROUND = 243.0  # a light neutral grey
 MARGIN = 0.04  # of a cell, around the cube
 SAMPLES = 2  # rays in a pixel, each way
-SIZES = range(LEAST_SIDE, MOST_SIDE + 1)  # what a sheet shows as it is
+SIZES = range(LEAST_SIDE, MOST_SIDE + 1)  # sizes that a sheet shows unchanged
 
 
 def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Picture:
-    """Show a solid texture as a block of stone.
+    """Return pictures of a solid texture as a block of stone, on one sheet.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
         Types other than uint8 are stretched over their own range. Of three channels or more the first three are shown
         as colours, else the first as grey. The block is taken to repeat itself in every direction.
     path : path, optional
-        Where to write the sheet as well; the suffix names the format.
+        A file for the sheet; the suffix names the format.
     size : int
         Pixels of each side of a body's picture, 96 to 1024.
 

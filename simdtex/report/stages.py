@@ -19,10 +19,10 @@ _FILE = re.compile(r"((temperature|candidates)-)?(level\d+(-sweep\d+)?|iteration
 class StageWriter:
     """A callback that writes the pictures of a run into a folder as they are completed.
 
-    Of ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the end of each sweep;
-    of ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end of each level, brighter where a pixel
-    had more candidates, on a logarithmic scale from 1; of ``pyramid``, ``iteration{k}.png``, of a block its middle
-    slice. Pictures are 8-bit previews; each file is written whole or not at all.
+    With ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the end of each sweep;
+    with ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end of each level, brighter where a pixel
+    had more candidates, on a logarithmic scale from 1; with ``pyramid``, ``iteration{k}.png``, for a block its middle
+    slice. Pictures are 8-bit previews; each file is written completely or not at all.
 
     The folder is made at the first picture. It may exist if it is empty or holds only the stages of an earlier run,
     which are removed at the first picture unless ``resumed()``: the run continues from a checkpoint. ``limits`` are the

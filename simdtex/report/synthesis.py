@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of one synthesis: the picture, how evenly it uses its sample, and what was taken from where."""
+"""The report of one synthesis: the picture, the use of its sample, and the source map."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Picture = NDArray[np.uint8]
 
 SHOWN_SIDE = 256  # smaller samples are enlarged by a whole factor, pixels
 PAGE = 1120  # the width of a page's pictures; a wider sheet is shrunk, and its labels with it, pixels
-CORNER = 512  # of an output that is reduced, so much is shown as it is, pixels a side
+CORNER = 512  # side of the part of a reduced output that is shown unchanged, pixels
 FRAME = (0, 200, 255)  # the colour of the frame around the most used piece, sRGB; no colour of the map of use is blue
 
 
@@ -82,7 +82,7 @@ def _views(name: str, array: Any, show: Any) -> list[tuple[str, Picture]]:
 
 
 def _sheet(pictures: list[tuple[str, Picture]], columns: int) -> Picture:
-    """Return a sheet of so many columns, or of fewer if its labels would be too small to read."""
+    """Return a sheet with ``columns`` columns, or fewer if its labels would be too small to read."""
     widest = min(MOST_SIDE, max(picture.shape[1] for _, picture in pictures))
     return contact_sheet(pictures, columns=max(1, min(columns, PAGE // (widest + GAP))))
 

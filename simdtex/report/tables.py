@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 class Table:
     """A table of texts: rows from heading to cell, all with the same headings; the first cell names the row.
 
-    A cell that begins with ``breaks`` or ``differs`` is set as a warning. ``note`` is a remark below the table, on
+    A cell that begins with ``breaks`` or ``differs`` is a warning. ``note`` is a remark below the table, on
     pages only.
     """
 
@@ -39,12 +39,12 @@ class Table:
 
 
 def warns(cell: str) -> bool:
-    """Return whether a cell is set as a warning."""
+    """Return whether a cell is a warning."""
     return cell.startswith(("breaks", "differs"))
 
 
 def print_table(table: Table, width: int | None = None) -> None:
-    """Print a table on lines of so many characters; None: those of the terminal, or 200 if there is no terminal."""
+    """Print a table on lines of ``width`` characters; None: those of the terminal, or 200 without a terminal."""
     console = Console(width=width or (None if sys.stdout.isatty() else 200))
     shown = rich.table.Table(
         title=table.caption, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold"

@@ -86,7 +86,7 @@ def benchmark_table(entry: dict[str, Any]) -> Table:
 
 
 def version_lines() -> list[str]:
-    """Return the versions of simdtex and of what it computes with, and the default device or why none works."""
+    """Return the versions of simdtex and of its libraries, and the default device or the reason why none works."""
     found = [
         f"simdtex {version('simdtex')}",
         f"Python {platform.python_version()}, NumPy {version('numpy')}, pyopencl {version('pyopencl')}",

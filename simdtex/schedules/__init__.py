@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parallel schedules: which sites relax together.
 
-A schedule is a pair of pure functions. ``init`` takes the `Setting` of a level and gives a state; ``step`` takes a
-state and which sites are `Active`, and gives the next state and an `Info` with the sites to relax now, in one step or
+A schedule is a pair of pure functions. ``init`` takes the `Setting` of a level and returns a state; ``step`` takes a
+state and the `Active` sites, and returns the next state and an `Info` with the sites to relax now, in one step or
 several. The counters in the state key every random choice, so a schedule never depends on the device.
 """
 
@@ -62,25 +62,25 @@ SCHEDULES: dict[str, Callable[[], Schedule]] = {
 """The schedules by name."""
 
 TOGETHER = ("coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
-"""Those that relax many sites a step."""
+"""The schedules that relax many sites in a step."""
 
 GROUP = "simdtex.schedules"
-"""Entry points of this group are schedules too: packages can bring their own."""
+"""The group of entry points with which other packages provide schedules."""
 
 
 def get(schedule: str | Schedule) -> Schedule:
-    """Return the schedule of a name.
+    """Return a schedule by its name.
 
     Parameters
     ----------
     schedule : str or Schedule
         A key of `SCHEDULES`; ``"random-subset:P"`` or ``"block:ROWSxCOLS"``; the name of an entry point of the group
-        ``simdtex.schedules``; or a schedule, which is returned as it is.
+        ``simdtex.schedules``; or a schedule, which is returned unchanged.
 
     Raises
     ------
     ValueError
-        There is no such schedule; the sentence lists the valid names.
+        There is no such schedule; the message lists the valid names.
     """
     if not isinstance(schedule, str):
         if isinstance(schedule, type) or not isinstance(schedule, Schedule) or not isinstance(schedule.name, str):

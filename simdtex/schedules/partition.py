@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Schedules that cut the lattice into groups and relax one group after another, each active site once a sweep."""
+"""Schedules that divide the lattice into groups and relax one group after another, each active site once per sweep."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from simdtex.schedules.schedule import Active, Info, Setting
 
 
 class State(NamedTuple):
-    """What a partition carries.
+    """The state of a partition.
 
-    ``sites`` (sites,) int32 the pixel indices of the lattice, group after group and row by row within each; ``starts``
-    (groups + 1,) int64 where each group begins among them, and where the last one ends; ``sweep`` sweeps begun so far.
+    ``sites`` (sites,) int32, the pixel indices of the lattice, group after group and row by row within each;
+    ``starts`` (groups + 1,) int64, the first index of each group in ``sites``, and the end of the last; ``sweep``, the
+    number of sweeps started.
     """
 
     sites: NDArray[np.int32]
@@ -30,11 +31,11 @@ class State(NamedTuple):
 
 
 class Partition:
-    """One group of sites a step; a subclass says which group a site belongs to."""
+    """One group of sites per step; a subclass defines the groups."""
 
     name: str
     shuffled = False
-    """Whether the groups come in a fresh random order each sweep, or always in their own."""
+    """Whether the groups have a new random order in each sweep, or always the same order."""
     tile: tuple[int, int] | None = None
     windows = False
 
@@ -47,7 +48,7 @@ class Partition:
         raise NotImplementedError
 
     def init(self, setting: Setting) -> State:
-        """Lay out the groups, once a level; those of a window are those of its sites in the whole lattice."""
+        """Return the state of a level; the groups of a window are those of its sites in the whole lattice."""
         machine, grid, offsets, order, seed, _ = setting
         group = self.groups(machine, grid if self.windows else grid.whole, offsets, order, seed)
         if self.windows:
@@ -63,7 +64,7 @@ class Partition:
         return State(grid.sites()[place], starts, 0)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
-        """Return all groups that have active sites; a sweep goes by what was active when it began."""
+        """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
         sweep, groups = state.sweep + 1, state.starts.size - 1
         turn = np.arange(groups)
         if self.shuffled:
@@ -81,17 +82,17 @@ AHEAD = 32
 
 @lru_cache(maxsize=8)
 def _orders(seed: int, level: int, first: int, groups: int) -> NDArray[np.intp]:
-    """Return random orders of groups, (sweeps, groups): a sweep at a time they cost ten times as much."""
+    """Return random orders of groups, (sweeps, groups); a call for each sweep would take ten times as long."""
     sweeps = np.repeat(first + np.arange(AHEAD), groups)
     bits = random.draw4(seed, level, sweeps, np.tile(np.arange(groups), AHEAD), random.SCHEDULE)[0]
     return np.argsort(bits.reshape(AHEAD, groups), 1, kind="stable")
 
 
 class Coloring(Partition):
-    """One colour class of the lattice a step, the colours in a fresh random order each sweep.
+    """One colour class of the lattice per step, with the colours in a new random order in each sweep.
 
-    Guarantees that no two sites of a step are neighbours, equation (14), and that each active site is relaxed
-    exactly once a sweep. Every colour comes as often as any other, so the stationary distribution is the model's.
+    No two sites of a step are neighbours, equation (14), and each active site is relaxed exactly once per sweep. All
+    colours are used equally often, so the stationary distribution is the model's.
     """
 
     name = "coloring"
@@ -114,10 +115,10 @@ class Coloring(Partition):
 
 
 class FixedColoring(Coloring):
-    """One colour class of the lattice a step, the colours in the same order always.
+    """One colour class of the lattice per step, with the colours always in the same order.
 
-    Guarantees what `Coloring` does: no neighbours together, each active site once a sweep, the model's distribution. A
-    fixed order lets what the first colours decided spread in the same direction each time.
+    The guarantees are those of `Coloring`: no neighbours together, each active site once per sweep, the model's
+    distribution. With a fixed order, the choices of the first colours spread in the same direction in every sweep.
     """
 
     name = "coloring-fixed"
@@ -127,16 +128,16 @@ class FixedColoring(Coloring):
 class Checkerboard(Partition):
     """Two colours, black then white, whatever the order of the neighbourhood.
 
-    Guarantees independence for order 1 on an open lattice or a torus of even sides. Above order 1 diagonal
-    neighbours are of one colour and relax together, which violates equation (14). Each active site is relaxed
-    exactly once a sweep.
+    Sites are independent for order 1 on an open lattice or a torus with even sides. Above order 1 diagonal neighbours
+    have the same colour and relax together, which violates equation (14). Each active site is relaxed exactly once per
+    sweep.
     """
 
     name = "checkerboard"
     windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Return whether every neighbour is of the other colour."""
+        """Return whether every neighbour has the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
         return even and bool((np.sum(parts_of(offsets), 0) % 2 == 1).all())
 
@@ -154,10 +155,10 @@ class Checkerboard(Partition):
 
 
 class Synchronous(Partition):
-    """All active sites at once, old values read.
+    """All active sites together, from the old values.
 
-    Guarantees nothing: neighbours relax together, against equation (14). What it samples is another distribution,
-    and where neighbours want to agree they can exchange their values forever.
+    There is no guarantee: neighbours relax together, against equation (14). The sampled distribution is another one,
+    and neighbours that tend to agree can exchange their values forever.
     """
 
     name = "synchronous"
@@ -177,10 +178,10 @@ class Synchronous(Partition):
 
 
 class Raster(Partition):
-    """One site a step, row by row: the textbook's systematic scan.
+    """One site per step, row by row: the systematic scan of textbooks.
 
-    Guarantees independence, a step being one site, and each active site once a sweep. As many steps as sites: for
-    small lattices.
+    Sites of a step are independent, since it has only one, and each active site is relaxed once per sweep. A sweep has
+    as many steps as sites, so it is for small lattices.
     """
 
     name = "raster"
@@ -195,16 +196,16 @@ class Raster(Partition):
 
 
 class Block(Partition):
-    """Tiles that relax at once and on their own, row by row inside: what naive multi-device code does.
+    """Tiles that relax independently at the same time, each row by row, as in naive multi-device code.
 
-    Within a tile a site sees its neighbours as they are; beyond its edge it sees them as they were when the sweep
-    began, the last time that the tiles exchanged their edges. So neighbours across an edge relax as in `Synchronous`.
-    Each active site is relaxed exactly once a sweep; with a single tile this is `Raster`.
+    A site reads the current values of its neighbours within its tile; beyond the edge of the tile it reads those at the
+    start of the sweep, when tiles exchange their edges. So neighbours across an edge relax as in `Synchronous`. Each
+    active site is relaxed exactly once per sweep; with a single tile this is `Raster`.
 
     Parameters
     ----------
     rows, cols : int
-        Of a tile, in sites of the level's lattice.
+        Size of a tile, in sites of the level's lattice.
     """
 
     def __init__(self, rows: int = 16, cols: int = 16) -> None:
@@ -214,12 +215,12 @@ class Block(Partition):
         self.name = "block" if self.tile == (16, 16) else f"block:{rows}x{cols}"
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Only where one tile holds the whole lattice."""
+        """Return whether one tile holds the whole lattice."""
         assert self.tile is not None
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return the place within the tile."""
+        """Return the place of each site within its tile."""
         assert self.tile is not None
         row, col = np.indices((grid.rows, grid.cols))
         place: NDArray[Any] = row % self.tile[0] * self.tile[1] + col % self.tile[1]

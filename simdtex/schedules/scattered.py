@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Schedules that choose sites at random at every step; their sweep is as many relaxations as sites were active."""
+"""Schedules that choose sites at random at every step; a sweep has as many relaxations as sites active at its start."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from simdtex.schedules.schedule import Active, Info, Setting
 
 
 class State(NamedTuple):
-    """What a random choice carries.
+    """The state of a random choice.
 
-    ``steps`` counts the choices and keys them; ``left`` relaxations that are left of the present sweep.
+    ``steps``, the number of choices, which keys the next; ``left``, the relaxations left in the current sweep.
     """
 
     steps: int = 0
@@ -27,22 +27,22 @@ class State(NamedTuple):
 
 
 class Scattered:
-    """A random choice among the sites that are active now; a subclass says how."""
+    """A random choice among the active sites, which a subclass defines."""
 
     name: str
     tile: tuple[int, int] | None = None
     windows = False
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
-        """Numbers of sites out of those that are active; there are some."""
+        """Return the numbers of the chosen sites; at least one site is active."""
         raise NotImplementedError
 
     def init(self, setting: Setting) -> State:
-        """Nothing is decided beforehand."""
+        """Return the state before any choice."""
         return State()
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
-        """Choose; the sweep ends with as many relaxations as sites were active when it began."""
+        """Return the chosen sites; the sweep ends after as many relaxations as sites were active at its start."""
         wanting, steps = active.numbers().size, state.steps + 1
         chosen = self.choose(setting, steps, active) if wanting else active.numbers()
         left = max(0, (state.left or wanting) - chosen.size) if wanting else 0
@@ -51,10 +51,10 @@ class Scattered:
 
 
 class Luby(Scattered):
-    """A fresh random maximal independent set each step, as Algorithm 1 reads.
+    """A new random maximal independent set in each step, as in Algorithm 1.
 
-    Guarantees that no two sites of a step are neighbours, equation (14), and that no further active site could join
-    them. Sites are chosen by the step, not by the sweep: within a sweep one may come twice and another not at all.
+    No two sites of a step are neighbours, equation (14), and no further active site could be added. Sites are chosen
+    per step and not per sweep: a sweep may relax one site twice and another not at all.
     """
 
     name = "luby"
@@ -64,17 +64,17 @@ class Luby(Scattered):
         return True
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
-        """By the rounds of Luby, on the machine."""
+        """Return the sites of the rounds of Luby, on the machine."""
         machine, grid, offsets, _, seed, level = setting
         mask = machine.put(active.mask().astype(np.uint8))
         return np.flatnonzero(luby(machine, grid, machine.put(offsets), mask, seed, level, steps))
 
 
 class RandomSubset(Scattered):
-    """Each active site with probability p, neighbours or not.
+    """Each active site with probability p, independently of its neighbours.
 
-    Guarantees nothing: neighbours are often chosen together, against equation (14), the more rarely the smaller p is.
-    It tends to random single sites as p goes to 0, and is `Synchronous` at p = 1.
+    There is no guarantee: neighbours may be chosen together, against equation (14), more rarely for a smaller p. It
+    tends to random single sites as p goes to 0, and is `Synchronous` at p = 1.
 
     Parameters
     ----------
@@ -93,17 +93,17 @@ class RandomSubset(Scattered):
         return neighbourless(grid)
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
-        """Toss a coin for each."""
+        """Return each active site with probability p."""
         wanting = active.numbers()
         bits = random.draw4(setting.seed, setting.level, steps, wanting, random.SCHEDULE)[0]
         return wanting[bits < self.p * 2.0**32]
 
 
 class RandomScan(Scattered):
-    """One site a step, any of the active ones with the same probability: the textbook's random scan.
+    """One site per step, each active one with the same probability: the random scan of textbooks.
 
-    Guarantees independence, a step being one site. Choices are independent of one another: within a sweep one site may
-    come twice and another not at all. As many steps as sites: for small lattices.
+    Sites of a step are independent, since it has only one. So are choices: a sweep may relax one site twice and another
+    not at all. A sweep has as many steps as sites, so it is for small lattices.
     """
 
     name = "random-scan"
@@ -113,7 +113,7 @@ class RandomScan(Scattered):
         return True
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
-        """Choose one of the active sites."""
+        """Return one of the active sites."""
         wanting = active.numbers()
         first, at = divmod(steps, AHEAD)
         lo, hi = (bits[at : at + 1] for bits in _ahead(setting.seed, setting.level, first * AHEAD))
@@ -125,6 +125,6 @@ AHEAD = 1024
 
 @lru_cache(maxsize=8)
 def _ahead(seed: int, level: int, first: int) -> list[NDArray[np.uint32]]:
-    """Return random bits of many steps at once: one step at a time they cost a hundred times as much."""
+    """Return random bits of many steps; a call for each step would take a hundred times as long."""
     steps = first + np.arange(AHEAD)
     return random.draw4(seed, level, steps, np.zeros(AHEAD), random.SCHEDULE)[:2]

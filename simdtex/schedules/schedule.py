@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a schedule is: an init and a step, both pure functions."""
+"""The protocol of schedules: ``init`` and ``step``, both pure functions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from simdtex.model.lattice import Grid
 
 
 class Setting(NamedTuple):
-    """What stays the same throughout a level.
+    """The constants of a level.
 
-    ``machine`` what executes operations; ``grid`` the lattice, or a window of it; ``offsets`` (N, 2) int32, and
-    ``order``, of the neighbourhood; ``seed`` and ``level`` the keys of random choices.
+    ``machine`` executes operations; ``grid`` is the lattice, or a window of it; ``offsets`` (N, 2) int32 and ``order``
+    are those of the neighbourhood; ``seed`` and ``level`` are the keys of random choices.
     """
 
     machine: Machine
@@ -30,7 +30,7 @@ class Setting(NamedTuple):
 
 
 class Active(Protocol):
-    """Which sites want relaxing now."""
+    """The sites that are active now."""
 
     def mask(self) -> NDArray[np.bool_]:
         """Return whether each site is active, (rows, cols), on the host."""
@@ -41,34 +41,34 @@ class Active(Protocol):
         ...
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active ones of a list of pixel indices, group after group.
+        """Return the active sites of a list of pixel indices, group after group.
 
         Parameters
         ----------
         sites : (S,) array
             Pixel indices; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
         starts : (groups + 1,) array
-            Where each group begins in them, and where the last one ends.
+            The first index of each group in ``sites``, and the end of the last.
 
         Returns
         -------
         (active,) int32 array, of NumPy or of the machine
-            The active ones in their order.
+            The active sites, in the order of ``sites``.
         (groups + 1,) array
-            Where each group begins among those, and where the last one ends.
+            The first index of each group in them, and the end of the last.
         """
         ...
 
 
 class Masked:
-    """Sites that are active by a mask (rows, cols), which does not change; None: all are."""
+    """The active sites by a constant mask (rows, cols); None: all are active."""
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._grid = grid
         self._mask = np.ones(grid.shape, bool) if mask is None else mask
 
     def mask(self) -> NDArray[np.bool_]:
-        """Return the mask as given."""
+        """Return the given mask."""
         return self._mask
 
     @cached_property
@@ -76,11 +76,11 @@ class Masked:
         return np.flatnonzero(self._mask)
 
     def numbers(self) -> NDArray[np.int64]:
-        """Found once."""
+        """Return the numbers of the active sites, which are computed once."""
         return self._numbers
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active ones, computed in NumPy."""
+        """Return the active sites of a list, computed in NumPy."""
         if self._mask.all():
             return sites, starts
         plane = np.zeros(self._grid.plane, bool)
@@ -90,12 +90,12 @@ class Masked:
 
 
 class Info(NamedTuple):
-    """What a step decided, or several that are known beforehand.
+    """The decision of a step, or of several steps in advance.
 
-    ``sites`` (S,) int32 pixel indices, an array of NumPy or of the machine. ``turn`` keys the random numbers of their
-    relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this. ``steps`` None
-    where all sites relax together, or (steps, 2) int64: those from ``steps[0, 0]`` to
-    ``steps[0, 1]`` - 1 relax together, then those of ``steps[1]``, and so on.
+    ``sites`` (S,) int32, pixel indices, an array of NumPy or of the machine. ``turn`` keys the random numbers of their
+    relaxation: no site is relaxed twice with the same turn. ``last``: whether a sweep ends with this. ``steps``: None
+    if all sites relax together, or (steps, 2) int64: sites ``steps[0, 0]`` to ``steps[0, 1]`` - 1 relax together, then
+    those of ``steps[1]``, and so on.
     """
 
     sites: Array
@@ -105,7 +105,7 @@ class Info(NamedTuple):
 
     @property
     def ranges(self) -> NDArray[np.int64]:
-        """``steps``, also of a single step."""
+        """``steps``, which for a single step has one row."""
         return np.array([[0, self.sites.size]], np.int64) if self.steps is None else self.steps
 
     def apart(self, machine: Machine) -> Iterator[Info]:
@@ -120,18 +120,18 @@ class Info(NamedTuple):
 class Schedule(Protocol):
     """A parallel schedule: which sites relax together.
 
-    ``init`` and ``step`` are pure functions: whatever a schedule remembers is in its state, a tuple of plain arrays and
+    ``init`` and ``step`` are pure functions: all memory of a schedule is in its state, a tuple of plain arrays and
     numbers, and every random choice comes from the counters of `simdtex.random.draw4`.
 
     Attributes
     ----------
     name : str
     tile : (int, int) or None
-        Rows and columns of tiles that relax on their own: neighbours in another tile are read as they were when the
-        sweep began. None: the latest values are read.
+        Rows and columns of tiles that relax independently: sites read the values of neighbours in another tile at the
+        start of the sweep. None: they read the latest values.
     windows : bool
-        Whether a window of a lattice relaxes in the same sets as the same sites of the whole, in the same order; then
-        it has the whole's bits, except within a sweep's reach of its edges: steps times the neighbourhood's radius.
+        Whether a window of a lattice relaxes in the sets of the same sites of the whole, in the same order; it then has
+        the bits of the whole, except within a sweep's reach of its edges: steps times the radius of the neighbourhood.
     """
 
     name: str
@@ -139,7 +139,7 @@ class Schedule(Protocol):
     windows: bool
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Return whether every step's sites are i.i.d. in the sense of equation (14) on this lattice."""
+        """Return whether the sites of every step are i.i.d. in the sense of equation (14) on this lattice."""
         ...
 
     def init(self, setting: Setting) -> Any:
@@ -153,7 +153,7 @@ class Schedule(Protocol):
 
 @runtime_checkable
 class Windowed(Schedule, Protocol):
-    """A schedule whose `windows` is true, and which knows how far a sweep reaches."""
+    """A schedule whose `windows` is true, with the number of steps of a sweep, which limits its reach."""
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the most steps of a sweep of the whole lattice."""
@@ -161,7 +161,7 @@ class Windowed(Schedule, Protocol):
 
 
 def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int32]) -> tuple[int, int] | None:
-    """Two sites that are neighbours, which equation (14) forbids, or None."""
+    """Return two sites that are neighbours, which equation (14) forbids, or None."""
     chosen = np.zeros(grid.plane, bool)
     chosen[sites] = True
     r = grid.neighbours(sites, offsets)
@@ -173,7 +173,7 @@ def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int3
 
 
 class Watched:
-    """A schedule within another; a subclass looks at what it does.
+    """A wrapper of a schedule; a subclass examines its steps.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Watched:
         self.name, self.tile, self.windows = schedule.name, schedule.tile, schedule.windows
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Return what the schedule claims."""
+        """Return the claim of the schedule."""
         return self.schedule.independent(grid, offsets)
 
     def init(self, setting: Setting) -> Any:
@@ -193,19 +193,19 @@ class Watched:
         return self.schedule.init(setting)
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """Return the schedule's own step, after looking at it."""
+        """Return the schedule's own step, after examining it."""
         state, info = self.schedule.step(setting, state, active)
         for one in info.apart(setting.machine):
             self.look(setting, one)
         return state, info
 
     def look(self, setting: Setting, info: Info) -> None:
-        """Look at a step."""
+        """Examine a step."""
         raise NotImplementedError
 
 
 class Checked(Watched):
-    """A schedule that is watched: what it says of itself is checked at every step.
+    """A wrapper that checks the claims of a schedule at every step.
 
     Parameters
     ----------
@@ -213,12 +213,12 @@ class Checked(Watched):
 
     Notes
     -----
-    `step` raises RuntimeError where sites stand twice in a step or do not belong to the lattice, and where a
-    schedule claims independence and two of its sites are neighbours. Cost: O(sites x neighbours) a step, on the host.
+    `step` raises RuntimeError if a step has a site twice or one outside of the lattice, or if the schedule claims
+    independence and two sites of a step are neighbours. Cost: O(sites x neighbours) per step, on the host.
     """
 
     def look(self, setting: Setting, info: Info) -> None:
-        """Raise where the step breaks what the schedule claims."""
+        """Raise RuntimeError if the step violates a claim of the schedule."""
         grid, offsets = setting.grid, setting.offsets
         if np.unique(info.sites).size != info.sites.size:
             raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
@@ -234,12 +234,12 @@ class Checked(Watched):
 
 
 class Trimmed(Watched):
-    """A schedule whose every step but the last also relaxes rows around a tile, fewer with every step.
+    """A wrapper that limits each step to a tile and the rows around it that affect the tile.
 
-    What a site is depends on its neighbours one step earlier. So of a sweep of n steps, the i-th one matters to the
-    tile as far as (n - i) times the neighbourhood's radius beyond it, and no farther. The sites of a step of
-    ``schedule`` come row by row, as a `simdtex.schedules.Partition` has them. ``top`` is the first row of the tile
-    within the window, ``bottom`` the first one below it.
+    The value of a site depends on its neighbours one step earlier. So in a sweep of n steps, only sites within (n - i)
+    times the radius of the neighbourhood around the tile matter in step i. The sites of a step of ``schedule`` are in
+    the order of rows, as in a `simdtex.schedules.Partition`. ``top`` is the first row of the tile within the window,
+    ``bottom`` the first row below it.
     """
 
     def __init__(self, schedule: Schedule, top: int, bottom: int) -> None:
@@ -247,7 +247,7 @@ class Trimmed(Watched):
         self.top, self.bottom = top, bottom
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """Return the schedule's own step, without the rows that do not matter."""
+        """Return the schedule's own step, without the rows that do not affect the tile."""
         state, info = self.schedule.step(setting, state, active)
         sites = info.sites if isinstance(info.sites, np.ndarray) else setting.machine.get(info.sites)
         ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.width

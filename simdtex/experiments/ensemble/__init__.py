@@ -3,7 +3,7 @@
 
 An ensemble is an array (realisations, rows, cols). Categorical ones hold the values of categories, continuous ones
 integers or floats. The training image is (rows, cols), of the same kind and of any size. Axis 0 is down, axis 1 to the
-right, lags are pixels. No figure is enough alone: see the page on ensembles.
+right, lags are pixels. No single figure suffices: see the page on ensembles.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ __all__ = [
 
 
 def channels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return a training image of sinuous channels, and another map of the same kind to read hard data off.
+    """Return a training image of sinuous channels, and another map of the same kind for taking hard data from it.
 
-    Channels are about 8 pixels wide and cover 0.3 of each. They meander from left to right, cross, part and meet again,
+    Channels are about 8 pixels wide and cover 0.3 of each map. They meander from left to right, cross, part and join,
     and a few end inside. ``benchmarks/channels.py`` draws them, and more of any size.
 
     Returns

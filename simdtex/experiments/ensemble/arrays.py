@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks of ensembles and images, and the categories that they hold."""
+"""Checks of ensembles and images, and their categories."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simdtex.options import unmasked
 
 Array = NDArray[Any]
 
-MOST_CATEGORIES = 16  # integers of more values are taken for continuous ones
+MOST_CATEGORIES = 16  # integers with more values are continuous
 
 
 def as_image(array: ArrayLike, name: str = "image") -> Array:
@@ -44,7 +44,7 @@ def _checked(given: ArrayLike, name: str, axes: tuple[int, ...], shape: str) -> 
 
 
 def as_index(array: Array, categories: ArrayLike, name: str) -> tuple[NDArray[np.intp], int]:
-    """Return every value's place in a list of categories, checked, and their number."""
+    """Return the index of every value in a list of categories, checked, and the number of categories."""
     values = np.asarray(categories)
     if values.ndim != 1 or values.size == 0:
         raise ValueError("there are no categories: give a list of the values that stand for them, as [0, 1]")
@@ -58,20 +58,20 @@ def as_index(array: Array, categories: ArrayLike, name: str) -> tuple[NDArray[np
 
 
 def position(array: Array, values: Array) -> NDArray[np.intp]:
-    """Return the place of every element in a sorted list; -1 where it is not there."""
+    """Return the index of every element in a sorted list; -1 if it is not in the list."""
     found = np.minimum(np.searchsorted(values, array), len(values) - 1)
     return np.where(values[found] == array, found, -1)
 
 
 def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) -> Array:
-    """Return the categories that a training image has.
+    """Return the categories of a training image.
 
     Parameters
     ----------
     training : array_like, (rows, cols)
     categories : sequence of int, optional
-        The values that stand for categories; an empty one says that the values are continuous. By default the values
-        of the training image if they are integers, or true and false, and at most 16.
+        The values that are categories; an empty sequence means continuous values. By default the values of the training
+        image if they are integers or bools, and at most 16.
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the pixels of a category are connected: the connectivity function, components and dead ends."""
+"""Connectivity of the pixels of a category: the connectivity function, components and dead ends."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from simdtex.experiments.ensemble.arrays import as_image, as_map
 Mask = NDArray[np.bool_]
 
 MARGIN = 8  # pixels along the border where an end does not count
-HOLE = 16  # holes of at most so many pixels are filled
+HOLE = 16  # the most pixels of holes that are filled
 AROUND = (0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)  # the neighbours of (1, 1), once around
 
 
 class Connectivity(NamedTuple):
-    """How a category is connected.
+    """The connectivity of a category.
 
     Attributes
     ----------
     function : ndarray of float64, (axes, max_lag + 1)
-        Along each axis of the image, for h = 0, 1, ...: of the pairs of pixels at a distance of h that both
-        have the category, the share whose pixels lie in the same component, 0 to 1. NaN if there is no such pair.
+        Along each axis of the image, for h = 0, 1, ...: among the pairs of pixels of the category at a distance of h,
+        the share in the same component, 0 to 1. NaN if there is no such pair.
     components : float
-        Connected components in 10,000 pixels of the image.
+        Number of connected components in 10,000 pixels of the image.
     largest : float
-        Share of the category's pixels that the largest component has, 0 to 1; NaN if the category is missing.
+        Share of the category's pixels in the largest component, 0 to 1; NaN if the category is missing.
     """
 
     function: NDArray[np.float64]
@@ -60,9 +60,9 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
 
     Notes
     -----
-    Pixels are connected by their sides, because flow is computed through the sides that two cells share; by corners, a
-    channel and the ground on both sides of it would each pass through the other. Two pieces that meet outside of the
-    image are two. Cost: a few passes over the image, and two for each lag.
+    Pixels are connected by their sides, because flow is computed through the common sides of cells; by corners, a
+    channel and the ground on both sides of it would each cross the other. Two pieces that meet outside of the image are
+    two. Cost: a few passes over the image, and two for each lag.
     """
     pixels = as_map(image)
     if not 1 <= max_lag < min(pixels.shape):
@@ -82,17 +82,16 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
 
 
 def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
-    """Return where the channels of a category stop inside the picture.
+    """Return the positions where channels of a category end inside the picture.
 
     A dead end is a free end of the category's skeleton, inside the picture, of an arm that is longer than wide:
 
     1. Holes of at most 16 pixels are filled, and the picture is continued beyond its border by its border pixels, so
-       that a channel which leaves it goes on.
-    2. The skeleton (`skimage.morphology.skeletonize`) is pruned: its free ends are taken away, a pixel at a time, as
-       many times as one and a half of the usual width has pixels, and one more. The usual width is twice the median
-       distance of the skeleton's pixels from the ground. So the corners of an end, the bumps of a bank and short
-       pieces vanish.
-    3. The free ends that are left count if the arm ended at least 8 pixels inside the border.
+       that a channel which leaves it continues.
+    2. The skeleton (`skimage.morphology.skeletonize`) is pruned: its free ends are removed, a pixel at a time, 1.5
+       times as often as the usual width has pixels, and once more. The usual width is twice the median distance of the
+       skeleton's pixels from the ground. This removes the corners of an end, the bumps of a bank and short pieces.
+    3. The remaining free ends count if the arm ended at least 8 pixels inside the border.
 
     Parameters
     ----------
@@ -154,6 +153,6 @@ def _free_ends(lines: Mask) -> Mask:
 
 
 def _tip(piece: NDArray[np.intp], stump: NDArray[np.intp], reach: float) -> tuple[int, ...]:
-    """Return the far end of what was pruned: the mean of its pixels that are farthest from the stump."""
+    """Return the far end of a pruned piece: the mean of its pixels that are farthest from the stump."""
     far = np.linalg.norm(piece - stump, axis=1)
     return tuple(np.rint(piece[far >= far.max() - reach].mean(axis=0)).astype(int).tolist())

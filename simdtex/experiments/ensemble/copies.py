@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of a realisation stands in the training image as it is."""
+"""The parts of a realisation that occur unchanged in the training image."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, po
 from simdtex.experiments.quality.patches import hashes
 
 WINDOW = 16
-"""Side of the windows that are looked for, pixels."""
+"""Side of the windows to find, pixels."""
 
 ABSENT, PLAIN = -1, -2
-"""A window that is not in the training image, and one of a single value."""
+"""Marks of a window that is not in the training image, and of a window with a single value."""
 
 
 def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> NDArray[np.int32]:
-    """Return where in the training image the windows of realisations stand, pixel by pixel the same.
+    """Return the position in the training image of each window of realisations that occurs there unchanged.
 
     Parameters
     ----------
     ensemble : array_like, (realisations, rows, cols)
     training : array_like, (rows, cols)
     side : int
-        Of the square windows, pixels.
+        Side of the square windows, pixels.
 
     Returns
     -------
     ndarray of int32, (realisations, rows - side + 1, cols - side + 1)
         For the window at each upper left pixel, the pixel index (row x columns + column) of the upper left pixel of the
-        first equal window of the training image; -1 where there is none, and -2 for windows of a single value, which
-        are no copies of anything.
+        first equal window of the training image; -1 if there is none, and -2 for windows with a single value, which do
+        not count as copies.
 
     Raises
     ------
@@ -66,12 +66,12 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
 
 
 def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the share of windows that stand in the training image, of those of more values than one.
+    """Return the share of windows that occur in the training image, among those with more than one value.
 
     Parameters
     ----------
     places : ndarray of int32, (realisations, rows, cols)
-        As `copies` returns it.
+        The result of `copies`.
 
     Returns
     -------

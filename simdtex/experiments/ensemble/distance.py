@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An analysis of distance: how far realisations are from one another, and from their training image."""
+"""Analysis of distance: between realisations, and between them and their training image."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Anodi(NamedTuple):
 
 
 def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int] | None = None) -> Anodi:
-    r"""Measure the variety of an ensemble against its likeness to the training image.
+    r"""Return the variety of an ensemble and its likeness to the training image.
 
     The distance of two images is the mean over three levels :math:`g = 0, 1, 2` with weights :math:`2^{-g}` of the
     Jensen-Shannon distance (to base 2) between their histograms of patterns. A pattern of level g is a square of pixels
@@ -70,8 +70,8 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
     Raises
     ------
     ValueError
-        The arrays have another number of axes or are too small, a value is no category, or there are so many different
-        patterns that their counts do not fit into 0.5 GB.
+        The arrays have another number of axes or are too small, a value is no category, or there are too many different
+        patterns for their counts to fit 0.5 GB.
 
     Notes
     -----
@@ -106,7 +106,7 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
 
 
 def _cut(values: Array, bounds: Array) -> NDArray[np.intp]:
-    """Return the classes of values; a value that is a bound is a class of its own."""
+    """Return the classes of values; a value that equals a bound is a separate class."""
     return np.searchsorted(bounds, values, side="left") + np.searchsorted(bounds, values, side="right")
 
 

@@ -53,15 +53,15 @@ class Summary:
     components, largest : ndarray of float64, (K, n + 1)
         See `connectivity`.
     dead_ends : ndarray of float64, (K, n + 1)
-        Number in 10,000 of the pixels where they count, see `dead_ends`; NaN for images too small for it.
+        Number in 10,000 pixels of the area where they count, see `dead_ends`; NaN for too small images.
     anodi : Anodi
     copied : ndarray of float64, (n,)
-        Share of the 16 x 16 windows of each realisation that stand in the training image, see `copied`; NaN for images
-        too small for it.
+        Share of the 16 x 16 windows of each realisation that occur in the training image, see `copied`; NaN for too
+        small images.
     data : ndarray of float64, (m, 3)
         Hard data: x, y, value.
     misses : ndarray of float64, (n,)
-        How many data each realisation misses; of continuous values, the root of the mean squared difference.
+        Number of data that each realisation misses; for continuous values, the root of the mean squared difference.
     """
 
     categories: Array
@@ -87,7 +87,7 @@ def summary(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
 ) -> Summary:
-    """Compute all figures of an ensemble.
+    """Return all figures of an ensemble.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def variogram(field: Array, axis: int, most: int) -> Floats:
 
 
 def _ends_per_area(image: Array, category: int) -> float:
-    """Return the dead ends in 10,000 of the pixels where they count; NaN for a small image."""
+    """Return the dead ends in 10,000 pixels of the area where they count; NaN for a small image."""
     rows, cols = (side - 2 * MARGIN for side in image.shape)
     return 1e4 * len(dead_ends(image, category)) / (rows * cols) if min(rows, cols) > 0 else nan
 

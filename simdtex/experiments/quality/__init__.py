@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures of merit: how well a synthesised texture represents its sample.
 
-No figure is enough alone. An output that repeats one patch is plausible and covers nothing; one that copies the sample
-whole is perfect in both, and only its copying tells. Pictures are arrays (rows, cols) or (rows, cols, channels) in any
+No single figure suffices. An output that repeats one patch is plausible and covers nothing; a copy of the whole sample
+is perfect in both, and only its copying shows it. Pictures are arrays (rows, cols) or (rows, cols, channels) in any
 one unit; "sample standard deviation" is everywhere the square root of the sample's variance averaged over its channels,
 at full resolution (1 if the sample is constant).
 """
@@ -62,14 +62,14 @@ class Quality:
     copying : float
         Share of the output's patches, 0 to 1.
     seam : float
-        Ratio; 1 is a seam that does not show.
+        Ratio; 1 is an invisible seam.
     lattice_faults : float or None
         Share of the output, 0 to 1, that is out of place on the sample's lattice; None if it has no lattice.
     cut_ends : float
-        Ends of stripes in 10,000 pixels, less those of the sample; below 0 if the sample has more.
+        Ends of stripes in 10,000 pixels, minus those of the sample; negative if the sample has more.
     effective_share, most_used : float or None
-        `effective_use`: a share above 0, to 1, and how many times its fair share the most used piece is taken; None
-        if no source map was given.
+        `effective_use`: a share above 0, to 1, and the use of the most used piece over its fair share; None without a
+        source map.
     """
 
     plausibility: float
@@ -84,7 +84,7 @@ class Quality:
 
 
 def measure(sample: ArrayLike, output: ArrayLike, source: ArrayLike | None = None) -> Quality:
-    """Compute the figures of merit of one output.
+    """Return the figures of merit of one output.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def measure(sample: ArrayLike, output: ArrayLike, source: ArrayLike | None = Non
 
     Notes
     -----
-    About 1.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, most of it for plausibility
-    and coverage.
+    Cost: about 1.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, most of it for
+    plausibility and coverage.
     """
     found = Quality(
         copying=copying(sample, output),

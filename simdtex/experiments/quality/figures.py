@@ -48,7 +48,7 @@ def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
 
     Notes
     -----
-    About 4096 patches are looked up at each scale, spread evenly. The nearest one is exact, by comparing with all.
+    About 4096 evenly spaced patches are looked up at each scale. The nearest one is exact, by comparison with all.
     Cost: queries x candidates x 98 x channels operations in single precision; memory under 200 MB beyond the pictures,
     for any size.
     """
@@ -58,7 +58,7 @@ def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
 def coverage(sample: ArrayLike, output: ArrayLike) -> float:
     """Return the mean distance from a 7 x 7 patch of the sample to the nearest patch of the output.
 
-    `plausibility` with the pictures exchanged: it grows with every part of the sample that the output lacks.
+    It is `plausibility` with the pictures exchanged, and grows with every part of the sample that the output lacks.
     Parameters, units and cost are those of `plausibility`.
     """
     return _mean_nearest(sample, output, of_output=False)
@@ -78,7 +78,7 @@ def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool) -> f
 
 
 def _every(planes: Planes) -> Indices:
-    """Return the patches of a picture that are looked up."""
+    """Return the numbers of the patches of a picture to look up."""
     total = count(planes, PATCH)
     stride = -(-total // QUERIES)
     # no common divisor with a row of patches, or the queries would line up in columns
@@ -131,10 +131,10 @@ def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
 
 
 def seam(output: ArrayLike) -> float:
-    """Return how much the seam shows when the output is laid side by side with itself.
+    """Return the visibility of the seam between copies of the output side by side.
 
-    The mean absolute difference between the last and the first row over that between neighbour rows inside, the same
-    for columns, and the mean of the two.
+    It is the mean absolute difference between the last and the first row, divided by that between neighbouring inner
+    rows, the same for columns, and the mean of the two.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pictures that are compared, the unit of their differences, and the nearest patch among all of a picture."""
+"""The compared pictures, the unit of their differences, and the nearest of all patches of a picture."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Planes = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
 LARGEST = 1e100
-"""Of values that figures are computed of: sums of their squares stay finite."""
+"""The largest value for which figures are computed: sums of squares are then finite."""
 
 BLOCK_ROWS = 4096  # patches looked up at once
 BLOCK_BYTES = 48 << 20  # of one block of patches, and of one block of squared distances
@@ -74,30 +74,30 @@ def halved(planes: Planes) -> Planes:
 
 
 class Found(NamedTuple):
-    """The nearest candidates: ``distance`` (n,) float64, infinite where there was none, and ``where`` (n,) indices."""
+    """The nearest candidates: ``distance`` (n,) float64, infinite without a candidate, and ``where`` (n,) indices."""
 
     distance: NDArray[np.float64]
     where: Indices
 
 
 def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apart: int = 0) -> Found:
-    """Return, for some patches of a picture, the nearest of all patches of another.
+    """Return, for the patches ``asked`` of a picture, the nearest of all patches of another.
 
     Parameters
     ----------
     queries, candidates : float32 array, (rows, cols, channels)
     asked : (n,) int array
-        Which patches of `queries` to look up, in raster order of their first pixels.
+        The patches of `queries` to look up, by the number of their first pixel in raster order.
     side : int
-        Of a patch, pixels.
+        Side of a patch, pixels.
     apart : int
-        A candidate counts only if its row or its column differs from the query's by at least so many pixels.
+        A candidate counts only if its row or its column differs from the query's by at least ``apart`` pixels.
 
     Returns
     -------
     Found
-        Distances are the root of the mean squared difference over the side^2 x channels values; among equals the first
-        candidate is taken.
+        Distances are the root of the mean squared difference over the side^2 x channels values; of equally near
+        candidates, the first.
 
     Notes
     -----
@@ -145,7 +145,7 @@ def count(planes: Planes, side: int) -> int:
 
 
 def hashes(numbers: NDArray[np.integer], side: int) -> NDArray[np.uint64]:
-    """Return a hash of each patch of whole numbers (rows, cols, channels), (rows - side + 1, cols - side + 1).
+    """Return a hash of each patch of integers (rows, cols, channels), (rows - side + 1, cols - side + 1).
 
     It is the sum of its numbers modulo 2**64, each times an odd random weight of its row, one of its column and one of
     its channel. Of n different patches and m others, about n m / 2**64 have the same hash by chance.

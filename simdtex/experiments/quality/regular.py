@@ -14,22 +14,22 @@ from simdtex.model.regularity import Lattice, plain, regular
 from simdtex.model.structure import smoothed, surroundings
 
 OVERTONES = 3
-"""Highest multiple of each wave of a lattice that tells its phase."""
+"""Highest multiple of each wave of a lattice that determines the phase."""
 
 PHASES = 16
-"""Phases to a period that are compared."""
+"""Number of compared phases in a period."""
 
 OFF = 1 / 8
-"""Share of a cell by which it may be out of place."""
+"""The largest allowed displacement of a cell, as a share of the cell."""
 
 FAINT = 0.25
-"""Share of the sample's usual likeness to its own mean cell, below which nothing of the cell is left."""
+"""Share of the sample's usual likeness to its own mean cell, below which the cell is lost."""
 
 OWN = 0.25
-"""Faults of the sample itself, from which on its lattice tells nothing."""
+"""Share of faults in the sample itself, from which its lattice is meaningless."""
 
 SITES = 6
-"""Sites to the side of a cell at which its phase is told."""
+"""Number of sites along the side of a cell at which its phase is determined."""
 
 BORDER = 8
 """Pixels from the border of a picture within which stripes may end."""
@@ -41,16 +41,16 @@ AREA = 10_000
 def lattice_faults(sample: ArrayLike, output: ArrayLike) -> float | None:
     """Return the share of an output that is out of place on the sample's lattice, 0 to 1, see `lattice_fault_map`.
 
-    None if the sample has no lattice, or does not keep to it.
+    None if the sample has no lattice, or does not fit it.
     """
     faults = lattice_fault_map(sample, output)
     return None if faults is None else float(faults.mean())
 
 
 def lattice_fault_map(sample: ArrayLike, output: ArrayLike) -> NDArray[np.bool_] | None:
-    """Return where an output (rows, cols) is out of place on the sample's lattice.
+    """Return the mask of sites of an output (rows, cols) that are out of place on the sample's lattice.
 
-    None if the sample has no lattice, or is out of place itself for a quarter or more, as a sample of stripes may be.
+    None if the sample has no lattice, or if a quarter or more of the sample itself is out of place, as with stripes.
 
     Parameters
     ----------
@@ -60,10 +60,10 @@ def lattice_fault_map(sample: ArrayLike, output: ArrayLike) -> NDArray[np.bool_]
     Notes
     -----
     The waves of the lattice in the output, weighted by those of the sample's mean cell and by a Gaussian as wide as
-    half a cell, say for every phase how much the surroundings of a site look like a cell there. A site is out of place
-    if another phase, more than an eighth of a cell away, looks more so than any nearby, or if none does. The lattice is
-    that of the sample or, if this has fewer faults, the same fitted to an output that wraps around; where it begins
-    follows from the output. Cost: about 0.5 s for 256 x 256 pixels.
+    half a cell, give the likeness of the surroundings of a site to a cell, for every phase. A site is out of place if a
+    phase more than an eighth of a cell away has a greater likeness than all near ones, or if no phase has any. The
+    lattice is that of the sample or, if this gives fewer faults, the same fitted to an output that wraps around; the
+    output determines its origin. Cost: about 0.5 s for 256 x 256 pixels.
     """
     first, second = as_pair(sample, output, 9)
     pictures = Pictures((first,))
@@ -94,7 +94,7 @@ def _step(lattice: Lattice) -> int:
 
 
 def _waves(picture: NDArray[np.int64], lattice: Lattice) -> NDArray[np.complex128]:
-    """Return a picture, less its mean, times the waves of a lattice: (n, rows, cols)."""
+    """Return a picture minus its mean, times the waves of a lattice, (n, rows, cols)."""
     phases = lattice.phases(*np.indices(picture.shape))
     turned = np.exp(-2j * np.pi * np.tensordot(ORDERS, phases, 1))
     found: NDArray[np.complex128] = turned * (picture - picture.mean())
@@ -104,7 +104,7 @@ def _waves(picture: NDArray[np.int64], lattice: Lattice) -> NDArray[np.complex12
 def _likeness(
     picture: NDArray[np.int64], lattice: Lattice, cell: NDArray[np.complex128], torus: bool
 ) -> NDArray[np.float64]:
-    """Return how much the surroundings of sites look like a cell of each phase: (`PHASES`, `PHASES`, rows, cols)."""
+    """Return the likeness of the surroundings of sites to a cell of each phase, (`PHASES`, `PHASES`, rows, cols)."""
     from scipy.ndimage import gaussian_filter
 
     step, width, mode = _step(lattice), lattice.cell**0.5 / 2, "wrap" if torus else "constant"
@@ -121,7 +121,7 @@ def _likeness(
 
 
 def _out_of_place(likeness: NDArray[np.float64], usual: float) -> NDArray[np.bool_]:
-    """Return which sites look more like a cell of another phase than of the output's own, or like none."""
+    """Return the mask of sites that look more like a cell of another phase than of the output's, or like none."""
     own = np.unravel_index(likeness.mean((2, 3)).argmax(), likeness.shape[:2])
     apart = (np.indices(likeness.shape[:2]).T - own + PHASES // 2) % PHASES - PHASES // 2
     near = (np.abs(apart.T) <= OFF * PHASES).all(0)
@@ -131,14 +131,14 @@ def _out_of_place(likeness: NDArray[np.float64], usual: float) -> NDArray[np.boo
 
 
 class Ends(NamedTuple):
-    """Where stripes end: ``bright`` and ``dark`` (n, 2) rows and columns of the ends of either kind."""
+    """The ends of stripes: ``bright`` and ``dark`` (n, 2), rows and columns of the ends of either kind."""
 
     bright: NDArray[np.intp]
     dark: NDArray[np.intp]
 
 
 def cut_ends(sample: ArrayLike, output: ArrayLike) -> float:
-    """Return how many more stripes end in an output than in its sample, in 10,000 pixels; below 0 if fewer do.
+    """Return the excess of ends of stripes in an output over its sample, in 10,000 pixels; negative for fewer ends.
 
     See `cut_end_places`.
     """
@@ -153,7 +153,7 @@ def _rate(sample: NDArray[Any], output: NDArray[Any]) -> float:
 
 
 def cut_end_places(sample: ArrayLike, output: ArrayLike) -> Ends:
-    """Return where bright and dark stripes of an output end.
+    """Return the ends of bright and dark stripes of an output.
 
     Parameters
     ----------
@@ -183,6 +183,6 @@ def _ends(lines: NDArray[np.bool_]) -> NDArray[np.intp]:
     from scipy.ndimage import convolve
 
     neighbours = convolve(lines.astype(np.int8), np.ones((3, 3), np.int8), mode="constant")
-    ends = lines & (neighbours == 2)  # itself and one more
+    ends = lines & (neighbours == 2)  # the pixel itself and one more
     ends[:BORDER] = ends[-BORDER:] = ends[:, :BORDER] = ends[:, -BORDER:] = False
     return np.argwhere(ends)

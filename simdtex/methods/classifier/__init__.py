@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which texture is where: nearest whole neighbourhoods, a Potts field, and a test for what is none of them."""
+"""Classification of textures: nearest whole neighbourhoods, a Potts field, and a test for unknown textures."""
 
 from simdtex.methods.classifier.options import Options
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The classifier as a program for the array: distances to every class, a Potts field, and a test for the unknown."""
+"""The classifier as a program: distances from every class, a Potts field, and a test for unknown textures."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from simdtex.options import within_32_bits
 from simdtex.run import Callback, Labelling, Output
 
 WORK = 2**32
-"""Multiply-adds of a step, about."""
+"""About the number of multiply-adds of a step."""
 
 AT_ONCE = 2**19
-"""Sites whose fits are computed at a time."""
+"""The most sites whose fits are computed together."""
 
 STEPS = 64
-"""Steps to a sweep, at most: each takes a pass over the picture."""
+"""The most steps of a sweep, since each takes a pass over the picture."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Plan:
     unknown : (rows, cols) bool array
         Pixels without a value, which are labelled 0.
     classes : sequence of sequences of Region, or Model
-        What there is of each class; or the model that was learned from it.
+        The regions of each class, or a model trained on them.
     names : dict of int to str
         The label of each class, 1 to 254, and its name.
     options : Options
@@ -61,7 +61,7 @@ class Plan:
     options: Options
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Learn the classes on a machine; raise if the memory does not suffice."""
+        """Return the run on a machine, with trained classes; raise if the memory does not suffice."""
         shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
@@ -79,9 +79,9 @@ class Plan:
 class State(NamedTuple):
     """The state between two steps.
 
-    ``done`` rows that were compared; ``logs`` (E, classes, rows, cols) uint16 logarithms of distances; ``labels``
-    (rows, cols) uint8, 0 the first class; ``schedule`` its state; ``changed`` the labels that each sweep changed. The
-    next step writes into the arrays.
+    ``done``, the number of compared rows; ``logs`` (E, classes, rows, cols) uint16, logarithms of distances; ``labels``
+    (rows, cols) uint8, 0 the first class; ``schedule``, its state; ``changed``, the number of labels that each sweep
+    changed. The next step writes into the arrays.
     """
 
     done: int
@@ -92,7 +92,7 @@ class State(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a step did: ``fraction`` of the work that is done, ``doing`` in words, and the ``labels``."""
+    """A description of a step: the finished ``fraction`` of the work, ``doing`` in words, and the ``labels``."""
 
     fraction: float
     doing: str
@@ -102,7 +102,7 @@ class Info(NamedTuple):
 class _Segment(NamedTuple):
     """The sites of a label in a strip of the picture.
 
-    ``own`` all of them; ``inner`` those whose neighbours are of it, too; ``at`` those whose fit is wanted.
+    ``own``: all of them; ``inner``: those whose neighbours have the label, too; ``at``: those whose fit is computed.
     """
 
     own: Mask
@@ -134,13 +134,13 @@ class Run:
             )
 
     def begin(self) -> State:
-        """Return the state in which nothing was compared."""
+        """Return the state before any comparison."""
         shape = self.plan.pixels.shape[:2]
         logs = np.zeros((len(self.model.experts), len(self.plan.names), *shape), np.uint16)
         return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 
     def step(self, state: State, watch: Callable[..., None]) -> tuple[State, Info]:
-        """Compare the next rows with the exemplars of every class; after the last, relax labels in a sweep."""
+        """Compare the next rows with the exemplars of every class or, after the last row, relax labels in a sweep."""
         after = self._compared(state) if state.done < self.grid.rows else self._swept(state)
         compared = after.done / self.grid.rows
         sweeps = len(after.changed) / max(1, self.options.sweeps)
@@ -192,7 +192,7 @@ class Run:
         return State(state.done, state.logs, found, kept, (*state.changed, changed))
 
     def ended(self, state: State) -> bool:
-        """Return whether all is compared, and the last sweep changed no label or no sweep is left."""
+        """Return whether all rows are compared, and the last sweep changed no label or no sweep is left."""
         settled = len(state.changed) >= self.options.sweeps or 0 in state.changed[-1:]
         return state.done == self.grid.rows and settled
 
@@ -227,11 +227,11 @@ class Run:
         )
 
     def _fits(self, state: State) -> tuple[NDArray[np.float32], Mask]:
-        """Return how well each class fits each site, (classes, rows, cols), and where the site's own is rejected.
+        """Return the fit of each class at each site, (classes, rows, cols), and a mask of sites with a rejected class.
 
         The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
-        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was
-        copied from the samples is left out, since it has no distance to them, and fits.
+        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. Copies of
+        the samples are excluded, since their distance is 0, and fit.
         """
         from scipy.special import fdtrc, fdtri
 
@@ -262,7 +262,7 @@ class Run:
         return fit, rejected
 
     def _distance(self, null: Null, logs: NDArray[np.uint16], copied: Mask, segment: _Segment) -> NDArray[np.float64]:
-        """Return Hotelling's statistic of the sites of a segment that are judged, 0 where the sample is copied."""
+        """Return Hotelling's statistic of the tested sites of a segment, 0 where the sample is copied."""
         own, inner, at = segment
         means, found = windowed(self.machine, logs, inner & ~copied, self._taps, at)
         if not (found | copied[at]).all():  # a narrow segment
@@ -279,7 +279,7 @@ class Run:
         return State(**saved | {"schedule": kept, "changed": tuple(saved["changed"])})
 
     def observer(self, callback: Callback | None) -> Record:
-        """Return what watches this run."""
+        """Return the observer of this run."""
         return Record(self, callback)
 
 
@@ -290,7 +290,7 @@ class Record:
         self._run, self._callback = run, callback
 
     def part(self, *seen: Any) -> None:
-        """See nothing: steps are short."""
+        """Do nothing, since steps are short."""
 
     def step(self, state: State, info: Info) -> None:
         """Report a step."""
@@ -306,7 +306,7 @@ class Record:
             self._callback(Labelling(work=info.doing, **now))
 
     def save(self) -> None:
-        """Return nothing: all is in the state."""
+        """Return nothing: the state holds everything."""
 
     def load(self, saved: None) -> None:
-        """Go on from nothing."""
+        """Do nothing: the state holds everything."""

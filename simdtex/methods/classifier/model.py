@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a classifier knows of its classes: exemplars, how far they are from themselves, and how far they drift."""
+"""The model of a classifier: exemplars of its classes, their distances from their own class, and the drift of these."""
 
 from __future__ import annotations
 
@@ -24,46 +24,46 @@ from simdtex.ops.features import SIXTEENTHS, features
 from simdtex.ops.window import gaussian, window
 
 SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
-"""Standard deviations of the Gaussians that levels are smoothed by, pixels."""
+"""Standard deviations of the Gaussians that smooth the levels, pixels."""
 
 SIDE = 32
-"""Pixels a side of a sample at level 0, at least, and twice as many with each level."""
+"""The least side of a sample at level 0, pixels; each further level doubles it."""
 
 TEMPERATURE = 0.5
-"""Evidence is the mean logarithm of squared distances over this."""
+"""Evidence is the mean logarithm of squared distances divided by this."""
 
 LEAST = 16
-"""Neighbourhoods of a class at a level, at least."""
+"""The fewest neighbourhoods of a class at a level."""
 
 BANDS = 14
-"""Bands of a picture at most: sums of products of raw neighbourhoods are below 2**24."""
+"""The most bands of a picture: sums of products of raw neighbourhoods are then below 2**24."""
 
 CLASSES = 254
-"""Classes at most: labels are bytes, and 0 is unknown."""
+"""The most classes: labels are bytes, and 0 is unknown."""
 
 BOX = 128
-"""Rows and columns of a part of a sample that is judged by the other parts, at most."""
+"""The most rows and columns of a part of a sample that is compared with the other parts."""
 
 UNITS = 2**18
-"""Units of evidence, and of votes, to 1."""
+"""Units in 1 of evidence, and of votes."""
 
 MEANS = 16
-"""Units of a mean logarithm over a window to one of its logarithms."""
+"""Units of a mean logarithm over a window in one unit of its logarithms."""
 
 RAW = 0.35
-"""Share of the evidence that raw neighbourhoods have; those with compressed contrast have the rest."""
+"""Share of raw neighbourhoods in the evidence; those with compressed contrast have the rest."""
 
 FINER = (1.0, 0.3, 0.09, 0.027, 0.0081)
 """Weights of the evidence of levels, the finest first."""
 
 OWN, DRIFTS, FLOOR = 0.7, 2.0, 0.01
-"""Covariance of a class: its own share, the rest pooled; how many times the drift between parts; and at least this."""
+"""Covariance of a class: the share of its own, the rest is pooled; the factor of the drift; and the least value."""
 
 
 class Expert(NamedTuple):
-    """One way to compare neighbourhoods: ``offsets`` (N, 2) int32 in pixels of a level, whether contrast is compressed.
+    """A comparison of neighbourhoods: ``offsets`` (N, 2) int32 in pixels of a level, whether contrast is compressed.
 
-    ``reach`` is the furthest offset, in pixels, and ``factor`` what a unit of its logarithms is in `UNITS` of evidence.
+    ``reach`` is the farthest offset, in pixels, and ``factor`` the evidence, in `UNITS`, of one unit of its logarithms.
     """
 
     level: int
@@ -74,7 +74,7 @@ class Expert(NamedTuple):
 
 
 def experts_of(options: Options, levels: int) -> list[Expert]:
-    """Return the experts of so many levels: raw and contrast-compressed neighbourhoods at each, the finest first.
+    """Return the experts of ``levels`` levels: raw and contrast-compressed neighbourhoods at each, the finest first.
 
     An expert has the weight of its level, in `FINER`, times the share of its kind; the weights add up to
     1 / `TEMPERATURE`.
@@ -91,10 +91,10 @@ def experts_of(options: Options, levels: int) -> list[Expert]:
 
 
 class Region(NamedTuple):
-    """Sites of a picture that are of one class.
+    """Sites of a picture in one class.
 
-    ``pixels`` (rows, cols, B); ``sites`` (rows, cols) bool; ``whole`` whether neighbourhoods must lie within them, or
-    only their centres; ``judged`` whether they only say how the class differs from its exemplars.
+    ``pixels`` (rows, cols, B); ``sites`` (rows, cols) bool; ``whole``: whether neighbourhoods must lie within the
+    sites, or only their centres; ``judged``: whether the sites only show how the class differs from its exemplars.
     """
 
     pixels: NDArray[Any]
@@ -105,9 +105,9 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True)
 class Null:
-    """How much a class differs from its own exemplars: the distribution of mean logarithms over a window.
+    """The differences of a class from its own exemplars: the distribution of mean logarithms over a window.
 
-    ``mean`` (E,) and ``inverse`` (E, E), that of the covariance, in logarithms, for E experts.
+    ``mean`` (E,), and ``inverse`` (E, E) of the covariance, in logarithms, for E experts.
     """
 
     mean: NDArray[np.float64]
@@ -117,7 +117,7 @@ class Null:
         """Return the squared Mahalanobis distance over E of means (E, n) in 1 / (`MEANS` `LOGS`)."""
         gap = means / float(MEANS * LOGS) - self.mean[:, None]
         total = np.zeros(gap.shape[1])
-        for i, j in np.ndindex(self.inverse.shape):  # one order of summation everywhere
+        for i, j in np.ndindex(self.inverse.shape):  # the same order of summation on every machine
             total += self.inverse[i, j] * gap[i] * gap[j]
         return total / len(self.mean)
 
@@ -126,9 +126,9 @@ class Null:
 class Model:
     """A trained classifier.
 
-    ``exemplars`` one for each expert, with all classes; ``offsets`` (classes,) int64, what is added to the evidence of
-    each class; ``nulls`` one for each class; ``freedom`` degrees of freedom of their covariances; ``own`` (classes, E)
-    the mean logarithm of distances of a class to itself; ``counts`` its exemplars.
+    ``exemplars``, one for each expert, with all classes; ``offsets`` (classes,) int64, added to the evidence of each
+    class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their covariances; ``own`` (classes,
+    E), the mean logarithm of distances of a class from itself; ``counts``, the numbers of exemplars.
     """
 
     scale: Scale
@@ -144,12 +144,12 @@ class Model:
 def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
     """Return the levels of a picture (rows, cols, B) on a machine, each (B, rows, cols) uint16 in sixteenths of 0..255.
 
-    Level 0 is the picture, and the others are smoothed by `SMOOTHING`, mirrored beyond the border.
+    Level 0 is the picture, and all further levels are smoothed by `SMOOTHING`, mirrored beyond the border.
     """
     planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
     found = [machine.put(planes.astype(np.uint16))]
     for level in range(1, levels):
-        smooth = planes.astype(np.float64)  # which holds the whole numbers of both sums
+        smooth = planes.astype(np.float64)  # exact for the integers of both sums
         taps = gaussian(SMOOTHING[level]).astype(np.float64)
         for axis in (1, 2):
             smooth = ndimage.correlate1d(smooth, taps, axis, mode="mirror")
@@ -185,7 +185,7 @@ def learn(
 
 
 def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
-    """Return the number of levels that all classes have enough sites for; raise if there is none."""
+    """Return the number of levels at which all classes have enough sites; raise if it is 0."""
     regions = [region for one in classes for region in one]
     side = min(min(region.sites.shape) for region in regions)
     levels = max(1, sum(side >= SIDE << level for level in range(options.levels)))
@@ -204,7 +204,7 @@ def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Seq
 
 
 def _centres(region: Region, reach: int) -> Mask:
-    """Return the sites whose neighbourhoods of this reach are whole."""
+    """Return the sites whose neighbourhoods of ``reach`` pixels are whole."""
     rows, cols = region.sites.shape
     inside = np.zeros((rows, cols), bool)
     inside[reach : rows - reach, reach : cols - reach] = True
@@ -215,7 +215,7 @@ def _centres(region: Region, reach: int) -> Mask:
 
 
 def _cropped(region: Region, margin: int) -> Region:
-    """Return the part of a region that holds its sites, and so many pixels around them."""
+    """Return the part of a region with its sites and ``margin`` pixels around them."""
     box = tuple(
         slice(max(0, int(line[0]) - margin), int(line[-1]) + margin + 1)
         for line in (np.flatnonzero(region.sites.any(axis)) for axis in (1, 0))
@@ -224,17 +224,17 @@ def _cropped(region: Region, margin: int) -> Region:
 
 
 class _Part(NamedTuple):
-    """A part of a class that the others judge: the number of its region, and its sites there."""
+    """A part of a class to compare with the rest: the number of its region, and its sites there."""
 
     region: int
     sites: Mask
 
 
 class Self(NamedTuple):
-    """What the parts of a class are to the rest of it.
+    """The distances of the parts of a class from the rest of it.
 
-    ``mean`` (E,) of the logarithms in natural units; ``windows`` (E, n) int64 mean logarithms over windows; ``parts``
-    (parts, E) float64, of each part.
+    ``mean`` (E,) of the logarithms in natural units; ``windows`` (E, n) int64, mean logarithms over windows; ``parts``
+    (parts, E) float64, the mean of each part.
     """
 
     mean: NDArray[np.float64]
@@ -253,14 +253,14 @@ class _Class:
     def draw(
         self, machine: Machine, expert: Expert, most: int, seed: int, number: int, without: _Part | None = None
     ) -> NDArray[np.float32]:
-        """Return neighbourhoods of the class drawn at random, (n, K); none of a part that is to be judged."""
+        """Return random neighbourhoods of the class, (n, K), outside of the part ``without``."""
         masks = []
         for place, region in enumerate(self.regions):
             mask = _centres(region, expert.reach) & (not region.judged)
             masks.append(mask & ~without.sites if without and without.region == place else mask)
         pool = np.concatenate([mask.ravel() for mask in masks])
         sites = np.flatnonzero(pool)
-        if len(sites) < TOO_FEW and without:  # a small region: what is left says nothing
+        if len(sites) < TOO_FEW and without:  # a small region, whose rest is too small
             return self.draw(machine, expert, most, seed, number)
         if len(sites) > most:
             words = random.draw4(seed, expert.level, number, sites, random.SEARCH)[0]
@@ -283,7 +283,7 @@ class _Class:
         return values
 
     def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> Self:
-        """Return how far the parts of the class are from the rest of it, by each expert."""
+        """Return the distances of the parts of the class from the rest of it, for each expert."""
         taps = gaussian(options.window)
         windows, parts = [], []
         for place, region in enumerate(self.regions):
@@ -304,11 +304,11 @@ class _Class:
 
 
 TOO_FEW = 8
-"""Neighbourhoods that are too few to judge a part by."""
+"""The fewest neighbourhoods for a comparison with a part."""
 
 
 def _quarters(sites: Mask) -> list[Mask]:
-    """Return sites in four parts, as near equal as rows and columns allow: above and below, each left and right."""
+    """Return sites in four nearly equal parts, divided by a row and by columns: above and below, left and right."""
     row, col = np.nonzero(sites)
     middle = np.median(row)
     found = []
@@ -325,7 +325,7 @@ def _quarters(sites: Mask) -> list[Mask]:
 
 
 def _boxed(sites: Mask) -> Mask:
-    """Return the sites within a box of `BOX` pixels around their middle."""
+    """Return the sites within a box of `BOX` x `BOX` pixels around their middle."""
     row, col = np.nonzero(sites)
     top, left = (max(0, int(np.median(axis)) - BOX // 2) for axis in (row, col))
     found = np.zeros_like(sites)
@@ -336,7 +336,7 @@ def _boxed(sites: Mask) -> Mask:
 def windowed(
     machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32], at: Mask
 ) -> tuple[NDArray[np.int64], Mask]:
-    """Return the mean of planes (P, rows, cols) over the sites in a window, and whether there are any.
+    """Return the mean of planes (P, rows, cols) over the sites in each window, and whether it has any.
 
     The windows are around the n sites ``at``; the means are in 1 / `MEANS` of the planes' units, (P, n).
     """
@@ -366,7 +366,7 @@ def _nulls(selves: Sequence[Self]) -> tuple[list[Null], int]:
 
 
 def _covariance(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the covariance of values (E, n), with sums in one order everywhere."""
+    """Return the covariance of values (E, n), with the same order of summation on every machine."""
     gap = values - np.array([np.add.accumulate(line)[-1] for line in values])[:, None] / values.shape[1]
     products = [[np.add.accumulate(a * b)[-1] for a in gap] for b in gap]
     found: NDArray[np.float64] = np.array(products) / max(1, values.shape[1] - 1)
@@ -374,7 +374,7 @@ def _covariance(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse of a symmetric positive definite matrix, with the same bits everywhere (Cholesky)."""
+    """Return the inverse of a symmetric positive definite matrix by Cholesky, with the same bits on every machine."""
     n = len(matrix)
     lower = np.zeros((n, n))
     for i in range(n):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
 
-`Run.begin`, `Run.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. A step of 6.2.2
-is decided first and executed at once (`simdtex.ops.relax`): its sites do not depend on one another, so a device relaxes
-them in one launch. Progress, counts and stages are the observer's (record.py).
+`Run.begin`, `Run.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. The schedule
+first chooses the sites of a step of 6.2.2, which do not depend on one another; a device then relaxes all of them in one
+launch (`simdtex.ops.relax`). The observer (record.py) keeps progress, counts and stages.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ AT_ONCE = 2**20
 
 
 Watch = Callable[[Level, State, Part], Any]
-"""Called after every part of a sweep with the state before the sweep."""
+"""A function that is called after every part of a sweep, with the state before the sweep."""
 
 
 def ignore(level: Level, state: State, part: Part) -> None:
-    """Watch nothing."""
+    """Do nothing: the default of ``watch``."""
 
 
 class Run(Lattices):
-    """Algorithm 1 as the driver runs it: a step enters a level or is a sweep."""
+    """Algorithm 1 for the driver: a step is a sweep, or enters a level."""
 
     def begin(self) -> State:
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
@@ -56,7 +56,7 @@ class Run(Lattices):
         return opened(level, self.conditions.entered(self.machine, number, level.setting.grid, field))
 
     def step(self, state: State, watch: Watch = ignore) -> tuple[State, Info]:
-        """Run a sweep, or enter the next level if the present one has reached equilibrium."""
+        """Run a sweep, or enter the next level if the current one is at equilibrium; return the state after it."""
         if self.at_equilibrium(state):  # 6
             return self.enter(state.level - 1, state.field), Info(state.level - 1)
         level = self.level(state.level)
@@ -89,12 +89,12 @@ class Run(Lattices):
         """Return the state that `save` copied, on this machine."""
         state = State(**saved)
         level = self.level(state.level)
-        memory = like(level.schedule.init(level.setting), state.schedule)  # its types are the schedule's own
+        memory = like(level.schedule.init(level.setting), state.schedule)  # with the types of the schedule's own state
         values, source, temperature = map(self.machine.put, state.field)
         return state._replace(values=values, source=source, temperature=temperature, schedule=memory)
 
     def observer(self, callback: Callback | None) -> Record:
-        """Return what watches this run."""
+        """Return the observer of this run."""
         return Record(self, callback)
 
 
@@ -107,11 +107,11 @@ def opened(level: Level, field: Field) -> State:
 
 
 def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, list[schedules.Info]]:
-    """Relax about as many sites as are active, step by step of the schedule: 6.2.1 and 6.2.2.
+    """Relax about as many sites as are active, in the steps of the schedule: 6.2.1 and 6.2.2.
 
-    The arrays of the state are used up. If no site is active, the sweep is a free one, of all sites that are not known.
-    ``watch`` is called after every part of the sweep. Returns the state after it, and what the schedule decided at each
-    step.
+    The arrays of ``state`` are overwritten. If no site is active, the sweep is a free sweep: it relaxes all sites that
+    are not known. ``watch`` is called after every part of the sweep. Returns the state after the sweep, and the
+    schedule's decision at each step.
     """
     free = not state.active
     field, memory, chosen = swept(level, state, free, watch)
@@ -122,7 +122,7 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
 
 
 def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tuple[Field, Any, list[schedules.Info]]:
-    """Run the steps of a sweep; return the sites after it, the schedule's state, and what the schedule decided."""
+    """Run the steps of a sweep; return the field after it, the state of the schedule, and its decisions."""
     field, memory = exchanged(level, state.field), state.schedule
     relaxation = rule(level, state.penalty)
     chosen: list[schedules.Info] = []
@@ -136,7 +136,7 @@ def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tupl
 
 
 def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
-    """Return how often each candidate is used, (n,); zeros if nothing depends on it."""
+    """Return the number of uses of each candidate, (n,); zeros if nothing depends on these."""
     candidates = level.proposal.candidates
     if not (level.rate or level.fair_use.kinds is not None):
         return np.zeros(candidates.size, np.int32)
@@ -145,7 +145,7 @@ def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
 
 
 def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
-    """Relax the sites of one step after another, in parts that do not take long: 6.2.2."""
+    """Relax the sites of the chosen steps one step after another, and yield short parts: 6.2.2."""
     machine = level.machine
     if level.in_place:
         sites, before = chosen.sites, 0
@@ -172,7 +172,7 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
 
 
 def exchanged(level: Level, field: Field) -> Field:
-    """Return the field with a copy below it that other blocks see until the sweep ends, if the schedule has blocks."""
+    """Return the field; if the schedule has blocks, with a copy below it that other blocks read during the sweep."""
     if not level.schedule.tile:
         return field
     return Field(*(snapshot(level.machine, plane, level.grid.height) for plane in field))
@@ -183,8 +183,8 @@ def finished(
 ) -> NDArray[Any]:
     """Return the picture in the sample's type, with the finish (`simdtex.ops.finish`) if the options have one.
 
-    ``grid`` is the finest level or a window of it, ``field`` and the known sites ``known`` (H, W) are of that; ``seen``
-    (rows, cols) are the sources on the host, of all rows or of some from row ``first`` on.
+    ``grid`` is the finest level or a window of it, ``field`` its sites, and ``known`` (H, W) its known sites; ``seen``
+    (rows, cols) are the sources on the host, of all rows or of some rows from ``first`` on.
     """
     sample = run.sample
     if not run.options.finish:

@@ -21,8 +21,8 @@ from simdtex.ops.neighbourhood import Confidences, Field
 class Held(NamedTuple):
     """Conditioning data and guides of a level's sites, on the host.
 
-    ``values`` (C, rows, cols) uint16, at free sites only those of guides; ``source`` (rows, cols) int32;
-    ``known`` (rows, cols) bool, False at free sites.
+    ``values`` (C, rows, cols) uint16, of which free sites have only the guides' channels; ``source`` (rows, cols)
+    int32; ``known`` (rows, cols) bool, False at free sites.
     """
 
     values: NDArray[np.uint16]
@@ -40,8 +40,7 @@ class Data(NamedTuple):
 class Conditions(ABC):
     """Conditioning data and guides of an output: all in memory, or windows out of a store.
 
-    ``confidences`` says which channels are guides, whether values have confidences of
-    their own, and the weights.
+    ``confidences`` holds the number of guide channels, whether values have confidences of their own, and the weights.
     """
 
     def __init__(self, confidences: Confidences) -> None:
@@ -49,7 +48,7 @@ class Conditions(ABC):
 
     @abstractmethod
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level at the sites of its lattice, or of a window; None if there are none."""
+        """Return the data and guides of a level at the sites of its lattice or a window of it; None without any."""
 
     @abstractmethod
     def scattered(self, number: int) -> Data | None:
@@ -95,7 +94,7 @@ class Conditioning(Conditions):
         self._held: dict[int, Held] = {}
 
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level at the sites of its lattice, or of a window."""
+        """Return the data and guides of a level at the sites of its lattice or a window of it."""
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:

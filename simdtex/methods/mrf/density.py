@@ -19,10 +19,10 @@ from simdtex.ops.histogram import histogram
 from simdtex.ops.neighbourhood import Field, neighbourhood
 
 AT_ONCE = 4096
-"""Sites whose tables are made in one go."""
+"""The most sites whose tables are made together."""
 
 PAIRS = 2**22
-"""Pairs of sites and data, or of sites and kinds, that are looked at in one go."""
+"""The most pairs of sites and data, or of sites and kinds, that are processed together."""
 
 
 def lcpdf_at(
@@ -35,9 +35,9 @@ def lcpdf_at(
     bandwidth: float,
     estimator: str,
 ) -> NDArray[np.float64]:
-    """Return P(x_s | x_r, r in N_s) of some sites, (S, greys) float64; every row adds up to 1.
+    """Return P(x_s | x_r, r in N_s) at ``sites``, (S, greys) float64; every row adds up to 1.
 
-    ``field`` holds the image in working grey levels and its temperatures, nothing is read of its sources; the sample
+    ``field`` holds the image in working grey levels and its temperatures, and its sources are not read; the sample
     has one channel; ``sites`` are pixel indices, and ``bandwidth`` is h in units of h_opt, equation (8). ``estimator``
     is ``"parzen"``, equations (6) to (8), or ``"histogram"``, counts of exact matches, (4) and (5). Raises ValueError
     if no neighbourhood of the sample matches that of a site.
@@ -84,10 +84,10 @@ class Data(NamedTuple):
 def near(
     sites: NDArray[np.integer], place: NDArray[np.integer], most: int, reach: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
-    """Return the nearest data of sites (S, 2): numbers (S, m) into ``place`` (n, 2), and the number of each site, (S,).
+    """Return the nearest data of sites (S, 2): indices (S, m) into ``place`` (n, 2), and the count of each site, (S,).
 
-    At most ``most`` data count, and none farther away than ``reach``; of equals the first. Numbers past that of a site
-    mean nothing.
+    A site has at most ``most`` data, none farther away than ``reach``; of equally far data, the first. Indices beyond
+    the count of a site are meaningless.
     """
     squared = ((sites[:, None] - place[None]).astype(np.int64) ** 2).sum(-1)
     key = squared * len(place) + np.arange(len(place))
@@ -105,12 +105,12 @@ def given_data(
     nearest: int,
     bandwidth: float,
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float64]]]:
-    """Yield the LCPDF of sites given data alone, equations (6), (7) and (12): numbers of sites, and rows for these.
+    """Yield the LCPDF of sites given data alone, equations (6), (7) and (12): indices of sites, and a row for each.
 
-    A neighbour that is no datum has t = 1, and no weight. Each datum is compared at its own offset, so the sample's
-    margin is how far they reach. ``of`` (n,) is the kind of each candidate, 0 up, and a row holds the probability of
-    each kind and adds up to 1; ``sites`` (S, 2) row and column; ``bandwidth`` is h in units of h_opt, equation (8), for
-    as many data as the site has.
+    A neighbour without a datum has t = 1, and no weight. Each datum is compared at its own offset, so the margin of
+    ``sample`` limits the distance of data. ``of`` (n,) is the kind of each candidate, from 0; a row holds the
+    probability of each kind and adds up to 1. ``sites`` (S, 2) are rows and columns; ``bandwidth`` is h in units of
+    h_opt, equation (8), for the number of data of the site.
     """
     places = sample.places(np.zeros((1, 2), np.int32), 1)
     candidates = sample.candidates(machine, places)
@@ -119,7 +119,7 @@ def given_data(
     kind[0, places.positions] = of
     counted = candidates._replace(pixels=machine.put(kind))
     free = machine.put(np.zeros(candidates.positions.shape[0] + BLOCK, np.float32))
-    itself = machine.put(np.zeros((1, 2), np.int32))  # which is no neighbour
+    itself = machine.put(np.zeros((1, 2), np.int32))  # the offset of no neighbour
     step = max(1, min(machine.chunk(size, 1, sample.channels), AT_ONCE, PAIRS // kinds))
     together = max(1, PAIRS // max(1, len(data.place)))
     for first in range(0, len(sites), together):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why a site takes what it takes: one relaxation by the engine's own operations, with each of its terms kept.
+"""The explanation of a site's choice: one relaxation by the engine's own operations, with each of its terms.
 
 `explained` relaxes a site by the twins of the operations, from a copy of the field on the host, and changes nothing. So
-it serves a run that goes on (`simdtex.run.Relaxing.explain`) and one that is made for it (`simdtex.explain`) alike. A
-device has the twins' bits: what they take is what it takes.
+it serves both a run in progress (`simdtex.run.Relaxing.explain`) and a run that is made for the explanation
+(`simdtex.explain`). The twins have the device's bits, so both take the same candidate.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from simdtex.ops.neighbourhood import Field, gathered
 from simdtex.ops.relax import SUGGESTING, Everything, Relaxation, relax_apart
 
 MOST = 100
-"""Candidates whose terms are returned, the first by rank."""
+"""The most candidates whose terms are returned, the first by rank."""
 
 
 class Moment(NamedTuple):
     """A moment of a run, on the host.
 
-    ``level``, and ``sweep`` from 1; ``field`` before the relaxation; ``penalty`` of each candidate during the sweep;
-    ``turn`` the key of the random numbers.
+    ``level``; ``sweep``, from 1; ``field`` before the relaxation; ``penalty`` of each candidate during the sweep; and
+    ``turn``, the key of the random numbers.
     """
 
     level: int
@@ -42,9 +42,9 @@ class Moment(NamedTuple):
 
 
 def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanation:
-    """Return the relaxation of a site, (row, column) or (layer, row, column), at a moment.
+    """Return an explanation of the relaxation of a site, (row, column) or (layer, row, column), at a moment.
 
-    ``twin`` is the run's plan on the reference. Cost: a relaxation by the twins, some three times.
+    ``twin`` is the run's plan on the reference. Cost: about three relaxations by the twins.
     """
     level = twin.level(moment.level)
     pixel = np.array([pixel_of(twin, moment.level, site)], np.int32)
@@ -52,7 +52,7 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     choice, candidates = relaxation.choice, relaxation.proposal.candidates
 
     listed, found = relaxation.proposal.weighed(pixel, field, relaxation, moment.turn)
-    weighed = np.flatnonzero(np.isfinite(found.distance[:, 0]))  # others are no candidates
+    weighed = np.flatnonzero(np.isfinite(found.distance[:, 0]))  # the other slots have no candidate
     total, numbers = found.distance[weighed, 0], listed[weighed, 0]
     relaxed, cooled = relax_apart.reference(
         pixel, field, np.zeros(field.source.shape, np.int32), relaxation, moment.turn
@@ -111,7 +111,7 @@ def pixel_of(run: Lattices, number: int, site: tuple[int, ...]) -> int:
 def _terms(
     relaxation: Relaxation, pixel: NDArray[np.int32], field: Field, turn: int
 ) -> tuple[NDArray[np.float32], dict[str, NDArray[np.float32]]]:
-    """Return equation (12) without guides, and each cost by its name, of all candidates that are proposed, (slots,)."""
+    """Return equation (12) without guides, and each cost by its name, of all proposed candidates, (slots,)."""
     proposal, costs = relaxation.proposal, relaxation.costs
     bare = relaxation._replace(novelty=np.float32(0), costs=Costs(np.zeros_like(costs.penalty)))
 
@@ -125,7 +125,7 @@ def _terms(
     with np.errstate(invalid="ignore"):  # a slot without a candidate is infinitely far
         if guides := relaxation.confidences.guides:
             values = field.values.copy()
-            values[-guides:] = UNKNOWN  # which nothing is compared with
+            values[-guides:] = UNKNOWN  # so that guides count for nothing
             distance = weighed(field._replace(values=values), np.float32(1))
             terms["guide"] = whole - distance
         if relaxation.discount != 1:
@@ -140,7 +140,7 @@ def _terms(
 def _neighbours(
     twin: Lattices, relaxation: Relaxation, pixel: NDArray[np.int32], field: Field
 ) -> tuple[Neighbours, NDArray[np.int32]]:
-    """Return the neighbourhood of a site, and the candidate that continues each neighbour's source, if it counts."""
+    """Return the neighbourhood of a site, and the candidate that continues the source of each evaluated neighbour."""
     grid, sample, given = relaxation.grid, twin.sample, twin.plan.given
     r = grid.neighbours(pixel, relaxation.offsets)
     values, certain = gathered(pixel, r, field, relaxation.confidences)
@@ -172,7 +172,7 @@ def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.Ch
     rows = []
     for c, grey in enumerate(pixels):
         mass = np.zeros(choice.window.top + 1, np.uint64)
-        others = lcpdf.masses(weights, np.delete(pixels, c, 0), choice)  # what is drawn of them is legal, too
+        others = lcpdf.masses(weights, np.delete(pixels, c, 0), choice)  # whose drawn levels are legal, too
         np.add.at(mass, grey[:, 0].astype(np.int64), others[:, 0])
         rows.append(lcpdf.smoothed(mass, choice.window).astype(np.float64))
     return np.stack([row / row.sum() for row in rows])

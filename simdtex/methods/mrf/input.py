@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run of the method ``mrf`` is made from."""
+"""The input of a run of the method ``mrf``."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from simdtex.options import SMALLER
 
 @dataclass(frozen=True)
 class Input:
-    """What a run is made from, validated, on the host.
+    """The validated input of a run, on the host.
 
     ``sample`` is Y with its structure channel and guides, ``shape`` (rows, cols) or (layers, rows, cols) of X, the
     output, ``offsets`` (N, 2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1.
     ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels;
-    ``soft`` are soft data, and ``remedy`` what to do if the memory does not suffice.
+    ``soft`` are soft data, and ``remedy`` is the user's remedy if the memory does not suffice.
     """
 
     sample: Sample

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Algorithm 1 works on: the lattices of a run, and the state that goes from sweep to sweep."""
+"""The data of Algorithm 1: the lattices of a run, and the state that passes from sweep to sweep."""
 
 from __future__ import annotations
 
@@ -31,44 +31,44 @@ from simdtex.ops.use import FairUse
 from simdtex.schedules import Setting
 
 WHOLE = 256
-"""Candidates of a coarsest level whose neighbourhoods see much of the sample's layout; of more they see less."""
+"""Number of candidates of a coarsest level up to which neighbourhoods cover much of the sample's layout."""
 
 SMALL = 128
-"""Candidates of a coarsest level from which on novelty counts in full: of fewer hardly two are alike."""
+"""Number of candidates of a coarsest level from which novelty counts in full: among fewer, hardly two are alike."""
 
 FEWEST, WIDE = 32, 8
-"""Candidates of the coarsest level of a small sample at least, up to a spacing of so many pixels."""
+"""The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
 STRICT = 0.5
-"""lambda of the penalty of a category that is used more than it is to be."""
+"""lambda of the penalty of a category that is used more often than its share."""
 
 TOGETHER = 2**16
-"""Sites that one kernel relaxes between two looks at the clock."""
+"""Number of sites that one kernel relaxes between two checks of the clock."""
 
 
 class State(NamedTuple):
-    """All that a run needs to go on after a sweep: arrays and numbers.
+    """The state of a run after a sweep, as arrays and numbers: all that the run needs to continue.
 
     Attributes
     ----------
     values : (C, H, W) uint16 array of the machine
         Working grey levels x.
     source : (H, W) int32 array of the machine
-        The source map: pixel index in the sample, its margin included.
+        The source map: pixel indices in the sample, including its margin.
     temperature : (H, W) uint16 array of the machine
-        t in 1/1024.
+        t in units of 1/1024.
     penalty : (n,) float32 array
         Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`).
     schedule : tuple of arrays and numbers
         The schedule's own state.
     level : int
-        The present level, 0 the finest.
+        The current level, 0 the finest.
     cooling, free : int
-        Sweeps of the level done: while it cooled, and free ones.
+        Numbers of finished sweeps of the level: cooling sweeps, and free sweeps.
     active, temperature_sum : int
-        Active sites of the level, and the sum of their temperatures in 1/1024.
+        Active sites of the level, and the sum of their temperatures in units of 1/1024.
 
-    A sweep uses up the arrays of the machine.
+    A sweep overwrites the arrays of the machine.
     """
 
     values: Array
@@ -89,10 +89,10 @@ class State(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a step did.
+    """A description of a step.
 
-    ``level``; ``sweep`` the sweep of the level, from 1, or 0 if the step entered the level; ``chosen`` what the
-    schedule decided; ``ended`` whether the level ends with the step.
+    ``level``; ``sweep``, the sweep of the level, from 1, or 0 if the step entered the level; ``chosen``, the decisions
+    of the schedule; ``ended``, whether the level ends with the step.
     """
 
     level: int
@@ -104,8 +104,8 @@ class Info(NamedTuple):
 class Part(NamedTuple):
     """A part of a sweep.
 
-    ``steps`` of the schedule that have begun with it; ``sites`` that it has relaxed; ``last`` whether the sweep ends
-    with it; ``turn`` the key of its random numbers; ``field`` the arrays over sites.
+    ``steps``, the number of steps of the schedule that start with it; ``sites``, the number of relaxed sites; ``last``,
+    whether the sweep ends with it; ``turn``, the key of its random numbers; ``field``, the arrays over sites.
     """
 
     steps: int
@@ -116,11 +116,11 @@ class Part(NamedTuple):
 
 
 class Lattices:
-    """A plan on a machine: what stays the same throughout the run, and its levels.
+    """A plan on a machine: the constants of the run, and its levels.
 
     ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
     plan. ``planes`` are the sample's working levels on the machine, and ``weighed`` (H, W) counts the candidates that
-    each site of the whole has weighed.
+    each site of the whole has evaluated.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
@@ -138,8 +138,8 @@ class Lattices:
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
 
-        ``window`` is row and column of the first site, rows and columns of a window of the lattice; the state's arrays
-        then hold that alone, site by site. None: the whole lattice, in pictures of the output's size.
+        ``window`` is (first row, first column, rows, columns) of a window of the lattice; the arrays of the state then
+        hold only the sites of the window. None: the whole lattice, in pictures of the output's size.
         """
         if self._last is None or self._last.number != number:
             self._last = None  # the arrays of one level are enough to keep
@@ -147,7 +147,7 @@ class Lattices:
         return self._last if window is None else self._on(self._last, self.grid(number).window(*window))
 
     def _level(self, number: int) -> Level:
-        """Return a level without what depends on the window."""
+        """Return a level without its parts that depend on the window."""
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid, places = self.grid(number), self.places(number)
         coarsest, count = number == self.levels - 1, places.positions.size
@@ -180,7 +180,7 @@ class Lattices:
         return Level(setting, self.plan.schedule, relaxation, options.balance * self.usual, self.fair_use(number))
 
     def _on(self, level: Level, grid: Grid) -> Level:
-        """Return a level with what depends on the window, on a lattice or a window of it."""
+        """Return the level with the parts that depend on the window, for a lattice or a window of it."""
         machine, schedule, number, costs = self.machine, level.schedule, level.number, level.relaxation.costs
         costs = costs._replace(
             phased=costs.phased and costs.phased._replace(sites=self._phases(grid)),
@@ -205,7 +205,7 @@ class Lattices:
         return Kinds(self.machine.put(np.pad(those, ((0, 0), (0, TAIL)))), None)  # as many as `Phased` has
 
     def _soft(self, number: int, grid: Grid) -> Array:
-        """Return what each kind costs at the sites of a lattice, or of a window of it, (kinds, H, W)."""
+        """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, H, W)."""
         assert self.plan.soft
         found = self.plan.soft.costs(self.sample, 2**number, self.options.soft_weight * self.usual)
         planes = np.zeros((len(found), *grid.pixels), np.float32)
@@ -213,11 +213,11 @@ class Lattices:
         return self.machine.put(planes)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
-        """Return the phases of candidates of a regular sample, and how much they count; None of another."""
+        """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
         waves = self.sample.waves
         if not waves:
             return None
-        certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # what a guide counts there and at the site
+        certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
         step = 1 if self.options.phases == "all" else 2**number
         free = np.float32(round(float(certain) ** 2 * waves.half(step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
@@ -225,14 +225,14 @@ class Lattices:
         return Phased(self.machine.put(those), None, certain, free)
 
     def _phases(self, grid: Grid) -> Array:
-        """Return the phases (waves, H, W) of the output at the sites of a lattice, or of a window of it."""
+        """Return the phases (waves, H, W) of the output at the sites of a lattice or a window of it."""
         assert self.sample.waves
         planes = np.zeros((WAVES, grid.height, grid.width), np.uint16)
         grid.view(planes)[...] = self.sample.waves.at(grid)
         return self.machine.put(planes)
 
     def _scattered(self, number: int, grid: Grid) -> Scattered | None:
-        """Return the conditioning data between the sites of a lattice, or of a window of it; None if there are none."""
+        """Return the conditioning data between the sites of a lattice or a window of it; None if there are none."""
         data = self.conditions.scattered(number)
         if data is None:
             return None
@@ -247,17 +247,17 @@ class Lattices:
 
     @property
     def usual(self) -> float:
-        """N C sigma^2: half of what any two neighbourhoods differ by, on average."""
+        """N C sigma^2: half of the mean distance between two neighbourhoods."""
         return len(self.offsets) * self.sample.channels * self.sample.variance
 
     def exhaustive(self, number: int) -> bool:
-        """Return whether a site of a level weighs all its candidates."""
+        """Return whether a site of a level evaluates all its candidates."""
         if self.options.search == "exact" or number == self.levels - 1:
             return True
         return bool(self.places(number).positions.size <= EXHAUSTIVE)
 
     def fair_use(self, number: int) -> FairUse:
-        """Return where the candidates of a level lie, and how much use of each is fair."""
+        """Return the positions of the candidates of a level, and the fair use of each."""
         step = 2**number if self.options.phases == "all" else 1
         places = self.places(number)
         around, kinds = int(self.offsets[:, 1].max()) * step, None
@@ -274,7 +274,7 @@ class Lattices:
 
 @dataclass(frozen=True)
 class Level:
-    """What stays the same throughout a level.
+    """The constants of a level.
 
     Attributes
     ----------
@@ -282,19 +282,19 @@ class Level:
         The input of its schedule.
     schedule : simdtex.schedules.Schedule
     relaxation : simdtex.ops.relax.Relaxation
-        How its sites relax, but for the penalty of each candidate, which changes with every sweep.
+        The relaxation of its sites, except for the penalty of each candidate, which changes with every sweep.
     rate : float
-        lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
+        lambda N C sigma^2: the cost of a candidate whose surroundings are used twice as often as their share.
     fair_use : simdtex.ops.use.FairUse
-        Where the candidates lie, and how much of each is fair.
+        The positions of the candidates, and the fair use of each.
     in_place : bool
-        Whether the sites of a step may be written while others of it are read: none is another's neighbour.
+        Whether sites of a step may be written while other sites of it are read: no two are neighbours.
     weighed : (H, W) int32 array of the machine
-        Counts the candidates that each site has weighed.
+        The number of candidates that each site has evaluated.
     movable : (H, W) uint16 array of the machine, optional
-        0 at sites whose values are given, which free sweeps leave alone. None: every site may relax.
+        0 at sites with given values, which free sweeps do not change. None: every site may relax.
     lists : dict
-        The schedule's lists of sites as the machine holds them: each is put there once.
+        The schedule's lists of sites on the machine: each is copied there once.
     """
 
     setting: Setting
@@ -319,23 +319,23 @@ class Level:
 
     @property
     def proposal(self) -> Everything | Listed:
-        """Which candidates a site weighs."""
+        """The candidates that a site evaluates."""
         return self.relaxation.proposal
 
     @property
     def machine(self) -> Machine:
-        """What executes the steps."""
+        """The machine that executes the steps."""
         return self.setting.machine
 
     @property
     def work(self) -> int:
-        """Fma of a relaxation at most: 2 for every candidate, neighbour and channel."""
+        """The most fma of a relaxation: 2 for every candidate, neighbour and channel."""
         channels = self.proposal.candidates.pixels.shape[0]
         return 2 * self.proposal.slots * len(self.setting.offsets) * int(channels)
 
     @property
     def at_once(self) -> int:
-        """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
+        """The most sites that are relaxed between two checks of the clock; scratch memory limits it."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
         stores = self.relaxation.choice.draws or self.relaxation.confidences.own
         stores = stores and isinstance(self.proposal, Everything)
@@ -344,13 +344,13 @@ class Level:
 
 
 def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
-    """Return how a site of the level relaxes in a sweep, with this penalty (n,) of each candidate."""
+    """Return the relaxation of the level in a sweep, with the penalty (n,) of each candidate."""
     padded = level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK)))
     return level.relaxation._replace(costs=level.relaxation.costs._replace(penalty=padded))
 
 
 class Active:
-    """The active sites: those warmer than 0 or, in a free sweep, all that are not known.
+    """The active sites: those with a temperature above 0 or, in a free sweep, all that are not known.
 
     Parameters
     ----------
@@ -364,19 +364,19 @@ class Active:
         self._plane = level.movable if free else temperature  # above 0 at active sites; None: all are active
 
     def mask(self) -> NDArray[np.bool_]:
-        """Read back from the machine."""
+        """Return the mask of active sites, read back from the machine."""
         grid = self._level.grid
         if self._plane is None:
             return np.ones(grid.shape, bool)
         return np.asarray(grid.view(self._level.machine.get(self._plane)) > 0)
 
     def numbers(self) -> NDArray[np.int64]:
-        """Read back from the machine."""
+        """Return the numbers of active sites, read back from the machine."""
         grid = self._level.grid
         return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Found on the machine."""
+        """Return the active sites of a list, found on the machine."""
         known, machine = self._level.lists, self._level.machine
         if id(sites) not in known:
             begins, firsts = active.stretches(starts)
@@ -388,10 +388,10 @@ class Active:
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:
-    """Yield steps in parts of ``most`` sites or fewer: ranges, steps that have begun, and whether it is the last part.
+    """Yield parts of at most ``most`` sites: their ranges, the number of steps started, and whether it is the last.
 
-    ``ranges`` (steps, 2) say where each step's sites begin and end in a list. A step of more sites is cut; several
-    steps of fewer go together.
+    ``ranges`` (steps, 2) are the begin and the end of each step's sites in a list. A step of more sites is cut; several
+    short steps form one part.
     """
     held: list[tuple[int, int]] = []
     sites = begun = 0
@@ -409,9 +409,9 @@ def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int
 def number_of_levels(
     samples: Sequence[tuple[int, ...]], offsets: NDArray[np.int32], shape: tuple[int, ...], options: Options
 ) -> int:
-    """M, checked against the sides of the sample's pictures and against M <= 1 + log2(min(Mx, My)).
+    """Return M, checked against the sides of the sample's pictures and against M <= 1 + log2(min(Mx, My)).
 
-    The layers of a volume may be fewer than a coarse level is wide: its rows and columns alone count.
+    The number of layers of a volume does not limit M: only its rows and columns do.
     """
     radius = int(offsets[:, 1].max())
     for sample in samples:
@@ -442,7 +442,7 @@ def number_of_levels(
 
 
 def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
-    """Raise unless the sample holds one whole neighbourhood at least."""
+    """Raise ValueError unless the sample holds at least one whole neighbourhood."""
     side = min(sample)
     if side > 2 * radius:
         return

@@ -29,20 +29,20 @@ from simdtex.ops.finish import around
 from simdtex.options import within_32_bits
 
 LABELS = 64
-"""The most labels of a guide: each is a channel."""
+"""The most labels of a guide; each label is a channel."""
 
 
 class Plan(Input):
     """A run of the method ``mrf`` before it has a machine and a seed."""
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Lay the plan out on a machine; raise if its memory does not suffice.
+        """Return the run of the plan on a machine; raise if its memory does not suffice.
 
         Notes
         -----
         Memory on the device, in bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``),
-        14 channels + 159 per pixel of the sample with its margin, and the machine's scratch memory or, if
-        that is more, 65 per candidate. On the host, which includes a CPU's device memory: 84 per output pixel (100
+        14 channels + 159 per pixel of the sample with its margin, and the larger of the machine's scratch memory and
+        65 per candidate. On the host, which includes a CPU's device memory: 84 per output pixel (100
         with ``block``) and 10 + 1.5 n for each of its channels, n the bytes of a value of the sample, and 64 per pixel
         of the sample (benchmarks/memory.py). Soft data: 4 per output pixel and kind on the device, and 32 on the host.
         """
@@ -66,7 +66,7 @@ def plan(
     most: int | None = None,
     soft: Soft | None = None,
 ) -> Plan:
-    """Validate the input of a run, and lay its sample out.
+    """Return the plan of a run, with its input validated and its sample in working levels.
 
     Parameters
     ----------
@@ -78,11 +78,11 @@ def plan(
     given : Given, optional
         Conditioning data of X.
     guide : GuidePair or Surroundings, optional
-        Which label, number or colour belongs where in Y and in X.
+        The label, number or colour at each place of Y and of X.
     most : int, optional
-        The most levels, if the options leave their number open.
+        The largest number of levels if the option ``levels`` is None.
     soft : Soft, optional
-        Which category, and which picture of Y, is how probable where in X.
+        The probability of each category, and of each picture of Y, at each site of X.
     """
     pictures = options.of(pictures)
     check_categories(pictures, given, options.proportions)
@@ -91,7 +91,7 @@ def plan(
         check_volume(pictures, options, guide)
     offsets = neighbourhood_offsets(options.order, len(shape))
     sides = [picture.shape[:-1] for picture in pictures.pixels]
-    if soft and soft.images is not None:  # each picture has to do for the sites that it is wanted at
+    if soft and soft.images is not None:  # each picture must serve the sites that it is probable at
         pictures, sides = replace(pictures, shares=soft.shares), [min(sides, key=min)]
     levels = number_of_levels(sides, offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
@@ -123,7 +123,7 @@ def sampled(
     guides: Sequence[AnyGuide],
     regular: Phases | None,
 ) -> tuple[int, Sample]:
-    """Return the number of levels and the sample: fewer levels if one has no candidate and their number is open."""
+    """Return the number of levels and the sample; if ``options.levels`` is None, every level has a candidate."""
     far = int(around(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
@@ -141,7 +141,7 @@ def sampled(
 
 
 def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surroundings | None) -> None:
-    """Raise if a volume is asked for what only pictures have."""
+    """Raise if a volume has a guide or an option that only pictures support."""
     if len(pictures.pixels) > 1:
         raise ValueError("several samples are pictures; give one volume")
     flat = {
@@ -156,7 +156,7 @@ def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surrou
 
 
 def check_categories(pictures: Pictures, given: Given | None, proportions: Sequence[float] | None = None) -> None:
-    """Raise if a known value or a proportion is of a category that the sample lacks."""
+    """Raise if a known value or a proportion refers to a category that the sample lacks."""
     for variable in range(pictures.pixels[0].shape[-1]):
         categories = pictures.categories(variable)
         if categories is None:
@@ -184,7 +184,7 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
 
 
 def check_guide(guide: GuidePair, options: Options) -> Guide:
-    """Return the guide with its kind and weight; raise if it asks for a label that the sample lacks."""
+    """Return the guide with its kind and weight; raise if the output has a label that the sample lacks."""
     if options.pixel == "density":
         raise ValueError('a guide chooses among pixels of the sample; give pixel="source"')
     samples, output = guide

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What watches a run of Algorithm 1: progress, counts, stages, and what the run would cost on a processor array."""
+"""The observer of a run of Algorithm 1: progress, counts, stages, and the cost of the run on a processor array."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from simdtex.run import Callback, Output, Relaxing, Stage
 
 
 class Record:
-    """Sees every part and every end of a sweep, and changes nothing.
+    """The observer of a run: it receives every part and every end of a sweep, and changes nothing.
 
     ``callback`` is called with a `simdtex.run.Relaxing` after every part of a sweep. ``stages`` holds each level's
-    picture at its end, ``reports`` the counts of each level (`simdtex.run.Output`), and ``launches`` the kernels that
-    the machine had launched before the run.
+    picture at its end, ``reports`` the counts of each level (`simdtex.run.Output`), and ``launches`` the number of
+    kernels that the machine had launched before the run.
     """
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
@@ -44,12 +44,12 @@ class Record:
         self._run, self._callback = run, callback
         self._expected = expected_work(run)
         self._fraction = 0.0
-        self._began, self._first_left = time.perf_counter(), 0.0  # of the present level
-        self._slots, self._listed = 0, False  # candidates that a relaxation weighs; whether they are listed
-        self._done = 0  # sites of the present sweep that are relaxed
+        self._began, self._first_left = time.perf_counter(), 0.0  # of the current level
+        self._slots, self._listed = 0, False  # candidates that a relaxation evaluates; whether they are listed
+        self._done = 0  # relaxed sites of the current sweep
         self._ended = True  # the next part begins a sweep
         self._skipped = self._weighed = 0
-        self._twin: Lattices | None = None  # the plan on the reference, for what asks for an explanation
+        self._twin: Lattices | None = None  # the plan on the reference, for explanations
 
     def part(self, level: Level, state: State, part: Part) -> None:
         """Count a part of a sweep, and report it to the callback."""
@@ -85,16 +85,16 @@ class Record:
             )
 
     def _explain(self, level: Level, state: State, part: Part, *site: int) -> Explanation:
-        """Return how a site of the level would relax now."""
+        """Return an explanation of how a site of the level would relax now."""
         if self._twin is None:
             self._twin = Lattices(self._run.plan, Reference(), self._run.seed)
         field, sweep = Field(*map(self._run.machine.get, part.field)), state.cooling + state.free + 1
         return explained(self._twin, Moment(level.number, sweep, field, state.penalty, part.turn), site)
 
     def _advance(self, level: int, state: State, left: float, share: float) -> None:
-        """Estimate the share of the run that is done, once ``share`` of a sweep is, begun at this mean temperature.
+        """Estimate the finished share of the run after ``share`` of a sweep that started at mean temperature ``left``.
 
-        The share of a level's cooling that is done is about 1 - sqrt(t / t_0); a sweep cools by about a tenth.
+        The finished share of a level's cooling is about 1 - sqrt(t / t_0); a sweep cools by about a tenth.
         """
         cooled, free = 1.0, 0.0
         if state.active:
@@ -105,7 +105,7 @@ class Record:
         self._fraction = max(self._fraction, fraction_done(self._expected, level, cooled, free))
 
     def step(self, state: State, info: Info) -> None:
-        """Count what a sweep would cost on an array; at a level's end, keep its picture."""
+        """Count the cost of a sweep on a processor array; at the end of a level, keep its picture."""
         machine = self._run.machine
         if self.account:
             for chosen in info.chosen:
@@ -117,20 +117,20 @@ class Record:
             if self._listed:
                 before, self._weighed = self._weighed, self._total()
                 weighed = self._weighed - before
-                report["weighed"] = weighed / max(1, report["relaxations"])  # of none, if all of the level is known
+                report["weighed"] = weighed / max(1, report["relaxations"])  # 0 if the whole level is known
                 report["fma"] += weighed * (level.work // level.proposal.slots)
             report["skipped"] = machine.spared - self._skipped
             report["seconds"] = time.perf_counter() - self._began
 
     def _total(self) -> int:
-        """Return how many candidates all sites have weighed so far, if the level weighs listed ones."""
+        """Return the number of candidates that all sites have evaluated so far, if the level lists candidates."""
         if not self._listed:
             return self._weighed
         weighed = self._run.grid(self.reports[-1]["level"]).view(self._run.machine.get(self._run.weighed))
         return int(weighed.sum(dtype=np.int64))
 
     def _begin(self, level: Level) -> None:
-        """Begin the report of a level."""
+        """Start the report of a level."""
         self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
         self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, Listed)
         grid, candidates = level.grid, level.proposal.candidates.size
@@ -143,7 +143,7 @@ class Record:
             self.account.begin(grid, self._slots)
 
     def save(self) -> dict[str, Any]:
-        """Return all that was seen, as plain arrays and numbers."""
+        """Return everything received so far, as plain arrays and numbers."""
         return {
             "stages": [(stage.level, stage.image) for stage in self.stages],
             **{"reports": self.reports, "account": self.account and self.account.total, "fraction": self._fraction},
@@ -153,7 +153,7 @@ class Record:
         }
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Go on from what `save` returned."""
+        """Continue from the tree that `save` returned."""
         self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
         self.reports, self._fraction, self._first_left = saved["reports"], saved["fraction"], saved["first_left"]
         self._slots, self._listed = saved["slots"], saved["listed"]
@@ -189,28 +189,28 @@ def known_before(run: Lattices) -> dict[str, Any]:
 
 
 def picture(run: Lattices, grid: Grid, field: Field) -> NDArray[Any]:
-    """Read back the picture of a level, in the sample's type."""
+    """Return the picture of a level, read back, in the sample's type."""
     values, source = run.machine.get(field.values), run.machine.get(field.source)
     found = run.sample.picture(grid.view(values), grid.view(source))
     return run.plan.given.shown(found, grid) if run.plan.given else found
 
 
 def temperatures(run: Lattices, grid: Grid, field: Field) -> NDArray[np.float64]:
-    """Read back the temperatures of a level, 0 to 1."""
+    """Return the temperatures of a level, read back, 0 to 1."""
     found: NDArray[np.float64] = np.ascontiguousarray(grid.view(run.machine.get(field.temperature))) / np.float64(1024)
     return found
 
 
 def sources(run: Lattices, grid: Grid, field: Field) -> NDArray[np.int32]:
-    """Read back where in the sample each site of a level is from, (rows, cols, 2 or 3)."""
+    """Return the source map of a level, read back: the position in the sample of each site, (rows, cols, 2 or 3)."""
     return run.sample.place(grid.view(run.machine.get(field.source)))
 
 
 def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
-    """Return the relaxations times candidates that cooling and free sweeps of each level should take.
+    """Return the expected product of relaxations and candidates of each level, for its cooling and its free sweeps.
 
-    As measured at xi = -1, the coarsest level takes about 0.6 |N| sweeps, and the others relax each of their new sites
-    about 6 times.
+    Measured at xi = -1: the coarsest level takes about 0.6 |N| sweeps, and every other level relaxes each of its new
+    sites about 6 times.
     """
     work = {}
     for number in range(run.levels):
@@ -226,7 +226,7 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
 
 
 def fraction_done(expected: dict[int, tuple[float, float]], level: int, cooled: float, free: float) -> float:
-    """Return the share of the expected work that is done at these shares of a level's cooling and free sweeps."""
+    """Return the finished share of the expected work, at the shares ``cooled`` and ``free`` of a level's sweeps."""
     cooling, sweeps = expected[level]
     before = sum(sum(work) for number, work in expected.items() if number > level)
     return min(1.0, (before + cooling * cooled + sweeps * free) / sum(map(sum, expected.values())))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run of Algorithm 1 that can be looked at after any set of sites that relax together."""
+"""A replay of a run of Algorithm 1: its field after any set of sites that relax together."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from simdtex.model.explanation import Explanation
 from simdtex.ops.neighbourhood import Field
 
 KEPT = 2**28
-"""Bytes of the states that a replay keeps, at most; what is not kept is computed again."""
+"""The most bytes of the states that a replay keeps; all other states are recomputed."""
 
 
 class Sweep(NamedTuple):
@@ -32,11 +32,11 @@ class Sweep(NamedTuple):
     level : int
         0 is the finest.
     sweep : int
-        Its number on the level, from 1.
+        The number of the sweep on its level, from 1.
     sets : int
-        How many sets of sites relax one after another.
+        The number of sets of sites, which relax one after another.
     sites : int
-        How many sites relax.
+        The number of sites that relax.
     temperature : float
         Mean temperature of the level before the sweep, 0 to 1.
     """
@@ -61,9 +61,9 @@ class Instant:
     source : (rows, cols, 2 or 3) int32 array
         Source map, as in `simdtex.Output.source`.
     temperature : (rows, cols) float64 array
-        0 to 1.
+        Temperatures, 0 to 1.
     relaxed : (rows, cols) uint8 array
-        2 for the sites of the last set, 1 for those that have relaxed earlier in the sweep, 0 for all others.
+        2 for the sites of the last set, 1 for sites that have relaxed earlier in the sweep, 0 for all others.
     """
 
     level: int
@@ -74,25 +74,26 @@ class Instant:
 
 
 class Played(NamedTuple):
-    """A part of a sweep: its sites after it, and what the schedule has decided, the sites on the host."""
+    """A part of a sweep: the field after it, and the decisions of the schedule, with their sites on the host."""
 
     field: Field
     decided: list[schedules.Info]
 
 
 class Replay:
-    """A run of the method ``mrf`` that can be looked at after any set of sites that relax together.
+    """A replay of a run of the method ``mrf``: its field after any set of sites that relax together.
 
-    `simdtex.replay` makes one. Sweeps are numbered from 0 over all levels, the coarsest level first.
+    `simdtex.replay` returns one. Sweeps are numbered from 0 over all levels, the coarsest level first.
 
     Notes
     -----
-    The run is made once, as far as it is asked for, and a copy of the state before each sweep goes to the host: 6 bytes
-    per site and 2 for each channel, `KEPT` bytes at most. `at` and `explain` start from the nearest state before.
+    The run is executed once, up to the last sweep that a call needs. The host keeps a copy of the state before each
+    sweep: 6 bytes per site, and 2 for each of its channels, 256 MiB at most. `at` and the explanations start from the
+    nearest earlier state.
     """
 
     origin = (0, 0)
-    """Where the lattice begins in the output, pixels."""
+    """The first row and column of the lattice in the output, pixels."""
 
     def __init__(self, plan: Plan, machine: Machine, seed: int, kept: int = KEPT) -> None:
         self._run, self._twin = plan.on(machine, seed), Lattices(plan, Reference(), seed)
@@ -109,7 +110,7 @@ class Replay:
         return self._sweeps
 
     def at(self, sweep: int, sets: int | None = None) -> Instant:
-        """Return the field after so many sets of a sweep; None: after all of it. Negative sweeps count from the end."""
+        """Return the field after the first ``sets`` sets of a sweep, None: all. Negative sweeps count from the end."""
         sweep = range(len(self.sweeps))[sweep]
         played = self._play(sweep, sets)
         level = self._sweeps[sweep].level
@@ -125,10 +126,10 @@ class Replay:
         return Instant(level, *seen, grid.view(done))
 
     def explain(self, site: tuple[int, ...], level: int = 0, sweep: int | None = None) -> Explanation:
-        """Return why a site of a level took its value in a sweep of the level, from 1.
+        """Return an explanation of the value that a site of a level took in a sweep of the level.
 
-        None: in the last sweep in which it relaxes. Raises ValueError if there is no such site or level, or if the site
-        does not relax there.
+        ``sweep`` counts from 1; None is the last sweep in which the site relaxes. Raises ValueError if there is no such
+        site or level, or if the site does not relax there.
         """
         if not 0 <= level < self._run.levels:
             raise ValueError(
@@ -147,10 +148,10 @@ class Replay:
         )
 
     def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
-        """Return why a pixel of the output had its value after so many sets of a sweep.
+        """Return an explanation of the value of an output pixel after the first ``sets`` sets of a sweep, None: all.
 
-        It is the last relaxation until then: on the sweep's level or, if the pixel has kept its value since, on a level
-        above. Raises ValueError if there was none: the pixel's value is known, or it was drawn at random at the start.
+        It explains the last relaxation until then: on the sweep's level or, if the pixel has kept its value since, on a
+        level above. Raises ValueError if there was none: the value is known, or was drawn at random at the start.
         """
         sweep = range(len(self.sweeps))[sweep]
         limits: dict[int, int | None] = {sweep: sets}
@@ -160,7 +161,7 @@ class Replay:
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
                     return explained(self._twin, moment, (row, col))
-            if row % 2 or col % 2:  # which is no site of the level above
+            if row % 2 or col % 2:  # no site of the level above
                 break
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
@@ -198,7 +199,7 @@ class Replay:
         return state
 
     def _play(self, number: int, sets: int | None) -> Played:
-        """Run so many sets of a sweep; None: all."""
+        """Run the first ``sets`` sets of a sweep, None: all; return the field and the decisions of the schedule."""
         state, machine = self._before(number), self._run.machine
         level, left = self._run.level(state.level), self._sweeps[number].sets if sets is None else sets
         field, memory = exchanged(level, state.field), state.schedule
@@ -216,7 +217,7 @@ class Replay:
         return Played(field, decided)
 
     def _moment(self, number: int, pixel: int, sets: int | None = None) -> Moment | None:
-        """Return the last moment at which a site relaxes within so many sets of a sweep; None if it does not."""
+        """Return the last moment at which a site relaxes in the first ``sets`` sets of a sweep; None without any."""
         found, done = None, 0
         for info in self._play(number, sets).decided:
             for place in np.flatnonzero(info.sites == pixel):

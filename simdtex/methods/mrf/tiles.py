@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A tile of a level: relaxed in a window that is larger by the reach of a sweep, it has the bits of the whole.
+"""A tile of a level, relaxed in a window that is larger by the reach of a sweep, so that it has the bits of the whole.
 
 Input and output are NumPy arrays over the sites of a lattice, so any process can compute any tile.
 """
@@ -24,7 +24,7 @@ from simdtex.schedules.schedule import Trimmed
 
 
 class Tile(NamedTuple):
-    """The first row and column of a tile in its lattice, its rows and its columns; or a window's."""
+    """A tile or a window of a lattice: its first row and column, and its numbers of rows and columns."""
 
     top: int
     left: int
@@ -33,7 +33,7 @@ class Tile(NamedTuple):
 
 
 class Framed(NamedTuple):
-    """A tile in a window of its lattice: the window, and where in it the tile lies."""
+    """A tile in a window of its lattice: the window, and the tile's rows and columns in the window."""
 
     window: Tile
     rows: slice
@@ -47,7 +47,8 @@ class Framed(NamedTuple):
 class Tally(NamedTuple):
     """Counts of a tile's sites, which add up over tiles.
 
-    ``counts`` (n,) how often each candidate is used; ``active`` sites; ``temperature_sum`` in 1/1024.
+    ``counts`` (n,), the number of uses of each candidate; ``active``, the number of active sites; ``temperature_sum``,
+    the sum of temperatures in units of 1/1024.
     """
 
     counts: NDArray[Any]
@@ -56,13 +57,13 @@ class Tally(NamedTuple):
 
 
 def together(tallies: Sequence[Tally]) -> Tally:
-    """Return the sum of counts of several tiles."""
+    """Return the sum of several tallies."""
     counts = np.stack([one.counts for one in tallies]).sum(0)
     return Tally(counts, sum(one.active for one in tallies), sum(one.temperature_sum for one in tallies))
 
 
 def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
-    """Return a tile in the window that holds it and all sites of the lattice within a halo."""
+    """Return a tile in the window that holds it and all sites of the lattice within ``halo`` sites of it."""
     sides = []
     for first, size, whole in ((tile.top, tile.rows, lattice.rows), (tile.left, tile.cols, lattice.cols)):
         if size + 2 * halo >= whole:
@@ -79,7 +80,8 @@ def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
 def entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
     """Return a tile at the beginning of its level: steps 2 and 5 of Algorithm 1, and the sites of the level above.
 
-    ``above`` are the sites of the level above that lie in the tile; None at the coarsest level.
+    ``above`` are the sites of the level above in the tile; None at the coarsest level. Returns the field of the tile,
+    and its tally.
     """
     level, field = _entered(run, number, tile, above)
     return _off(run.machine, field), _tally(level, field, level.grid)
@@ -98,16 +100,16 @@ def whole(run: Run, number: int, above: Field | None) -> Field:
 def relaxed(
     run: Run, number: int, tile: Tile, frame: Framed, field: Field, penalty: NDArray[np.float32], done: int, free: bool
 ) -> tuple[Field, Tally]:
-    """Return a tile after a sweep.
+    """Return a tile after a sweep, and its tally.
 
-    ``frame`` is its window with a halo as deep as the sweep reaches, ``field`` the sites of the window before the
-    sweep, ``penalty`` (n,) that of the candidates during it, ``done`` the sweeps of the level before it, and ``free``
-    whether it is a free one.
+    ``frame`` is the tile in a window with a halo of the reach of the sweep, ``field`` the sites of the window before
+    the sweep, ``penalty`` (n,) the penalty of each candidate, ``done`` the number of earlier sweeps of the level, and
+    ``free`` whether it is a free sweep.
     """
     machine, level = run.machine, run.level(number, frame.window)
-    if frame.window.rows < run.grid(number).rows:  # else rows wrap around, and none is far away
+    if frame.window.rows < run.grid(number).rows:  # otherwise rows wrap around, and all are near
         level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
-    memory = level.schedule.init(level.setting)._replace(sweep=done)  # all that its state carries over
+    memory = level.schedule.init(level.setting)._replace(sweep=done)  # the only part of the state that persists
     state = State(*Field(*map(machine.put, field)), penalty, memory, number)
     found, *_ = swept(level, state, free)
     inside = Field(*map(frame.cut, _off(machine, found)))

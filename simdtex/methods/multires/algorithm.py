@@ -36,7 +36,7 @@ from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, paced
 
 VALUES = 4
-"""Values for each pixel of an output that kernels number: two counts, all levels together."""
+"""The most values per output pixel that kernels index: two counts, with all levels together."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Plan:
         Rows and columns of the output.
     options : Options
     analysis : Analysis, optional
-        Of the sample, made on the same machine with the same options; None: `on` makes it.
+        The analysis of the sample, made on the same machine with the same options; None: `on` makes it.
     """
 
     sample: NDArray[Any]
@@ -59,7 +59,7 @@ class Plan:
     analysis: Analysis | None = None
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Analyse the sample on a machine, the first phase of the paper; raise if the memory does not suffice."""
+        """Return the run on a machine after the first phase of the paper; raise if the memory does not suffice."""
         channels, size = self.sample.shape[-1], self.sample.dtype.itemsize
         within_32_bits(self.shape, max(VALUES, channels))  # before any work
         memory.require_host(_on_host(self.shape, channels, size))
@@ -70,8 +70,8 @@ class Plan:
 class State(NamedTuple):
     """The state between two launches.
 
-    ``level`` that is sampled now, ``done`` pixels of it that are;
-    ``source``, ``counts`` of all levels, as of `simdtex.ops.candidates.Sampled`; ``picture`` G of the level above.
+    ``level``, the current level; ``done``, its number of sampled pixels; ``source`` and ``counts`` of all levels, as in
+    `simdtex.ops.candidates.Sampled`; ``picture``, G of the level above.
     """
 
     level: int
@@ -82,7 +82,7 @@ class State(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a step did: ``done`` pixels of a ``level`` are sampled; at its end, its ``stage`` and ``counts``."""
+    """A description of a step: ``done`` pixels of a ``level`` are sampled; at its end, its ``stage`` and ``counts``."""
 
     level: int
     done: int
@@ -112,18 +112,18 @@ class Run:
         self._launches: Iterator[tuple[int, int]] = iter(())
 
     def begin(self) -> State:
-        """Return the state whose top level is the sample's, copied and repeated."""
+        """Return the first state, whose top level is that of the sample, copied and repeated."""
         top = self.analysis.levels - 1
         sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
         return self._prepared(State(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
 
     def _prepared(self, state: State) -> State:
-        """Return the state, once what launches need is ready."""
+        """Return the state, after preparing the input of launches."""
         self._structure = structure_of(self.machine, self.analysis, self.options)
         return self._entered(state)
 
     def _entered(self, state: State) -> State:
-        """Return the state, once the launches of its level are planned."""
+        """Return the state, after planning the launches of its level."""
         if 0 <= state.level < self.analysis.levels - 1:
             count, least = pixels([self.shapes[state.level]]), first_launch(self.analysis, state.level)
             self._launches = paced(count, least, state.done)
@@ -185,7 +185,7 @@ class Run:
         return self._prepared(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
 
     def observer(self, callback: Callback | None) -> Record:
-        """Return what watches this run."""
+        """Return the observer of this run."""
         return Record(self, callback)
 
 
@@ -201,10 +201,10 @@ class Record:
         self._run, self._callback, self._began = run, callback, perf_counter()
 
     def part(self, *seen: Any) -> None:
-        """See nothing: steps are short."""
+        """Do nothing, since steps are short."""
 
     def step(self, state: State, info: Info) -> None:
-        """Report the pixels that are sampled; at a level's end, keep its stage and report it."""
+        """Report the sampled pixels; at the end of a level, keep its stage and report it."""
         if info.stage is not None and info.counts is not None:
             self._end(info.stage, info.counts)
         if self._callback:
@@ -230,12 +230,12 @@ class Record:
         self._began = perf_counter()
 
     def save(self) -> dict[str, Any]:
-        """Return all that was seen, as plain arrays and numbers."""
+        """Return everything received so far, as plain arrays and numbers."""
         stages = [tuple(vars(stage).values()) for stage in self.stages]
         return {"stages": stages, "reports": self.reports, "seconds": perf_counter() - self._began}
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Go on from what `save` returned."""
+        """Continue from the tree that `save` returned."""
         self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
         self.reports[:] = saved["reports"]
         self._began = perf_counter() - saved["seconds"]
@@ -252,10 +252,10 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
 
 
 def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:
-    """Bytes on the host of an output with its stages."""
+    """Return the bytes on the host of an output with its stages."""
     return prod(shape) * (66 + channels * (4 + itemsize))
 
 
 def _held(analysis: Analysis) -> int:
-    """Bytes of an analysis on the device."""
+    """Return the bytes of an analysis on the device."""
     return 4 * (pixels(analysis.shapes) * len(analysis.sample.planes) + int(prod(analysis.features.shape)))

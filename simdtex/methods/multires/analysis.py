@@ -40,7 +40,7 @@ class Analysis:
     torus : bool
         Whether pyramids wrap around.
     place : (rows, cols) int array
-        Number of the pixel of the given sample that stands there; another one where the sample is mended.
+        Number of the sample's pixel at each place; a different pixel where the edges are repaired.
     """
 
     sample: Stretched
@@ -53,7 +53,7 @@ class Analysis:
 
     @property
     def levels(self) -> int:
-        """Of the pyramid, with the residue."""
+        """Number of levels of the pyramid, with the residue."""
         return len(self.shapes)
 
 
@@ -67,7 +67,7 @@ def pyramid(machine: Machine, picture: Array, levels: int, torus: bool) -> tuple
     levels : int
         1 or more.
     torus : bool
-        Whether the picture wraps around, or continues as in a mirror.
+        Whether the picture wraps around, or continues as its mirror image.
 
     Returns
     -------
@@ -98,13 +98,13 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
     Raises
     ------
     ValueError
-        More levels than the sample has, or a sample of 2**31 values or more.
+        There are more levels than the sample has, or the sample has 2**31 values or more.
 
     Notes
     -----
     Cost: 45 multiply-adds for every pixel and channel, and 3 for every pixel and filter. Memory on the device: 16 bytes
-    for every pixel and channel (and luminance, if there are several channels), 3 for every pixel and feature.
-    `simdtex.methods.multires.mend.mend` says what mending takes.
+    for every pixel and channel (and luminance, if there are several channels), 3 for every pixel and feature. For the
+    repair of edges see `simdtex.methods.multires.mend.mend`.
     """
     rows, cols, channels = pixels.shape
     width = 1 + 2 * options.orientations
@@ -142,7 +142,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
 
 
 def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int, int]]:
-    """Return rows and columns of every level, down to a single pixel or to so many levels."""
+    """Return rows and columns of every level, down to a single pixel or to ``levels`` levels."""
     shapes = [(shape[0], shape[1])]
     while max(shapes[-1]) > 1:
         shapes.append(half(shapes[-1]))
@@ -155,7 +155,7 @@ def _energy(features: NDArray[np.int32], about_mean: bool = False) -> NDArray[np
     """Return Z (M,): the mean square of each column, or its variance, from sums in integers."""
     n = len(features)
     squares, total = np.zeros((2, features.shape[1]), object)
-    for first in range(0, n, 2**20):  # the sum of so many squares fits 64 bits
+    for first in range(0, n, 2**20):  # the sum of that many squares fits 64 bits
         block = features[first : first + 2**20].astype(np.int64)
         squares += (block * block).sum(0).astype(object)
         total += block.sum(0).astype(object)

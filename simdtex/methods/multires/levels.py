@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Levels while they are sampled: their thresholds, their structure, and where their pixels are from."""
+"""Levels during sampling: their thresholds, their structure, and the sources of their pixels."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ ANY = 2**32 - 1
 """The threshold that every difference passes."""
 
 LAUNCH = 4e8
-"""Comparisons that the first launch of a level may take if no node fails."""
+"""The most comparisons of the first launch of a level, if no node fails."""
 
 
 def thresholds(levels: int, alpha: float, beta: float) -> NDArray[np.float64]:
     """Return T of every level (levels,), the finest first: alpha / k**beta (13), k = 1 at the top."""
     k = np.arange(levels, 0, -1, dtype=np.float64)
     with np.errstate(over="ignore"):
-        divisor = (k ** float(beta)).astype(np.float32)  # so that the last bit of a libm does not show
+        divisor = (k ** float(beta)).astype(np.float32)  # so that the last bit of a libm does not matter
     return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
 
 
@@ -48,25 +48,25 @@ def first_launch(analysis: Analysis, level: int) -> int:
 
 
 def lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
-    """Return the lattices of `Structure` and `Sampled`: levels one after another, from one of them on."""
+    """Return the lattices of `Structure` and `Sampled`: levels one after another, from level ``first`` on."""
     begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
     ragged = [sum((n % 2**level > 0) << axis for axis, n in enumerate(shapes[0])) for level in range(len(shapes))]
     return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
 
 
 def structure_of(machine: Machine, analysis: Analysis, options: Options) -> Structure:
-    """Return the parents' features, and how much a candidate's may differ from them."""
+    """Return the parents' features, and the largest differences of a candidate's features from them."""
     most = differences(analysis, options)
     return Structure(analysis.features, machine.put(most), machine.put(lattice(analysis.shapes, 1)))
 
 
 def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
-    """Return the top level, copied and repeated to fill, and empty levels below it."""
+    """Return the top level, filled with copies of the sample's, and empty levels below it."""
     row, col = np.indices(shapes[-1], np.int32)
     top = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
     source = np.concatenate([np.zeros(pixels(shapes[:-1]), np.int32), top.ravel()])
     counts = np.zeros((source.size, 2), np.int32)
-    counts[-top.size :, 0] = 1  # the others are to be counted
+    counts[-top.size :, 0] = 1  # all other levels are still to be counted
     return Sampled(machine.put(source), machine.put(counts), machine.put(lattice(shapes, 0)))
 
 

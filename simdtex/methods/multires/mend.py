@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A sample that does not wrap around is made to: its edges are covered with a piece of itself, cut where it fits best.
+"""Repair of a sample that does not wrap around: a piece of the sample, cut where it fits best, covers its edges.
 
 The cut is the least path of Efros and Freeman, "Image quilting for texture synthesis and transfer", SIGGRAPH 2001.
 Everything is in integers on the host.
@@ -11,27 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHARE = 8
-"""The strip reaches an eighth of the side to either side of the seam."""
+"""The strip reaches the side divided by this to either side of the seam."""
 
 WIDEST = 64
-"""Pixels that the strip reaches at most: a wider one costs more and hides no more."""
+"""The most pixels to either side of the seam: a wider strip costs more without an effect."""
 
 PLACES = 128
-"""Places of the sample that a strip is tried from, at most, evenly spaced."""
+"""The most places of the sample, evenly spaced, from which a strip is tried."""
 
 FITS = 11, 10
-"""Edges that differ by no more than 11/10 of what neighbours inside do are left alone."""
+"""Edges that differ by at most 11/10 of the difference of inner neighbours are not changed."""
 
 _FAR = np.int64(2**62)
 
 
 def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
-    """Return a picture that wraps around, made of one that does not, as the source of each pixel.
+    """Return the source of each pixel of a picture that wraps around, made from a picture that does not.
 
-    Columns first: the picture is turned by half its width, so that the seam of its left and right edges stands in the
-    middle; a strip of the picture, of the place where it fits best, is laid over the seam; on either side of the seam
-    the strip ends at the path from top to bottom along which the squared differences of the two add up to least. Then
-    the same for rows, with paths that end where they begin.
+    Columns are first: the picture is rotated by half its width, so that the seam of its left and right edges is in the
+    middle. The strip of the picture that fits best is placed over the seam. On either side of the seam the strip ends
+    at the path from top to bottom with the least sum of squared differences of the two. Rows are treated in the same
+    way, with paths that end where they begin.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
     Returns
     -------
     (rows, cols) int array
-        Number of the pixel of ``planes`` that stands there, row by row. An axis whose edges fit already, or of fewer
-        than 16 pixels, is left as it is.
+        Number of the pixel of ``planes`` at each place, row by row. An axis whose edges already fit, or with fewer than
+        16 pixels, is not changed.
 
     Notes
     -----
-    Cost: for each axis at most 128 times a quarter of the picture. Memory: 60 + 20 channels bytes a pixel.
+    Cost: for each axis at most 128 times a quarter of the picture. Memory: 60 + 20 channels bytes per pixel.
     """
     values = np.moveaxis(planes, 0, -1).astype(np.int64) >> 8  # the squares along any path then fit 64 bits
     place = np.arange(values[..., 0].size).reshape(values.shape[:2])
@@ -69,10 +69,10 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
     """Return ``place`` with a strip over the seam of the last column with the first."""
     cols = values.shape[1]
     reach, turn = min(cols // SHARE, WIDEST), cols // 2
-    left = turn - reach  # of the strip, where the seam is before column `turn`
+    left = turn - reach  # the first column of the strip; the seam is before column `turn`
     there = np.roll(values, turn, 1)[:, left : left + 2 * reach]
     starts = range(0, cols - 2 * reach + 1, -(-cols // PLACES))
-    # the least that any two paths cost ranks the places well enough
+    # the least cost of any two paths is good enough to rank places
     least = [sum(int(c.min(1).sum()) for c in _seams(there, values[:, x : x + 2 * reach])) for x in starts]
     best = starts[int(np.argmin(least))]
     first, last = (_path(c, closed)[:, None] for c in _seams(there, values[:, best : best + 2 * reach]))
@@ -85,7 +85,7 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
 
 
 def _seams(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the costs of cutting right of each column of either half, (rows, reach - 1) each."""
+    """Return the costs of a cut to the right of each column, for either half, (rows, reach - 1) each."""
     square = ((there - strip) ** 2).sum(-1)
     cost = square[:, :-1] + square[:, 1:]
     reach = strip.shape[1] // 2
@@ -93,15 +93,15 @@ def _seams(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[
 
 
 def _path(cost: NDArray[np.int64], closed: bool) -> NDArray[np.intp]:
-    """Column of the least path in each row, (rows,): from row to row it moves by one at most, also around if closed."""
+    """Return the column of the least path in each row, (rows,); it moves by 1 at most per row, around if closed."""
     if not closed:
         return _least(cost, None)
-    begin = _least(np.concatenate([cost, cost]), None)[len(cost)]  # after a turn the start hardly matters
+    begin = _least(np.concatenate([cost, cost]), None)[len(cost)]  # after one turn the start hardly matters
     return _least(cost, int(begin))
 
 
 def _least(cost: NDArray[np.int64], begin: int | None) -> NDArray[np.intp]:
-    """Return the least path, or the least of those that begin at a column and end beside it."""
+    """Return the least path or, with ``begin``, the least of those that begin at this column and end beside it."""
     rows, cols = cost.shape
     total = cost[0].copy()
     if begin is not None:

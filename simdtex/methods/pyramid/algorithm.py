@@ -31,27 +31,27 @@ from simdtex.options import within_32_bits
 from simdtex.run import Callback, Iterating, Output
 
 RESIDUE = 8
-"""Rows and columns that the low-pass residue has at least, where the number of levels is not given."""
+"""The fewest rows and columns of the low-pass residue, if the number of levels is not given."""
 
 PART = 2**16
-"""Pixels whose colours are restored at a time, in double precision: some megabytes on the host."""
+"""Pixels whose colours are restored together, in double precision: some megabytes on the host."""
 
 VALUES = 8
-"""Values for each pixel of an output that kernels number at most: six oriented bands of a level, and more to spare."""
+"""The most values per output pixel that kernels index: six oriented bands of a level, and a margin."""
 
 MEMORY = 160
-"""Bytes for each pixel of a picture on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+"""The most bytes per pixel of a picture on the device (measured by benchmarks/pyramid_cost.py)."""
 
 HOST = 20, 20, 3
-"""Bytes for each pixel on the host: at all, for each channel, and for each byte of these (benchmarks/memory.py)."""
+"""Bytes per pixel on the host: in any case, per channel, and per byte of all channels (benchmarks/memory.py)."""
 
 
 @dataclass(frozen=True)
 class Texture:
-    """What a run is to match: histograms of decorrelated channels, and the colours to show them in.
+    """The target of a run: histograms of decorrelated channels, and the transform back to colours.
 
-    ``scale`` is the unit of the channels, ``stretched`` turns values back into pixels, and ``own`` are the sample's
-    pixels in ascending order if a grey output takes exactly these.
+    ``scale`` is the unit of the channels, ``stretched`` converts values to pixels, and ``own`` are the sample's pixels
+    in ascending order if a grey output takes exactly these.
     """
 
     histograms: list[Histograms]
@@ -61,18 +61,18 @@ class Texture:
     own: NDArray[Any] | None = None
 
     def image(self, channels: Sequence[NDArray[np.int32]]) -> NDArray[Any]:
-        """Return the image (..., C) that channels, each of any one shape, stand for."""
+        """Return the image (..., C) of channels (...), which have one shape."""
         shape = channels[0].shape
         pixels = []
         flat = np.stack([channel.reshape(-1) for channel in channels])
-        for first in range(0, flat.shape[1], PART):  # double precision, for some pixels at a time
+        for first in range(0, flat.shape[1], PART):  # double precision, for a part of the pixels
             part = self.palette.restored(self.scale.normalised(flat[:, first : first + PART]))
             pixels.append(self.stretched.picture(part[:, None])[0])
         return np.concatenate(pixels).reshape(*shape, len(channels))
 
 
 def transform(machine: Machine, options: Options, levels: int, torus: bool) -> Transform:
-    """Return the 2-D pyramid that options describe."""
+    """Return the 2-D pyramid of the options."""
     return Transform(machine, options.pyramid, levels, options.orientations, torus)
 
 
@@ -114,14 +114,14 @@ class Plan:
     options: Options
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Analyse the sample on a machine; raise if the memory does not suffice."""
+        """Return the run on a machine, with the sample analysed; raise if the memory does not suffice."""
         levels = number_of_levels(self.options, *self.shape, *self.sample.shape[:2])
         pyramid = transform(machine, self.options, levels, self.options.edges == "wrap")
         return picture_run(machine, analyse(machine, self.sample, self.options, pyramid), self, levels, seed)
 
 
 def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed: int) -> Run:
-    """Return the run that makes a picture of ``plan.shape`` with ``plan.options`` match a texture."""
+    """Return the run that matches a picture of ``plan.shape`` with a texture, by ``plan.options``."""
     shape, options = plan.shape, plan.options
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
     check_memory(machine, shape, texture, MEMORY)
@@ -136,7 +136,7 @@ def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed
 
 
 def check_memory(machine: Machine, shape: tuple[int, ...], texture: Texture, on_device: int) -> None:
-    """Raise where an output takes more memory than there is, so many bytes for each pixel on the device."""
+    """Raise if an output does not fit the memory, with ``on_device`` bytes per pixel on the device."""
     each, channel, byte = HOST
     host = each + len(texture.histograms) * (channel + byte * texture.stretched.pixels.dtype.itemsize)
     memory.require(machine, prod(shape) * on_device, prod(shape) * host)
@@ -151,14 +151,15 @@ def match_subbands(
 
 
 Turn = Callable[[Array, list[Wanted], Matcher, Callable[[float], None]], Array]
-"""One turn of the loop, but for the pixels: pyramid of the picture, subbands matched, collapsed."""
+"""One turn of the loop without the pixels: the pyramid of the picture is made, matched and collapsed."""
 
 
 class State(NamedTuple):
     """The state between two channels' turns.
 
-    ``turns`` done, all channels and iterations together; ``pictures`` (1, 1, ...) int32 arrays of the machine, one for
-    each channel that varies; ``moved`` how far values were moved in this iteration, as of `Matcher.moved`.
+    ``turns``, the number of turns done, over all channels and iterations; ``pictures`` (1, 1, ...) int32 arrays of the
+    machine, one for each channel that varies; ``moved``, the distances of values in this iteration, as in
+    `Matcher.moved`.
     """
 
     turns: int
@@ -167,7 +168,7 @@ class State(NamedTuple):
 
 
 class Info(NamedTuple):
-    """What a step did: ``turns`` done, and at the end of an iteration the distances of the histograms by subband."""
+    """A description of a step: ``turns`` done, and at the end of an iteration the histograms' distances by subband."""
 
     turns: int
     distances: dict[str, float] | None
@@ -196,7 +197,7 @@ class Run:
         self.levels, self.seed, self._turn = levels, seed, turn
         self.matcher = Matcher(machine, options, seed)
         found = texture.histograms
-        self.busy = [c for c, own in enumerate(found) if own.pixels[0, 0] < own.pixels[0, -1]]  # the others are flat
+        self.busy = [c for c, own in enumerate(found) if own.pixels[0, 0] < own.pixels[0, -1]]  # others are flat
         self._pixels = [self.matcher.wanted(found[c].pixels) for c in self.busy]
         self._subbands = [[self.matcher.wanted(band) for band in found[c].subbands] for c in self.busy]
 
@@ -225,7 +226,7 @@ class Run:
         return state.turns >= self.options.iterations * len(self.busy)
 
     def read(self, pictures: tuple[Array, ...]) -> NDArray[Any]:
-        """Read back the image that the channels' pictures stand for."""
+        """Return the image of the channels' pictures, read back."""
         found = dict(zip(self.busy, pictures, strict=True))
         return self.texture.image(
             [
@@ -261,14 +262,14 @@ class Run:
         return State(saved["turns"], tuple(map(put, saved["pictures"])), moved)
 
     def observer(self, callback: Callback | None) -> Record:
-        """Return what watches this run."""
+        """Return the observer of this run."""
         return Record(self, callback)
 
 
 def _begin(
     machine: Machine, texture: Texture, shape: tuple[int, ...], options: Options, seed: int
 ) -> Callable[[int], Array]:
-    """Return a function that gives each channel (1, 1, ...) to begin with: noise, or that of the start."""
+    """Return a function that returns the initial picture of each channel (1, 1, ...): noise, or that of ``start``."""
     if options.start is None:
         return lambda c: noise(machine, 1, prod(shape), seed, c).reshape((1, 1, *shape))
     start = np.asarray(options.start)
@@ -301,7 +302,7 @@ class Record:
         self._run, self._callback, self._began = run, callback, perf_counter()
 
     def part(self, state: State, share: float) -> None:
-        """Report a share of the present channel's turn."""
+        """Report a share of the current channel's turn."""
         self._report(state.turns + share, state.pictures, ended=False)
 
     def step(self, state: State, info: Info) -> None:
@@ -313,7 +314,7 @@ class Record:
             self.reports.append({"iteration": number, "seconds": seconds, "distances": info.distances})
 
     def nothing_done(self, state: State) -> None:
-        """If there was no turn, because nothing varies or no iteration is wanted, complete the reports."""
+        """Complete the reports if there was no turn, because no channel varies or there are no iterations."""
         if not self._run.busy:
             wanted = range(1, self._run.options.iterations + 1)
             self.reports[:] = [{"iteration": number, "seconds": 0.0, "distances": {}} for number in wanted]
@@ -333,9 +334,9 @@ class Record:
             self._callback(Iterating(image=lambda: self._run.read(pictures), solid=solid, **now))
 
     def save(self) -> dict[str, Any]:
-        """Return all that was seen, as plain arrays and numbers."""
+        """Return everything received so far, as plain arrays and numbers."""
         return {"reports": self.reports, "seconds": perf_counter() - self._began}
 
     def load(self, saved: dict[str, Any]) -> None:
-        """Go on from what `save` returned."""
+        """Continue from the tree that `save` returned."""
         self.reports[:], self._began = saved["reports"], perf_counter() - saved["seconds"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Heeger and Bergen keep of a texture: the histograms of its pixels and of its subbands, as sorted values."""
+"""Heeger and Bergen's description of a texture: histograms of its pixels and of its subbands, as sorted values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Sorted = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Histograms:
-    """Those of one channel, as sorted values.
+    """The histograms of one channel, as sorted values.
 
     ``pixels`` (1, m) int32; ``subbands`` (bands, m) int32 each, in the order of the pyramid:
     `simdtex.methods.pyramid.pyramids.Transform.make`.
@@ -37,7 +37,7 @@ def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transfor
 
 
 def average(parts: Sequence[Sorted], weights: Sequence[float]) -> Sorted:
-    """Return the average of the counts of each value of some histograms, band by band.
+    """Return the average of the counts of each value in histograms, band by band.
 
     ``parts`` (bands, m_i) int32 are sorted, as is the result (bands, m), m the largest m_i; ``weights`` are shares, not
     all 0.
@@ -59,7 +59,7 @@ def average(parts: Sequence[Sorted], weights: Sequence[float]) -> Sorted:
 
 
 def averaged(textures: Sequence[Histograms], weights: Sequence[float]) -> Histograms:
-    """Return two or more textures in one: the average of their histograms, see `average`."""
+    """Return the average of the histograms of two or more textures, see `average`."""
     subbands = zip(*(texture.subbands for texture in textures), strict=True)
     return Histograms(
         average([texture.pixels for texture in textures], weights),
@@ -70,6 +70,6 @@ def averaged(textures: Sequence[Histograms], weights: Sequence[float]) -> Histog
 def spliced(low: Histograms, high: Histograms, split: int) -> Histograms:
     """Return the low frequencies of one texture, and its pixels, with the high frequencies of another.
 
-    ``split`` is the number of subbands that are taken from `high`, from the finest on.
+    ``split`` is the number of subbands from ``high``, which are the finest.
     """
     return Histograms(low.pixels, [*high.subbands[:split], *low.subbands[split:]])

@@ -18,15 +18,15 @@ from simdtex.ops.ranking import ranking
 from simdtex.ops.sort import sort
 
 MATCHING = 200
-"""What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
+"""About the cost of sorting and matching a value, in multiply-adds, which decides when to wait for the device."""
 
 TIES = 2**20
-"""Where a level stands in the counter of random numbers: the order in which equal values come."""
+"""The level in the counter of random numbers for the order of equal values."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Histograms that bands are to have, on a machine.
+    """The target histograms of bands, on a machine.
 
     ``table`` is sorted values (bands, m), or the inverse of their cumulative distribution (bands, 257), int32;
     ``deviations`` (bands,) are standard deviations, 1 where there is none.
@@ -37,10 +37,10 @@ class Wanted:
 
 
 class Matcher:
-    """Match-Histogram with the options of a run; notes how far histograms were from each other.
+    """Match-Histogram with the options of a run, which notes the distances of histograms.
 
-    ``seed`` is that of the order in which equal values come. ``moved`` lists how far values were moved since
-    `distances` was called last: name of the subband, sums on the machine, and their unit (bands,).
+    ``seed`` is that of the order of equal values. ``moved`` lists the distances that values were moved since the last
+    call of `distances`: name of the subband, sums on the machine, and their unit (bands,).
     """
 
     def __init__(self, machine: Machine, options: Options, seed: int) -> None:
@@ -49,7 +49,7 @@ class Matcher:
         self.moved: list[tuple[str, Array, NDArray[np.float64]]] = []
 
     def wanted(self, values: NDArray[np.int32]) -> Wanted:
-        """Return the histogram of sorted values (bands, m), as `match` takes it."""
+        """Return the histogram of sorted values (bands, m), for `match`."""
         deviations = values.std(1, dtype=np.float64)
         deviations[deviations == 0] = 1.0
         if self._options.match == "lookup":
@@ -57,7 +57,7 @@ class Matcher:
         return Wanted(self._machine.put(values), deviations)
 
     def match(self, name: str, values: Array, wanted: Wanted, together: bool = False) -> Array:
-        """Values (bands, planes, ...) with each band's wanted histogram, in every plane or in all planes together."""
+        """Return values (bands, planes, ...) with each band's target histogram, per plane or for all planes."""
         bands, planes, *shape = values.shape
         if together:
             planes, shape = 1, [planes, *shape]
@@ -72,11 +72,11 @@ class Matcher:
         return matched.reshape(values.shape)
 
     def order(self, segments: Array) -> Array:
-        """Indices of each segment's values (segments, n) in ascending order; equal ones come in a random order."""
+        """Return indices of each segment's values (segments, n) in ascending order; equal ones in a random order."""
         return sort(self._machine, segments, self._ties(segments.shape[1]))
 
     def _ties(self, n: int) -> Array:
-        """Return the order in which equal ones of n values come."""
+        """Return the order of equal values among n values."""
         if n not in self._first:
             bits = noise(self._machine, 1, n, self._seed, TIES)
             itself = self._machine.put(np.arange(n, dtype=np.int32))
@@ -84,7 +84,7 @@ class Matcher:
         return self._first[n]
 
     def distances(self) -> dict[str, float]:
-        """Mean distance that the values of each subband were moved since the last call, in its standard deviations."""
+        """Return how far each subband's values were moved since the last call, mean, in its standard deviations."""
         found: dict[str, list[float]] = {}
         for name, moved, scale in self.moved:
             total = np.asarray(self._machine.get(moved)).reshape(len(scale), -1).sum(1)

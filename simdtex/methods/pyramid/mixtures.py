@@ -66,11 +66,11 @@ def mix(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Mix several textures into one, by pyramid matching.
+    """Return a mixture of several textures, by pyramid matching.
 
     Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
-    frequencies of one with the high ones of another (`low`, `high`). Its colours are those of its pattern, or of
-    another sample (`palette`).
+    frequencies of one sample with the high frequencies of another (`low`, `high`). Its colours are those of its
+    pattern, or of another sample (`palette`).
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def mix(
     average : sequence of float, optional
         A weight for every sample, 0 or more. By default all weights are equal.
     low, high : int, optional
-        The samples that low and high frequencies are taken from.
+        The samples of the low and of the high frequencies.
     split : int, optional
         Number of levels, from the finest on, that are high frequencies; by default half of them.
     channel_axis : int, optional
@@ -144,8 +144,8 @@ def mix(
 class Mixture:
     """A mixture of pictures (rows, cols, channels) before it has a machine and a seed.
 
-    ``weights`` are those of each picture in the pattern; ``sides`` says which pictures low and high frequencies are
-    taken from, and the split between them.
+    ``weights`` are those of each picture in the pattern; ``sides`` are the pictures of low and high frequencies, and
+    the split between them.
     """
 
     pictures: list[NDArray[Any]]
@@ -156,9 +156,9 @@ class Mixture:
     palette: int | None
 
     def on(self, machine: Machine, seed: int) -> pyramid.Run:
-        """Analyse the samples on a machine, on one scale.
+        """Return the run on a machine, with the samples analysed on one scale.
 
-        Those that are blended are decorrelated together, so that their channels mean the same.
+        Blended samples are decorrelated together, so that their channels have the same meaning.
         """
         pictures, options = self.pictures, self.options
         used = [i for i, weight in enumerate(self.weights) if weight]
@@ -194,7 +194,7 @@ class Mixture:
 
 
 def _parted(planes: NDArray[np.int32], pictures: list[NDArray[Any]]) -> list[NDArray[np.int32]]:
-    """Stretched planes (C, pixels of all pictures, 1) as those of each picture (C, rows, cols)."""
+    """Return the stretched planes (C, rows, cols) of each picture from (C, pixels of all pictures, 1)."""
     sizes = [p.shape[0] * p.shape[1] for p in pictures]
     parts = np.split(planes[..., 0], np.cumsum(sizes)[:-1], axis=1)
     return [part.reshape(len(planes), *p.shape[:2]) for part, p in zip(parts, pictures, strict=True)]
@@ -210,7 +210,7 @@ def _high_subbands(split: int | None, levels: int, kind: str) -> int:
 
 
 def _checked(samples: Sequence[ArrayLike], channel_axis: int | None) -> list[NDArray[Any]]:
-    """Return the samples as (rows, cols, channels), grey ones with as many channels as the others."""
+    """Return the samples as (rows, cols, channels), grey ones with the number of channels of colour ones."""
     if not isinstance(samples, Sequence):
         what = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
         raise TypeError(f"samples is {what}; give a list of samples")

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from simdtex.model.stretched import TOP
 
 FINE = 2**14
-"""Directions of axes are whole multiples of 2**-14, so that the last bit of a linear algebra library does not show."""
+"""Directions of axes are multiples of 2**-14, so that the last bit of a linear algebra library does not matter."""
 
 INVERSE = 2**26
-"""And the way back of 2**-26."""
+"""The inverse transform has multiples of 2**-26."""
 
 BLOCK = 2**20
-"""Pixels that are summed together: products of so many fit 64 bits."""
+"""The most pixels that are summed together, so that sums of products fit 64 bits."""
 
 FLAT = 2.0**-12
-"""An axis whose standard deviation is less than this share of the largest one's is flat: it holds rounding only."""
+"""An axis with less than this share of the largest standard deviation is flat: it holds only rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class Palette:
     Attributes
     ----------
     mean : (C,) int64 array
-        On the stretched scale.
+        The mean on the stretched scale.
     axes : (C, C) int64 array
-        U' in 2**-14: a row for each channel, that of the largest variance first.
+        U' in 2**-14: a row for each channel, the largest variance first.
     deviations : (C,) float64 array
         S: the standard deviation along each axis, in 2**-14 of the stretched scale; 0 where there is none.
     """
@@ -43,17 +43,17 @@ class Palette:
     deviations: NDArray[np.float64]
 
     def decorrelated(self, planes: NDArray[np.int32]) -> NDArray[np.float64]:
-        """M (x - mean) of stretched planes (C, ...), of unit variance."""
+        """Return M (x - mean) of stretched planes (C, ...), with unit variance."""
         rotated = np.tensordot(self.axes, planes - self.mean.reshape(-1, *(1,) * (planes.ndim - 1)), 1)
         flat = self.deviations == 0
         divisor = np.where(flat, 1.0, self.deviations).reshape(-1, *(1,) * (planes.ndim - 1))
         return np.where(flat.reshape(divisor.shape), 0.0, rotated / divisor)
 
     def restored(self, channels: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Stretched planes (C, ...) of channels of unit variance: M^-1 y + mean.
+        """Return stretched planes (C, ...) from channels with unit variance: M^-1 y + mean.
 
-        Flat axes have no part in it, so that grey stays grey to the bit. Sums are taken in the order of the channels,
-        so that no library of linear algebra changes a bit.
+        Flat axes are left out, so that grey stays grey to the bit. Sums are in the order of the channels, so that no
+        bit depends on a library of linear algebra.
         """
         used = self.deviations > 0
         along = self.axes[used] / FINE
@@ -68,11 +68,11 @@ class Palette:
 
 
 def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], decorrelate: bool = True) -> Palette:
-    """Return the transform that decorrelates some pictures taken together.
+    """Return the common decorrelating transform of pictures.
 
-    ``pictures`` (C, rows, cols) int32 are stretched, on one scale; ``weights`` are the shares that each has in mean and
-    covariance. Without ``decorrelate`` channels stay as they are, only centred and of unit variance. The covariance is
-    a matrix of exact sums in integers, divided at the end.
+    ``pictures`` (C, rows, cols) int32 are stretched, on one scale; ``weights`` are the share of each in mean and
+    covariance. Without ``decorrelate`` channels are only centred and scaled to unit variance. The covariance is a
+    matrix of exact sums in integers, divided at the end.
     """
     shares = [float(weight) / float(sum(weights)) for weight in weights]
     means = [picture.reshape(len(picture), -1).mean(1, dtype=np.float64) for picture in pictures]
@@ -86,7 +86,7 @@ def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], dec
     axes = np.eye(channels, dtype=np.int64) * FINE
     if decorrelate and channels > 1:
         u, _, _ = np.linalg.svd(covariance)  # C = U S^2 U'
-        u *= np.where(u[np.abs(u).argmax(0), np.arange(channels)] < 0, -1.0, 1.0)  # brighter is more
+        u *= np.where(u[np.abs(u).argmax(0), np.arange(channels)] < 0, -1.0, 1.0)  # brighter is larger
         axes = np.rint(u.T * FINE).astype(np.int64)
     variances = np.zeros(channels)
     for i, j in np.ndindex(channels, channels):  # u' C u, in one order
@@ -97,7 +97,7 @@ def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], dec
 
 
 def _moments(picture: NDArray[np.int32], about: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of x and of x x' about some integers, from sums in integers."""
+    """Return the means of x and of x x' about the integers ``about``, from sums in integers."""
     x = picture.reshape(len(picture), -1)
     sums, products = np.zeros(len(x), object), np.zeros((len(x), len(x)), object)
     for first in range(0, x.shape[1], BLOCK):
@@ -115,9 +115,9 @@ class Decorrelated:
     Attributes
     ----------
     channels : list of (C, rows, cols) int32 arrays
-        A picture each. The largest value in any of them, of either sign, is 2**20, or 0 in a flat channel.
+        One array per picture. The largest absolute value in any of them is 2**20, or 0 in a flat channel.
     spans : (C,) float64 array
-        The standard deviations that 2**20 stands for.
+        The standard deviations that 2**20 represents.
     """
 
     channels: list[NDArray[np.int32]]
@@ -129,7 +129,7 @@ class Decorrelated:
 
 
 def decorrelated(pictures: Sequence[NDArray[np.int32]], palettes: Sequence[Palette]) -> Decorrelated:
-    """Pictures (C, rows, cols) under a palette each, on one scale."""
+    """Return pictures (C, rows, cols) under one palette each, on one scale."""
     normal = [own.decorrelated(picture) for own, picture in zip(palettes, pictures, strict=True)]
     spans = np.array([max(float(np.abs(one[c]).max()) for one in normal) for c in range(len(normal[0]))])
     scale = np.where(spans == 0, 0.0, TOP / np.where(spans == 0, 1.0, spans)).reshape(-1, 1, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Image pyramids: pictures as subbands of several frequencies, and orientations, and back (Heeger and Bergen, 3.1).
+"""Image pyramids, which split pictures into subbands of frequencies and orientations (Heeger and Bergen, 3.1).
 
 The Laplacian pyramid is that of Burt and Adelson; the steerable pyramid has the spatial filters of Simoncelli and
 co-workers. Everything is in integers, so that a pyramid has the same bits on every device.
@@ -22,7 +22,7 @@ from simdtex.ops.steerable_filters import filters
 __all__ = ["Transform", "most_levels"]
 
 BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]).astype(np.float32) / 256
-"""Of the Laplacian pyramid."""
+"""The filter of the Laplacian pyramid."""
 
 
 class Transform:
@@ -33,11 +33,11 @@ class Transform:
     machine : Machine
     kind : {"steerable", "laplacian"}
     levels : int
-        Band-pass levels, 0 or more, beside the residues.
+        Number of band-pass levels, 0 or more, without the residues.
     orientations : int
-        Of the steerable pyramid: 1, 2, 4 or 6.
+        Number of orientations of the steerable pyramid: 1, 2, 4 or 6.
     torus : bool
-        Whether pictures wrap around, or continue as in a mirror.
+        Whether pictures wrap around, or continue as their mirror image.
     """
 
     def __init__(self, machine: Machine, kind: str, levels: int, orientations: int, torus: bool) -> None:
@@ -55,7 +55,7 @@ class Transform:
 
     @property
     def names(self) -> list[str]:
-        """Of the subbands, in the order of `make`."""
+        """The names of the subbands, in the order of `make`."""
         levels = [f"level {level}" for level in range(self._levels)]
         return [*(["high"] if self._steerable else []), *levels, "low"]
 
@@ -65,15 +65,15 @@ class Transform:
         Parameters
         ----------
         picture : (planes, rows, cols) int32 array of the machine
-            Every plane on its own.
+            Each plane is transformed separately.
 
         Returns
         -------
         list of (bands, planes, rows, cols) int32 arrays of the machine
             Steerable: the high-pass residue H0, the oriented bands B_i of every level, finest first, the low-pass
             residue. Laplacian: b^0, b^1, ... and the low-pass residue. A level has half the rows and columns of the
-            one below, rounded up; but on a torus as many where they are odd, in the order of `simdtex.ops.fold`, so
-            that there is no seam.
+            one below, rounded up. On a torus an odd number is kept, in the order of `simdtex.ops.fold`, so that there
+            is no seam.
         """
         if not self._steerable:
             return self._make_laplacian(picture)
@@ -87,7 +87,7 @@ class Transform:
         return [*subbands, low]
 
     def collapse(self, subbands: list[Array]) -> Array:
-        """Return the picture (planes, rows, cols) that subbands add up to."""
+        """Return the picture (planes, rows, cols) that is the sum of the subbands."""
         if not self._steerable:
             return self._collapse_laplacian(subbands)
         high, *bands, low = subbands
@@ -110,14 +110,14 @@ class Transform:
         return coarse.reshape((1, *coarse.shape))
 
     def _previous(self, low: Array, shape: tuple[int, int]) -> tuple[Array, Array, int]:
-        """Return the term of the level below, of these rows and columns, that is L1 2up(low)."""
+        """Return the term L1 2up(low) of the level below, which has the rows and columns ``shape``."""
         if not self._folds(shape):
             return low, self._up[4], 2
         gain, spread = self._spread(low.reshape(low.shape[1:]), shape)
         return spread, self._up[gain], 1
 
     def _spread(self, coarse: Array, shape: tuple[int, ...]) -> tuple[int, Array]:
-        """Return a level at its places on the one below, (1, planes, ...), and what the zeros between take away."""
+        """Return the factor that zeros between pixels cost, and the level with zeros at the size of the one below."""
         spread = unfold(self._machine, coarse, shape)
         return prod(1 if n % 2 else 2 for n in shape), spread.reshape((1, *spread.shape))
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Solid textures: section 4 of Heeger and Bergen (1995).
 
-The program is `simdtex.methods.pyramid.Run`; only the pyramids differ. A 2-D Laplacian pyramid of the sample
-is matched by the 3-D Laplacian pyramid of a block, and a steerable pyramid of the sample by those of all slices.
+The program is `simdtex.methods.pyramid.Run`; only the pyramids differ. The 3-D Laplacian pyramid of a block is matched
+with a 2-D Laplacian pyramid of the sample, and the steerable pyramids of all slices with that of the sample.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_redu
 from simdtex.options import Choice, documented, option, within_32_bits
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
-"""Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
+"""Slices by name: the axes in the order slice, row, column, and the order that reverses this."""
 
 
 MEMORY = 240
-"""Bytes for each voxel on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+"""The most bytes per voxel on the device (measured by benchmarks/pyramid_cost.py)."""
 
 
 @documented
@@ -71,7 +71,7 @@ class Plan:
     options: Options
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Analyse the sample on a machine; raise if the memory does not suffice.
+        """Return the run on a machine, with the sample analysed; raise if the memory does not suffice.
 
         Notes
         -----
@@ -107,7 +107,7 @@ class Plan:
 
 
 def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:
-    """Match and collapse the 3-D Laplacian pyramid of a block."""
+    """Return a block with its 3-D Laplacian pyramid matched and collapsed."""
     gaussian = [block]
     while len(gaussian) < len(wanted):
         gaussian.append(solid_reduce(machine, gaussian[-1]))
