@@ -117,7 +117,7 @@ class Record:
             if self._listed:
                 before, self._weighed = self._weighed, self._total()
                 weighed = self._weighed - before
-                report["weighed"] = weighed / max(1, report["relaxations"])  # 0 if the whole level is known
+                report["weighed"] = weighed / max(1, report["relaxations"])  # none if the whole level is known
                 report["fma"] += weighed * (level.work // level.proposal.slots)
             report["skipped"] = machine.spared - self._skipped
             report["seconds"] = time.perf_counter() - self._began
