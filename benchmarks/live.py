@@ -111,7 +111,7 @@ def in_a_browser(device, runs, large):
             time.sleep(0.1)
         script("page.view.fit()")
         time.sleep(1)
-        frame = script("return [page.view.frame.width, page.view.frame.height]")
+        frame = script("const { width, height } = page.view.panes[0].frame; return [width, height]")
         used = script("return performance.memory.usedJSHeapSize") / 2**20
         took = (script("return performance.now()") - begun) / 1000
         print(
