@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import shutil
 import warnings
 from pathlib import Path
 from typing import Any
@@ -164,11 +165,13 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd gets the time by a deprecated call
             nrrd.write(written, values, header, index_order="C")
-        # without the line of pynrrd that holds the time: the same volume is the same file
-        before, _, after = written.getvalue().partition(b"# on ")
+        written.seek(0)
         with path.open("wb") as file:
-            file.write(before)
-            file.write(after[after.index(b"\n") + 1 :])
+            for line in iter(written.readline, b"\n"):  # the header, which ends with an empty line
+                if not line.startswith(b"# on "):  # the time: the same volume is to be the same file
+                    file.write(line)
+            file.write(b"\n")
+            shutil.copyfileobj(written, file)
     elif suffix:
         image.write_tiff(path, values)
     else:
