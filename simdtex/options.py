@@ -35,6 +35,10 @@ LONGEST = 100
 """The most characters of a value in an error message."""
 
 
+class DataWarning(UserWarning):
+    """Values of an input are not used as they are."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """One of several words."""

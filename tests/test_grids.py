@@ -2,6 +2,7 @@
 
 import doctest
 import struct
+import warnings
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from simdtex.io import grids
 from simdtex.io.grids import MISSING, check_grid, kind_of, read_grid, write_grid
+from simdtex.options import DataWarning
 
 NAN = float("nan")
 
@@ -76,24 +78,78 @@ def test_a_name_that_comes_again_gets_a_number(tmp_path):
     assert list(read_grid(saved(tmp_path, "1 1 1\n3\nv\nv\nw\n1 2 3\n")).values) == ["v", "v_1", "w"]
 
 
-@pytest.mark.parametrize("code", MISSING)
+@pytest.mark.parametrize("code", [*MISSING, -1e21, 1e21, 1.70141e38])
 @pytest.mark.parametrize("suffix", [".gslib", ".sgems"])
-def test_numbers_that_stand_for_unknown_values(tmp_path, code, suffix):
-    text = saved(tmp_path, f"3 1 1\n1\nv\n1\n{code:g}\nNaN\n".replace("e+06", "000000"))
-    text.write_text(f"3 1 1\n1\nv\n1\n{code!r}\nNaN\n")
+def test_codes_of_unknown_values(tmp_path, code, suffix):
+    values = [1, 5, code, NAN]
+    path = saved(tmp_path, "4 1 1\n1\nv\n" + "\n".join(map(repr, values)) + "\n")
     if suffix == ".sgems":
-        text = saved(tmp_path, by_hand([1, code, NAN], sides=(3, 1, 1)))
-    found = read_grid(text).values["v"].ravel()
-    assert np.array_equal(found, [1, NAN, NAN], equal_nan=True)
-    assert read_grid(text, missing=()).values["v"][0, 0, 1] == code
-    assert np.isnan(read_grid(text, missing=[1]).values["v"][0, 0, 0])
+        path = saved(tmp_path, by_hand(values, sides=(4, 1, 1)))
+    with pytest.warns(DataWarning, match=r"v: 1 of 4 values are .*, and are taken as unknown"):
+        assert np.array_equal(read_grid(path).values["v"].ravel(), [1, 5, NAN, NAN], equal_nan=True)
+    everything = read_grid(path, valid=(-np.inf, np.inf)).values["v"].ravel()
+    assert everything[2] == (np.float32(code) if suffix == ".sgems" else code)
+    with pytest.warns(DataWarning, match="2 of 4"):
+        assert np.isnan(read_grid(path, missing=[5]).values["v"].ravel()).tolist() == [False, True, True, True]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "unknown"),
+    [
+        ("-120 -99 50", []), ("-99 0 1", [0]), ("-99 -99 -99", [0, 1, 2]), ("3e307 -5e307 1e30", []),
+        ("-999.25 -120 -99 50", [0]),
+    ],
+)  # fmt: skip
+def test_a_code_within_the_range_of_the_other_values_is_a_number(tmp_path, numbers, unknown):
+    path = saved(tmp_path, f"{len(numbers.split())} 1 1\n1\nv\n{numbers}\n")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert np.flatnonzero(np.isnan(read_grid(path).values["v"])).tolist() == unknown
+    assert len(said) == bool(unknown)
+
+
+GEONE = """#
+# # GRID - NUMBER OF CELLS
+# NX 3
+# NY 2
+# NZ 2
+# # GRID - CELL SIZE
+# SX 10.0
+# SY 20.0
+# SZ 0.5
+# # GRID - ORIGIN (bottom-lower-left corner)
+# OX 100.5
+# OY -7
+# OZ 0.3
+# # GRID - FILLING
+# SORTING +X+Y+Z
+#
+a b
+"""
+
+
+def test_a_text_of_geone(tmp_path):
+    path = saved(tmp_path, GEONE + CELLS, "ti.txt")
+    grid = read_grid(path)
+    assert kind_of(path) == "grid" and (grid.origin, grid.cell) == ((105.5, 3, 0.55), (10, 20, 0.5))
+    assert np.array_equal(grid.values["b"], np.arange(12).reshape(2, 2, 3))
+    assert list(read_grid(path, variables=["b"]).values) == ["b"]
+    refused(path, "has no variable 'c': give one of a, b", lambda path: read_grid(path, variables=["c"]))
+    refused(saved(tmp_path, GEONE.replace("+Y", "-Y") + CELLS), r"sorted as \+X-Y\+Z: save it with SORTING \+X\+Y\+Z")
+    refused(saved(tmp_path, GEONE + CELLS + "\nsand\n"), "has more values than its header says")
+    refused(saved(tmp_path, GEONE + CELLS.replace("4.5 4", "4.5 x")), "line 22 has 'x', not a number")
+
+
+def test_words_may_follow_the_number_of_variables(tmp_path):
+    grid = read_grid(saved(tmp_path, "3 2 2\n2 variables, of wells\na\nb\n" + CELLS))
+    assert list(grid.values) == ["a", "b"] and grid.values["b"].shape == (2, 2, 3)
 
 
 @pytest.mark.parametrize(
     ("numbers", "dtype"),
     [
         ("0 255", "uint8"), ("0 256", "int16"), ("-1 255", "int16"), ("0 32768", "int32"), ("0 2147483648", "float64"),
-        ("0 0.5", "float64"), ("0 -9966699", "float64"), ("0 1e1", "uint8"), ("0 inf", "float64"),
+        ("0 0.5", "float64"), ("0 1e1", "uint8"), ("0 inf", "float64"),
     ],
 )  # fmt: skip
 def test_whole_numbers_are_integers_of_the_smallest_type(tmp_path, numbers, dtype):
@@ -122,7 +178,8 @@ def test_a_file_of_sgems_byte_by_byte(tmp_path):
         b"\x3f\xc0\x00\x00\xcb\x18\x14\x6b"  # a: 1.5, unknown
         b"\x40\x00\x00\x00\x40\x40\x00\x00"  # b: 2, 3
     )
-    grid = read_grid(saved(tmp_path, content, "hand.sgems"))
+    with pytest.warns(DataWarning):
+        grid = read_grid(saved(tmp_path, content, "hand.sgems"))
     assert (grid.origin, grid.cell) == ((5, 0, -1), (10, 1, 0.5))
     assert np.array_equal(grid.values["a"], [[[1.5, NAN]]], equal_nan=True) and grid.values["a"].dtype == np.float32
     assert grid.values["b"].tolist() == [[[2, 3]]] and grid.values["b"].dtype == np.uint8
@@ -153,7 +210,8 @@ def test_a_text_byte_by_byte(tmp_path):
     write_grid(tmp_path / "a.gslib", values, origin=(0.1, 1000.7), cell=(0.1, 25))
     text = "2 2 1 0.1 25.0 1.0 0.05 988.2 -0.5\n2\npor\nfacies\n0.1 1\n-9966699 2\n1e-09 3\n2.0 4\n"
     assert (tmp_path / "a.gslib").read_text() == text
-    assert read_grid(tmp_path / "a.gslib").origin == (0.1, 1000.7, 0)
+    with pytest.warns(DataWarning):
+        assert read_grid(tmp_path / "a.gslib").origin == (0.1, 1000.7, 0)
 
 
 KINDS = ["bool", "uint8", "int16", "int32", "float32", "float64"]
@@ -175,7 +233,9 @@ def test_what_is_written_is_read(tmp_path_factory, kind, sides, numbers, origin,
     hidden = values == values.flat[0]
     arrays = {f"v{k}": np.ma.MaskedArray(values, hidden if k else False) for k in range(variables)}
     write_grid(path, arrays, origin=origin, cell=cell)
-    grid = read_grid(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        grid = read_grid(path)
     if suffix == ".sgems":
         assert np.allclose(grid.origin, origin, rtol=1e-6, atol=0) and grid.cell == cell
     else:
@@ -274,7 +334,9 @@ def test_files_that_are_none(tmp_path):
         ("wells\n3\nX\nY\nv\n1 2 3\n", "points"), ("1 2 3\n4 5 6\n", None), ("x y a b\n5 6 7 8\n1 2 3 4\n", None),
         ("x,y,v\n1,2,3\n", None), ("", None), ("5 5 1\n1\nv\n", "grid"), ("t\n1 5 5 1\nv\n", "grid"),
         ("t\n1 5 5 1\na name of four\n", "grid"),
-        ("a (5x5x1)\n1\nv\n", "grid"), ("a\nfacies\n1\n", None), ("\x89PNG\n", None),
+        ("a (5x5x1)\n1\nv\n", "grid"), ("a\nfacies\n1\n", None), ("wells\n3 columns\nX\n", "points"), 
+        ("id well x y\n1 A-1 5 6\n2 A-2 7 8\n", None),
+        ("# NX 5\n# NY 5\n", "grid"), ("# x y v\n1 2 3\n", None), ("\x89PNG\n", None),
     ],
 )  # fmt: skip
 def test_a_file_is_told_by_its_first_lines(tmp_path, text, kind):
@@ -296,7 +358,7 @@ ARGUMENTS = {
     "complex": ("a.gslib", {"v": np.ones((2, 3), complex)}, {}, TypeError, "holds complex128 values"),
     "a name of two lines": ("a.gslib", {"v\nw": np.ones((2, 3))}, {}, ValueError, "has the name"),
     "an empty name": ("a.sgems", {" ": np.ones((2, 3))}, {}, ValueError, "has the name"),
-    "a missing value": ("a.gslib", {"v": np.full((2, 3), -999)}, {}, ValueError, "cannot hold -999, which stands for"),
+    "a missing value": ("a.gslib", {"v": np.array([[-999, 0]])}, {}, ValueError, "cannot hold -999, which is a code"),
     "integers of 25 bits": ("a.sgems", {"v": np.full((2, 3), 2**24 + 1)}, {}, ValueError, "end its name in .gslib"),
     "vast floats": ("a.sgems", {"v": np.full((2, 3), 1e39)}, {}, ValueError, "cannot hold 1e.39, .* 32-bit floats"),
     "far away": ("a.sgems", GOOD, {"origin": (4.5e6 + 0.3, 0)}, ValueError, "x = 4500000.3 .* end its name in .gslib"),

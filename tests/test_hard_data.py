@@ -3,12 +3,15 @@
 import doctest
 
 import numpy as np
+import pandas
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.io import hard_data
+from simdtex.io.grids import MISSING
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
+from simdtex.options import DataWarning
 
 NAN = float("nan")
 
@@ -54,7 +57,7 @@ def test_several_variables_and_unknown_values(tmp_path):
     assert read_hard_data(table(tmp_path, "1 2 3 4")).names == ("value 1", "value 2")
 
 
-@given(st.lists(st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 4), min_size=1, max_size=5))
+@given(st.lists(st.tuples(*[st.floats(-1e20, 1e20).filter(lambda v: v not in MISSING)] * 4), min_size=1, max_size=5))
 def test_numbers_are_read_to_the_last_digit(tmp_path_factory, rows):
     path = tmp_path_factory.getbasetemp() / "any.csv"
     path.write_text("\n".join(",".join(map(repr, row)) for row in rows))
@@ -69,12 +72,18 @@ def test_numbers_are_read_to_the_last_digit(tmp_path_factory, rows):
         ("x,y,value\n", "a header and no rows"),
         ("1,2\n3,4\n", "line 1 has 2 cells: give x, y and one value or more"),
         ("x,y,value\n\n1,2,3\n4,5\n", "line 4 has 2 cells and those before it 3"),
-        ("x,y,value\n1,2,sand\n", "line 2 has 'sand' in column 3, which is no number: .* leave the cell .* empty"),
+        (
+            "x,y,value\n1,2,sand\n",
+            "line 2 has 'sand' in column 3, .* leave the cell .* empty, or .*of categories \\(--cat",
+        ),
         ("1,2,3\n1,,3\n", "line 2 has '' in column 2, which is no number: write"),
         ("1,5;2,5;3\n", "line 1 has '1,5' in column 1, .* decimal point$"),
-        ("y,x,value\n1,2,3\n", "the columns are y, x, value: put them in the order x"),
-        ("id,x,y,value\n1,2,3,4\n", "the columns are id, x, y, value: put them in the order x"),
-        ('x,y,value\n1,2,"3\n', "line 2 cannot be split into cells .* quotation marks"),
+        ("depth,por,facies\n1,2,3\n", "no column of depth, por, facies is called x, .* --columns x=depth"),
+        ("x,y\n1,2\n", "line 1 has 2 cells: give x, y and one value or more"),
+        ("x,lon,y,v\n1,2,3,4\n", "the columns x and lon both mean x: choose one by its name, as .* --columns"),
+        ("x,y,v,v\n1,2,3,4\n", "two columns are called v: rename one"),
+        ('x,y,value\n1,2,"3\n', "cannot be split into cells: check its quotation marks"),
+        ("1,2,3\n4,5,6,7\n", "line 2 has 4 cells and those before it 3"),
         (b"x,y,value\n1,2,\xff\n", "is no text in UTF-8"),
     ],
 )
@@ -105,6 +114,72 @@ def test_files_that_are_no_tables(tmp_path):
             read_hard_data(tmp_path / "b.npy")
 
 
+# What pandas, ArcGIS, Petrel and people write: the same two data.
+NAMED = [
+    "Y,X,facies\n2,1,3\n5,4.5,60\n",
+    ",x,y,facies\n0,1,2,3\n1,4.5,5,60\n",
+    "Unnamed: 0,x,y,facies\n0,1,2,3\n1,4.5,5,60\n",
+    "Northing,Easting,facies\n2,1,3\n5,4.5,60\n",
+    "Latitude;Longitude;facies\n2;1;3\n5;4.5;60\n",
+    "well\tY_coord\tX_coord (m)\tfacies\nA-1\t2\t1\t3\nA-2\t5\t4.5\t60\n",
+    "facies row column\n3 2 1\n60 5 4.5\n",
+    "POINT_X,POINT_Y,facies,name\n1,2,3,NA\n4.5,5,60,A 2\n",
+    "wells\n4 columns, of 2019\nfacies\nYlocation\nX\nZ\n3 2 1 7\n60 5 4.5 7\n",
+]
+
+
+@pytest.mark.parametrize("text", NAMED)
+@pytest.mark.filterwarnings("ignore:left out")
+def test_names_of_columns_mean_axes_in_any_order(tmp_path, text):
+    data = read_hard_data(table(tmp_path, text))
+    assert data.points[:, :2].tolist() == [[1, 2], [4.5, 5]] and data.values.tolist() == [[3], [60]]
+    assert data.names == ("facies",)
+    assert data.points[:, 2:].tolist() == ([[7], [7]] if "Z" in text else [[], []])
+
+
+def test_columns_are_chosen_by_name(tmp_path):
+    path = table(tmp_path, "depth,por,perm,facies\n1,0.2,5,sand\n2,0.3,6,Shale\n3,,7,\n")
+    chosen = {"x": "depth", "y": "perm", "value": ["por", "facies"]}
+    data = read_hard_data(path, columns=chosen, categories={"sand": 1, "shale": 0})
+    assert data.points.tolist() == [[1, 5], [2, 6], [3, 7]] and data.names == ("por", "facies")
+    np.testing.assert_array_equal(data.values, [[0.2, 1], [0.3, 0], [NAN, NAN]])
+    data = read_hard_data(table(tmp_path, "7 1 2 3\n8 4 5 6\n"), columns={"x": "2", "y": "3", "value": "4"})
+    assert data.points.tolist() == [[1, 2], [4, 5]] and data.values.tolist() == [[3], [6]]
+    for columns, words in (
+        ({"x": "X"}, "no column 'X' for 'x': give columns of depth, por"),
+        ({"w": "por"}, "for 'w'"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            read_hard_data(path, columns=columns, categories={"sand": 1})
+    with pytest.raises(ValueError, match=r"line 2 has 'sand' in column 4, .* --categories"):
+        read_hard_data(path, columns=chosen)
+
+
+def test_columns_of_text_are_left_out_with_a_warning(tmp_path):
+    with pytest.warns(DataWarning, match="left out, because they hold text: the columns well, rig"):
+        data = read_hard_data(table(tmp_path, "well,x,y,por,rig\nA,1,2,.5,b\nB,3,4,,NA\n"))
+    assert data.names == ("por",)
+
+
+def test_a_data_frame_is_a_table(tmp_path):
+    frame = pandas.DataFrame({"facies": [3, 60], "lat": [2.0, 5], "lon": [1, 4.5]}, index=[7, 9])
+    frame.to_csv(tmp_path / "a.csv")
+    for data in (read_hard_data(frame), read_hard_data(tmp_path / "a.csv")):
+        assert data.points.tolist() == [[1, 2], [4.5, 5]] and data.values.tolist() == [[3], [60]]
+    assert data.lines == (2, 3)
+
+
+@pytest.mark.parametrize("code", [*MISSING, 1e21, -1e21])
+def test_codes_of_unknown_values(tmp_path, code):
+    path = table(tmp_path, f"x,y,v,w\n1,2,23,0\n3,4,{code!r},1\n5,6,219,2\n")
+    with pytest.warns(DataWarning, match=r"wells\.csv, column v: 1 of 3 values are .*, and are taken as unknown"):
+        data = read_hard_data(path)
+    np.testing.assert_array_equal(data.values, [[23, 0], [NAN, 1], [219, 2]])
+    assert read_hard_data(path, valid=(-np.inf, np.inf)).values[1, 0] == code
+    with pytest.warns(DataWarning):
+        assert np.isnan(read_hard_data(path, missing=[23]).values[:2, 0]).all()
+
+
 POINTS = "wells\n{}\n" + "{}\n" * 4
 
 
@@ -116,6 +191,7 @@ POINTS = "wells\n{}\n" + "{}\n" * 4
         (("X", "Y", "Zn", "Pb"), [[1, 2], [4.5, 5]], [[3, 7], [6, NAN]]),
     ],
 )
+@pytest.mark.filterwarnings("ignore::simdtex.options.DataWarning")
 def test_a_point_set_of_geo_eas(tmp_path, names, points, values):
     data = read_hard_data(table(tmp_path, POINTS.format(4, *names) + "1 2 3 7\n\n 4.5\t5 6 -999\n", "a.eas"))
     assert data.points.tolist() == points
@@ -124,16 +200,12 @@ def test_a_point_set_of_geo_eas(tmp_path, names, points, values):
     assert data.lines == (7, 9)
 
 
-def test_minus_999_is_a_value_in_a_table(tmp_path):
-    assert read_hard_data(table(tmp_path, "1,2,-999\n")).values.tolist() == [[-999]]
-
-
-def test_z_is_a_coordinate_if_the_header_says_so(tmp_path):
+def test_z_is_a_coordinate_if_another_column_is_left(tmp_path):
     data = read_hard_data(table(tmp_path, "x,y,z,facies\n1,2,3,\n"))
     assert data.points.tolist() == [[1, 2, 3]] and data.names == ("facies",) and np.isnan(data.values).all()
-    for text, names in (("x,y,z\n1,2,3\n", ("z",)), ("x,y,a,z\n1,2,3,4\n", ("a", "z"))):
-        data = read_hard_data(table(tmp_path, text))
-        assert data.points.tolist() == [[1, 2]] and data.names == names
+    assert read_hard_data(table(tmp_path, "x,y,z\n1,2,3\n")).names == ("z",)
+    data = read_hard_data(table(tmp_path, "x,y,a,z\n1,2,3,4\n"))
+    assert data.points.tolist() == [[1, 2, 4]] and data.names == ("a",)
     with pytest.raises(ValueError, match=r"line 2 has '' in column 3, .* decimal point$"):
         read_hard_data(table(tmp_path, "x,y,z,facies\n1,2,,4\n"))
 
@@ -141,10 +213,10 @@ def test_z_is_a_coordinate_if_the_header_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a\n2\nX\nY\n1 2\n", ".* has 2 columns: give x, y and one value"),
-        ("a\n3\nX\nY\nv\n", ".* no line after the names of its 3 columns"),
+        ("a\n2\nX\nY\n1 2\n", "line 5 has 2 cells: give x, y and one value"),
+        ("a\n3\nX\nY\nv\n", ".* no line after the names of 3 columns"),
         ("a\n3\nX\nY\n", ".* no line after the names"),
-        ("a\n3\nwell\nX\nv\n1 2 3\n", "the first columns are 'well' and 'X': put x and y there"),
+        ("a\n3\nwell\nX\nv\n1 2 3\n", "no column of well, X, v is called y"),
         ("a\n3\nX\nY\nv\n1 2 3\n1 2\n", "line 7 has 2 cells and those before it 3"),
         ("a\n3\nX\nY\nv\n1 2 3\n1 2 sand\n", "line 7 has 'sand' in column 3, which is no number"),
     ],
@@ -217,7 +289,7 @@ def test_coordinates_on_the_ground():
     for x, y in ((999.9, 2000), (1040, 2000), (1000, 1999.9), (1000, 2015)):
         with pytest.raises(ValueError, match=rf"row 0 .* at x {x}.*, y {y}.*, outside .* of 4 x 3 pixels") as caught:
             place_hard_data([[x, y, 7]], (3, 4), "uint8", **GROUND)
-        assert "give x from 1000.0 to below 1040.0, y from 2000.0 to below 2015.0, or tell" in str(caught.value)
+        assert "give x from 1000.0 to below 1040.0, y from 2000.0 to below 2015.0, tell" in str(caught.value)
     assert place_hard_data([[12, 3, 7]], (3, 4), "uint8", cell=(10, 5))[1, 1] == 7
     with pytest.raises(ValueError, match="give sizes above 0"):
         place_hard_data([[12, 3, 7]], (3, 4), cell=(10, 0))

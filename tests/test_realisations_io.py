@@ -12,7 +12,8 @@ import zarr
 
 from simdtex import distributed
 from simdtex.io.grids import read_grid
-from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
+from simdtex.io.realisations import check_realisations_path, write_realisations
+from simdtex.options import DataWarning
 
 SUFFIXES = [".zarr", ".nc", ".npz"]
 GRIDS = [".gslib", ".sgems"]
@@ -71,7 +72,7 @@ import sys
 sys.modules["xarray"] = None
 from types import SimpleNamespace
 import numpy as np
-from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
+from simdtex.io.realisations import check_realisations_path, write_realisations
 coords = {"x": SimpleNamespace(values=np.arange(3))}
 check_realisations_path(sys.argv[1])
 write_realisations(sys.argv[1], SimpleNamespace(values=np.ones((2, 3, 3)), coords=coords, attrs={"seed": 1}))
@@ -97,7 +98,8 @@ def test_a_file_is_replaced(tmp_path, suffix):
 def test_a_grid_keeps_values_origin_and_cells(tmp_path, suffix, variables):
     array = some("float32", variables).assign_coords(z=3.5).assign_attrs(cell_x=1.0, cell_z=0.25)
     write_realisations(tmp_path / f"many{suffix}", array)
-    grid = read_grid(tmp_path / f"many{suffix}")
+    with pytest.warns(DataWarning):
+        grid = read_grid(tmp_path / f"many{suffix}")
     assert (grid.origin, grid.cell) == ((0, 0.25, 3.5), (1, 0.5, 0.25))
     parts = [""] if variables is None else ["_0", "_1"]
     assert list(grid.values) == [f"rock{part}__real{number}" for number in (7, 9, 11) for part in parts]
@@ -194,7 +196,7 @@ def test_a_grid_is_read_from_netcdf(tmp_path, layers):
         {"rock": (dims, values), "other": ("x", np.zeros(4)), "b": (dims[::-1], values.T / 2)}, coords
     )
     grid.to_netcdf(path, engine="h5netcdf")
-    found = read_netcdf(path)
+    found = read_grid(path)
     assert list(found.values) == ["rock", "b"] and found.values["rock"].dtype == np.int16
     for name, wanted in (("rock", values), ("b", values / 2)):
         assert (found.values[name] == wanted).all() and found.values[name].shape == (layers or 1, 5, 4)
@@ -205,13 +207,13 @@ def test_a_netcdf_that_is_no_grid_gets_one_sentence(tmp_path):
     path = tmp_path / "grid.nc"
     xarray.Dataset({"rock": ("t", np.zeros(4))}).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match="has no variable with the axes y and x, or z, y and x"):
-        read_netcdf(path)
+        read_grid(path)
     path.write_bytes(path.read_bytes()[:200])
-    with pytest.raises(ValueError, match="cannot be read as NetCDF"):
-        read_netcdf(path)
+    with pytest.raises(ValueError, match="cannot be read, it is damaged"):
+        read_grid(path)
     some().isel(realisation=0, drop=True).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match=r"grid\.nc "):
-        read_netcdf(path, max_pixels=4)
+        read_grid(path, max_pixels=4)
 
 
 def _group(path):

@@ -10,8 +10,9 @@ from __future__ import annotations
 import os
 import re
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from math import isfinite, prod
 from pathlib import Path
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
 from simdtex.io.limits import BYTES, check_size, reading
-from simdtex.options import check_real, shown
+from simdtex.options import DataWarning, check_real, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
@@ -32,8 +33,11 @@ PathLike = str | os.PathLike[str]
 SUFFIXES = (".gslib", ".sgems")
 """The suffixes for writing grids; files to read are recognised by their first lines."""
 
-MISSING = (-999.0, -9999.0, -997799.0, -9966699.0, -9999999.0)
-"""Numbers for an unknown value: those of GSLIB, grids of maps, MPSlib, SGeMS, and DeeSse."""
+MISSING = (-99.0, -999.0, -999.25, -9999.0, -99999.0, -997799.0, -9966699.0, -9999999.0)
+"""Codes of an unknown value: Petrel's, GSLIB's, that of LAS, those of maps, MPSlib's, SGeMS's, and DeeSse's."""
+
+TRIMMED = 1e21
+"""The size from which GSLIB takes a number as unknown, below and above 0."""
 
 NO_DATA = -9966699
 """The number that is written for an unknown value, that of SGeMS."""
@@ -43,6 +47,9 @@ MAGIC = b"\xb2\x11\x17\x5d"
 _BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
 _WHOLE = (np.uint8, np.int16, np.int32)
 _SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
+_NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
+"""Names of an axis that do not have its letter."""
+
 _FAR = 1e30
 """The largest coordinate, far below the largest 32-bit float."""
 
@@ -70,11 +77,14 @@ class CartesianGrid:
         The centre of the first cell.
     cell : (x, y, z)
         The size of a cell.
+    crs : str
+        The coordinate reference system as WKT; empty if unknown.
     """
 
     values: dict[str, Array]
     origin: tuple[float, ...]
     cell: tuple[float, ...]
+    crs: str = ""
 
 
 def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:
@@ -102,35 +112,106 @@ def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
     return found
 
 
+def axis_of(name: str) -> str | None:
+    """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None.
+
+    Examples
+    --------
+    >>> [axis_of(name) for name in ("X", "Ycoord", "Northing (m)", "lon", "UTM_X", "z_loc", "Zn", "depth")]
+    ['x', 'y', 'y', 'x', 'x', 'z', None, None]
+    """
+    word = re.sub(r"\(.*|\[.*|[^a-z]", "", name.lower())
+    around = "(utm|point|coord|loc|pos)?", "(m|km|ft|utm|(coord|loc|pos)[a-z]*)?"
+    return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
+
+
+def known_numbers(
+    what: str, values: Array, missing: Iterable[float] = (), valid: tuple[float, float] | None = None
+) -> Array:
+    """Return values with NaN for those that are unknown, and warn of their number; `values` itself if all are known.
+
+    Unknown are the numbers ``missing``; and `MISSING`, and numbers of `TRIMMED` and above in size, if they are outside
+    of the range ``valid``, by default that of all other values, if there are any.
+    """
+    if not missing and (
+        values.size == 0 or (np.fmin.reduce(values, None) > max(MISSING) and np.fmax.reduce(values, None) < TRIMMED)
+    ):
+        return values
+    coded = np.isin(values, MISSING) | ((np.abs(values) >= TRIMMED) & np.isfinite(values))
+    others = values[~(coded | np.isnan(values))]
+    others = others if others.size else values[~(np.isin(values, MISSING) | np.isnan(values))]
+    low, high = valid or ((others.min(), others.max()) if others.size else (np.inf, -np.inf))
+    unknown = (coded & ~((values >= low) & (values <= high))) | np.isin(values, tuple(missing))
+    if not unknown.any():
+        return values
+    codes = np.unique(values[unknown])
+    shown = ", ".join(f"{code:.10g}" for code in codes[:3]) + ", ..." * (len(codes) > 3)
+    warnings.warn(
+        f"{what}: {np.count_nonzero(unknown)} of {values.size} values are {shown}, and are taken as unknown",
+        DataWarning,
+        stacklevel=2,
+    )
+    return np.where(unknown, values.dtype.type(np.nan) if values.dtype.kind == "f" else np.nan, values)
+
+
 def kind_of(path: PathLike) -> str | None:
     """Return the kind of a file by its first lines: ``"grid"``, ``"points"`` for a point set of Geo-EAS, or None."""
     if not os.path.isfile(path):
         return None
     try:
         with open(path, "rb") as file:
-            title, second, third = (file.readline(_LINE) for _ in range(3))
+            title, second, third = (_text(file.readline(_LINE)) for _ in range(3))
+            if title.startswith("#"):
+                file.seek(0)
+                return "grid" if "NX" in _geone_header(file) else None
+            file.seek(0)
+            if file.read(len(MAGIC)) == MAGIC:
+                return "grid"
     except OSError:
         return None
-    if title.startswith(MAGIC):
-        return "grid"
+    if (count := count_of(second, third)) is not None:
+        return "grid" if count == 1 or _of_title(title) else "points"
     words = second.split()
-    if len(words) not in (1, 4, 10, 11) or not words[0].isdigit():
+    if len(words) not in (4, 10, 11) or not (words[0].isdigit() and _all_numbers(words)):
         return None
-    if len(words) > 1:  # otherwise a table with that number of columns
-        return None if len(third.split()) == len(words) and _all_numbers(third.split()) else "grid"
-    return "grid" if _of_title(_text(title)) else "points"
+    return None if len(third.split()) == len(words) and _all_numbers(third.split()) else "grid"
 
 
-def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels: int | None = None) -> CartesianGrid:
-    """Return the grid in a file of GSLIB or Geo-EAS (text) or of SGeMS (binary), recognised by its content.
+def count_of(line: str, after: str = "") -> int | None:
+    """Return the number of variables in the second line of Geo-EAS, which words may follow; None if it has none.
+
+    ``after`` is the third line: in a table it has as many words.
+    """
+    words = line.split()
+    if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
+        return None
+    table = len(words) > 1 and (number_of(words[1]) is not None or len(after.split()) == len(words))
+    return None if table else int(words[0])
+
+
+def read_grid(
+    path: PathLike,
+    *,
+    variables: Iterable[str] | None = None,
+    missing: Iterable[float] = (),
+    valid: tuple[float, float] | None = None,
+    max_pixels: int | None = None,
+) -> CartesianGrid:
+    """Return the grid in a file of GSLIB, geone, SGeMS, NetCDF, HDF5 or a raster of GDAL, recognised by its content.
 
     Parameters
     ----------
     path : path
         A text: a title, the number of variables, their names, each in a line, and a value of each variable for each
-        cell, x fastest, then y, then z. Or a Cartesian grid saved by SGeMS. The notes describe the headers.
+        cell, x fastest, then y, then z; the notes describe the headers. Or a Cartesian grid saved by SGeMS; a raster,
+        such as a GeoTIFF or ESRI ASCII; or a NetCDF or HDF5 file.
+    variables : iterable of str, optional
+        The names of the variables to return; None: all.
     missing : iterable of float
-        Numbers that mean an unknown value; they become NaN.
+        Further numbers that mean an unknown value; they become NaN.
+    valid : (low, high), optional
+        The range of possible values. A known code of an unknown value (`MISSING`, or 1e21 and above in size) outside
+        of it becomes NaN. None: the range of the variable's values that are not such codes.
     max_pixels : int, optional
         The most values that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
@@ -138,6 +219,11 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     -------
     CartesianGrid
         Values (nz, ny, nx), the centre of the first cell, and the size of a cell.
+
+    Warns
+    -----
+    simdtex.options.DataWarning
+        Values are taken as unknown.
 
     Raises
     ------
@@ -147,33 +233,61 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
 
     Notes
     -----
-    A text gives the number of cells in one of three ways:
+    A text gives the number of cells in one of four ways:
 
-    * its first line is ``nx ny nz``, as in MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as in DeeSse and geone: sizes of
-      a cell, and the corner of the grid, half a cell before the first centre;
+    * its first line is ``nx ny nz``, as in MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as in DeeSse: sizes of a cell,
+      and the corner of the grid, half a cell before the first centre;
     * its second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz``, as in GSLIB: the
       centre of the first cell, and sizes; a last number is that of realisations, which follow each other;
-    * its title ends in ``(NXxNYxNZ)``, as in SGeMS.
+    * its title ends in ``(NXxNYxNZ)``, as in SGeMS;
+    * its first lines begin with ``#`` and have ``NX``, ``SX``, ``OX`` and so on, as in geone, and the next line has the
+      names.
 
     Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats; origin and size
-    are the shortest decimal numbers with these values. Regions and groups of SGeMS are ignored.
+    are the shortest decimal numbers with these values. Regions and groups of SGeMS are ignored. NetCDF and HDF5 need
+    the extra ``simulate``, rasters the extra ``rasters``. They are returned in ascending order of y, also if their
+    first row is the northern one.
     """
     with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
-        binary = file.read(len(MAGIC)) == MAGIC
-        columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
-    stands = np.array(tuple(missing), np.float64)
-    return CartesianGrid({key: _typed(column, stands).reshape(sides[::-1]) for key, column in columns.items()}, *lies)
+        head = file.read(len(MAGIC))
+        read = None if head.startswith(MAGIC) or kind_of(path) else _others(head, path)
+        if read is None:
+            columns, sides, lies = (_sgems if head.startswith(MAGIC) else _gslib)(file, most)
+            values = {name: column.reshape(sides[::-1]) for name, column in columns.items()}
+            grid = CartesianGrid(values, *lies)
+        else:
+            try:
+                grid = read(path, most)
+            except (MemoryError, ValueError):
+                raise
+            except Exception as error:  # each library has its own for a damaged file
+                raise ValueError(f"it cannot be read, it is damaged or of an unknown kind ({error})") from None
+        names = list(grid.values) if variables is None else list(variables)
+        if strange := [name for name in names if name not in grid.values]:
+            raise ValueError(f"it has no variable {strange[0]!r}: give one of {', '.join(grid.values)}")
+    values = {name: known_numbers(f"{path}, {name}", grid.values[name], missing, valid) for name in names}
+    return replace(grid, values={name: one if read else _typed(one) for name, one in values.items()})
+
+
+def _others(head: bytes, path: PathLike) -> Callable[[PathLike, int], CartesianGrid] | None:
+    """Return the reader of a file that is not a grid of GSLIB or SGeMS; None if it is none of NetCDF and GDAL."""
+    from simdtex.io import rasters  # which grids are a part of
+
+    if head.startswith(rasters.NETCDF):
+        return rasters.read_netcdf
+    suffix = Path(path).suffix.lower()
+    raster = suffix in rasters.SUFFIXES or (suffix in (".tif", ".tiff") and rasters.is_raster(Path(path).read_bytes()))
+    return rasters.raster_grid if raster else None
 
 
 Read = tuple[dict[str, Array], tuple[int, ...], Frame]
 """Columns of values by name, nx ny nz, and the position of the cells."""
 
 
-def _typed(column: Array, missing: NDArray[np.float64]) -> Array:
-    """Return a column with NaN for unknown values, or as integers if all values are known integers."""
-    unknown = np.isnan(column) | np.isin(column, missing)
-    if unknown.any():
-        return np.where(unknown, column.dtype.type(np.nan), column)
+def _typed(column: Array) -> Array:
+    """Return a column as integers if all its values are known integers of a small type."""
+    if np.isnan(column).any():
+        return column
     low, high = column.min(), column.max()
     for kind in _WHOLE:
         if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max and (column == np.floor(column)).all():
@@ -184,18 +298,32 @@ def _typed(column: Array, missing: NDArray[np.float64]) -> Array:
 def _gslib(file: BinaryIO, most: int) -> Read:
     """Return the columns of a grid's text."""
     file.seek(0)
-    title, second = (_text(file.readline(_LINE)) for _ in range(2))
-    words = second.split()
-    if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
-        raise ValueError(
-            f"line 2 is {second.strip()[:40]!r} and not the number of variables: give a grid of GSLIB or SGeMS"
-        )
-    names = []
-    for number in range(int(words[0])):
-        names.append(_text(file.readline(_LINE)).strip())
-        if not names[-1]:
-            raise ValueError(f"line {number + 3} has no name of a variable: it is cut short, or line 2 is wrong")
-    sides, lies, realisations = _geometry(title, words)
+    title = _text(file.readline(_LINE))
+    if title.startswith("#"):
+        file.seek(0)
+        header = _geone_header(file)
+        if header.get("SORTING", "+X+Y+Z") != "+X+Y+Z":
+            raise ValueError(f"its cells are sorted as {header['SORTING']}: save it with SORTING +X+Y+Z")
+        words = [
+            header.get(f"{key}{axis}", default) for key, default in zip("NSO", "110", strict=True) for axis in "XYZ"
+        ]
+        names, line = _text(file.readline(_LINE)).split(), len(header) + 2
+        sides, lies, realisations = _geometry(" ".join(words), [])
+    else:
+        second = _text(file.readline(_LINE))
+        words = second.split()
+        if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
+            raise ValueError(
+                f"line 2 is {second.strip()[:40]!r} and not the number of variables: give a grid of GSLIB or SGeMS"
+            )
+        count, names = int(words[0]), []
+        for line in range(3, 3 + count):
+            names.append(_text(file.readline(_LINE)).strip())
+            if not names[-1]:
+                raise ValueError(f"line {line} has no name of a variable: it is cut short, or line 2 is wrong")
+        line = 3 + count
+        sides, lies, realisations = _geometry(title, words[:1] if count_of(second) else words)
+    variables = len(names)
     if realisations > 1:
         names = [f"{name}__real{k}" for k in range(realisations) for name in names]
     names = _apart(names)
@@ -205,9 +333,22 @@ def _gslib(file: BinaryIO, most: int) -> Read:
     begin = file.tell()
     if os.fstat(file.fileno()).st_size - begin < 2 * count - 1:  # a digit for each, and blanks between them
         raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
-    numbers = _parsed(file, count, what, 3 + int(words[0]))
-    blocks = numbers.reshape(realisations, prod(sides), int(words[0]))
+    numbers = _parsed(file, count, what, line)
+    blocks = numbers.reshape(realisations, prod(sides), variables)
     return dict(zip(names, blocks.transpose(0, 2, 1).reshape(len(names), -1), strict=True)), sides, lies
+
+
+def _geone_header(file: BinaryIO) -> dict[str, str]:
+    """Return the fields of the lines with ``#`` that begin a text of geone, and read past them."""
+    found: dict[str, str] = {}
+    while True:
+        at = file.tell()
+        line = _text(file.readline(_LINE))
+        if not line.startswith("#"):
+            file.seek(at)
+            return found
+        words = line[1:].split()
+        found[words[0] if len(words) == 2 else f"line {len(found)}"] = words[-1] if words else ""
 
 
 def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int]:
@@ -406,11 +547,13 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     """Raise unless the format can hold the values of ``array``."""
     check_real("the grid", array)
     known = array.compressed()
-    wrong = np.isin(known, MISSING) if known.dtype.kind != "b" else np.zeros(known.shape, bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        wrong = np.isnan(known_numbers("", known)) & ~np.isnan(known)
     if wrong.any():
         raise ValueError(
-            f"{target} cannot hold {known[wrong][0]}, which stands for an unknown value there: give NaN where nothing "
-            "is known, or another number"
+            f"{target} cannot hold {known[wrong][0]}, which is a code for an unknown value there: give NaN for unknown "
+            "values, or another number"
         )
     if target.suffix.lower() == ".sgems":
         with np.errstate(over="ignore"):

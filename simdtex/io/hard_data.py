@@ -10,9 +10,9 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
 from math import prod
 from operator import index
 from pathlib import Path
@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.grids import MISSING, frame, number_of
+from simdtex.io.grids import axis_of, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
-from simdtex.options import check_real, one_of
+from simdtex.options import DataWarning, check_real, one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
@@ -32,8 +32,16 @@ Floats = NDArray[np.float64]
 SEVERAL = ("refuse", "mean", "most")
 """The treatments of different data in one cell."""
 
-_AXES = tuple(re.compile(rf"{axis}(?:$|[^a-z]|loc|coord)", re.IGNORECASE) for axis in "xyz")
-"""The names of columns of coordinates: x, Xlocation, X_coord, x (m), but not Zn."""
+OUTSIDE = ("refuse", "skip")
+"""The treatments of data outside the grid."""
+
+ROLES = ("x", "y", "z", "value")
+"""What a column of a table can be."""
+
+_DIGITS = frozenset("+-.0123456789")
+
+_UNKNOWN = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-")
+"""Cells of an unknown value, in lower case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,23 +73,42 @@ class HardData:
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
 
-def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData:
-    """Return the table of known values in a file.
+def read_hard_data(
+    table: Any,
+    *,
+    columns: Mapping[str, str | Sequence[str]] | None = None,
+    categories: Mapping[str, float] | None = None,
+    missing: Iterable[float] = (),
+    valid: tuple[float, float] | None = None,
+    max_pixels: int | None = None,
+) -> HardData:
+    """Return the table of known values in a file, or in a DataFrame of pandas.
 
     Parameters
     ----------
-    path : path
+    table : path or pandas.DataFrame
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
         separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
-        line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x
-        and y is a header, which names the variables; if the third of four or more columns is called z, it is the third
-        coordinate. A comment extends from ``#`` to the end of the line.
+        line. Numbers have a decimal point. A first line with fewer than two numbers is a header. An empty cell, NaN, NA
+        and the like are unknown values. A comment extends from ``#`` to the end of the line. A first column without a
+        name is the index of pandas and is left out.
 
-        Or a point set of Geo-EAS, recognised by a second line of one number: a title, the number of columns, their
-        names, each in a line, and a datum in each line, with blanks between numbers. The first columns are x and y and,
-        if its name is z, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
+        Or a point set of Geo-EAS, recognised by a second line that begins with the number of columns: a title, that
+        number, the names of the columns, each in a line, and a datum in each line, with blanks between numbers.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
+    columns : mapping, optional
+        The names of the columns ``"x"``, ``"y"``, ``"z"`` and ``"value"``, which may be a list for several variables.
+        Columns of a text without a header are called 1, 2 and so on. By default names that mean an axis are that axis,
+        in any order: x, Xcoord, Easting, lon, column; y, Y_loc, Northing, lat, row; z, if another column is left for
+        the value. All other columns are values. Without a header x and y are the first two columns.
+    categories : mapping of str to float, optional
+        The number of each category that the table gives as a text, for example ``{"sand": 1, "shale": 0}``.
+    missing : iterable of float
+        Further numbers that mean an unknown value.
+    valid : (low, high), optional
+        The range of possible values. A known code of an unknown value (`simdtex.io.grids.MISSING`, or 1e21 and above
+        in size) outside of it is unknown. None: the range of the variable's values that are not such codes.
     max_pixels : int, optional
         The most cells, or bytes of a text, to read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
@@ -90,87 +117,74 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     HardData
         The data in the order of the file. Variables without a name are ``value``, or ``value 1`` and so on.
 
+    Warns
+    -----
+    simdtex.options.DataWarning
+        Values are taken as unknown, or columns of text are left out.
+
     Raises
     ------
     ValueError
-        The file is missing, not a table, too large, has no rows, or has an invalid row; the message names the line.
+        The file is missing, not a table, too large, has no rows, names no columns x and y, or has an invalid row; the
+        message names the line.
 
     Notes
     -----
-    Cost: about 8 s for a million rows of text.
+    Cost: about 4 s for a million rows of text.
     """
-    binary = Path(path).suffix.lower() == ".npy"
-    with reading(path, "the hard data", max_pixels, each=BYTES if binary else 1) as most:
+    if not isinstance(table, (str, os.PathLike)):
+        cells = [[str(cell) for cell in table[name]] for name in table.columns]
+        data = _of_columns(cells, [str(name) for name in table.columns], None, columns, categories)
+        return _without_codes("the table", data, missing, valid)
+    binary = Path(table).suffix.lower() == ".npy"
+    with reading(table, "the hard data", max_pixels, each=BYTES if binary else 1) as most, open(table, "rb") as file:
         if binary:
-            with open(path, "rb") as file:
-                return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
-        with open(path, encoding="utf-8-sig") as text:
-            try:
-                return _parsed(text)
-            except UnicodeDecodeError:
-                raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
+            return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
+        try:
+            text = file.read().decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
+        data = _parsed(text, columns, categories)
+    return _without_codes(os.fspath(table), data, missing, valid)
 
 
-def _parsed(text: Iterable[str]) -> HardData:
-    """Return the data in the lines of a table or of a point set."""
-    lines = iter(text)
-    first = list(islice(lines, 2))
-    if len(first) == 2 and re.fullmatch(r"\s*[0-9]{1,9}\s*", first[1]):
-        return _point_set(int(first[1]), lines)
-    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in enumerate(chain(first, lines), 1))
-    kept = [(number, line) for number, line in stripped if line.strip()]
-    if not kept:
-        raise ValueError("the table is empty: give a line with x, y and a value for each datum")
-    delimiter = next((one for one in ";\t," if one in kept[0][1]), None)
-    rows = [(number, _cells(line, number, delimiter)) for number, line in kept]
-    columns, names = len(rows[0][1]), None
-    if columns < 3:
-        raise ValueError(
-            f"line {rows[0][0]} has {columns} cell{'s' * (columns != 1)}: give x, y and one value or more, with "
-            "commas, semicolons, tabs or blanks between them"
-        )
-    if all(cell[:1].isalpha() and number_of(cell) is None for cell in rows[0][1][:2]):
-        names = rows.pop(0)[1]
-        _check_order(names)
-    if not rows:
-        raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
-    return _of_rows(rows, columns, names)
-
-
-def _point_set(columns: int, lines: Iterable[str]) -> HardData:
-    """Return the data of a point set of Geo-EAS, parsed from its third line on."""
-    numbered = enumerate(lines, 3)
-    names = [line.strip() for _, line in islice(numbered, columns)]
-    if columns < 3:
-        raise ValueError(f"the point set has {columns} column{'s' * (columns != 1)}: give x, y and one value or more")
-    rows = [(number, cells) for number, line in numbered if (cells := line.split())]
-    if not rows:
-        raise ValueError(f"the point set has no line after the names of its {columns} columns: get the file again")
-    if not all(axis.match(name) for axis, name in zip(_AXES[:2], names, strict=False)):
-        raise ValueError(f"the first columns are {names[0]!r} and {names[1]!r}: put x and y there, and call them so")
-    data = _of_rows(rows, columns, names)
-    data.values[np.isin(data.values, MISSING)] = np.nan
+def _without_codes(name: str, data: HardData, missing: Iterable[float], valid: tuple[float, float] | None) -> HardData:
+    """Return the data with NaN for codes of unknown values, and warn of their number."""
+    for variable, column in zip(data.names, data.values.T, strict=True):
+        column[:] = known_numbers(f"{name}, column {variable}", column, missing, valid)
     return data
 
 
-def _of_rows(rows: Sequence[tuple[int, list[str]]], columns: int, names: Sequence[str] | None) -> HardData:
-    """Return the data of numbered rows of cells."""
-    axes = 3 if names and columns > 3 and _AXES[2].match(names[2]) else 2
-    for number, cells in rows:
-        if len(cells) != columns:
-            raise ValueError(f"line {number} has {len(cells)} cells and those before it {columns}: give as many in all")
-    table = np.empty((len(rows), columns))
-    for k, (number, cells) in enumerate(rows):
-        for column, cell in enumerate(cells):
-            value = np.nan if not cell and column >= axes else number_of(cell)
-            if value is None:
-                raise ValueError(
-                    f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
-                    "decimal point" + (", and leave the cell of an unknown value empty" if column >= axes else "")
-                )
-            table[k, column] = value
-    values = _names(columns - axes, names and names[axes:])
-    return HardData(table[:, :axes], table[:, axes:], values, tuple(number for number, _ in rows))
+def _parsed(text: str, columns: Any, categories: Any) -> HardData:
+    """Return the data in the text of a table or of a point set."""
+    lines = text.splitlines()
+    width = count_of(lines[1]) if len(lines) > 1 else None
+    names = None if width is None else [line.strip() for line in lines[2 : 2 + width]]
+    body = enumerate(lines[0 if width is None else 2 + width :], 1 if width is None else 3 + width)
+    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in body)
+    kept = [(number, line) for number, line in stripped if line.strip()]
+    if not kept:
+        what = (
+            "the table is empty" if width is None else f"the point set has no line after the names of {width} columns"
+        )
+        raise ValueError(f"{what}: give a line with x, y and a value for each datum")
+    delimiter = next((one for one in ";\t," if one in kept[0][1]), None) if width is None else None
+    rows = [_cells(line, number, delimiter) for number, line in kept]
+    found = [number for number, _ in kept]
+    columns_there = len(rows[0])
+    if columns_there < 3:
+        raise ValueError(
+            f"line {found[0]} has {columns_there} cell{'s' * (columns_there != 1)}: give x, y and one value or more, "
+            "with commas, semicolons, tabs or blanks between them"
+        )
+    for number, row in zip(found, rows, strict=True):
+        if len(row) != (before := columns_there if names is None else len(names)):
+            raise ValueError(f"line {number} has {len(row)} cells and those before it {before}: give as many in all")
+    if names is None and sum(cell[:1] in _DIGITS for cell in rows[0] if cell) < 2:
+        names, rows, found = rows[0], rows[1:], found[1:]
+        if not rows:
+            raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
+    return _of_columns(list(zip(*rows, strict=True)), names, found, columns, categories)
 
 
 def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
@@ -183,18 +197,88 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _check_order(header: Sequence[str]) -> None:
-    """Raise unless x and y are the first columns of a header that names both."""
-    names = [name.lower() for name in header]
-    if ("x" in names and names[0] != "x") or ("y" in names and names[1] != "y") or names[0] in ("row", "rows"):
+def _of_columns(
+    cells: Sequence[Sequence[str]], names: list[str] | None, lines: list[int] | None, columns: Any, categories: Any
+) -> HardData:
+    """Return the data of columns of texts; ``names`` are those of a header, ``lines`` the numbers of the rows."""
+    listed = {k: str(k + 1) for k in range(len(cells))} if names is None else dict(enumerate(names))
+    if names and (not names[0] or names[0].startswith("Unnamed: 0")):  # the index of pandas
+        del listed[0]
+    points, values = _roles(listed, names is not None, columns or {})
+    if not columns or "value" not in columns:  # without names of wells
+        left = [k for k in values if not categories and all(map(_is_text, cells[k]))]
+        if 0 < len(left) < len(values):
+            values = [k for k in values if k not in left]
+            shown = ", ".join(listed[k] for k in left)
+            warnings.warn(f"left out, because they hold text: the columns {shown}", DataWarning, stacklevel=2)
+    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
+    found = np.array([_numbers(cells[k], k, lines, codes if k in values else None) for k in (*points, *values)]).T
+    plain = ["value"] if len(values) == 1 else [f"value {k + 1}" for k in range(len(values))]
+    labels = tuple((names and names[k]) or name for k, name in zip(values, plain, strict=True))
+    axes = len(points)
+    return HardData(found[:, :axes].copy(), found[:, axes:].copy(), labels, tuple(lines) if lines else None)
+
+
+def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tuple[list[int], list[int]]:
+    """Return the columns of coordinates, and those of values; without a header ``names`` are numbers."""
+    listed = {name: k for k, name in names.items()}
+    chosen: dict[str, list[int]] = {} if named else {"x": [0], "y": [1]}
+    for role, wanted in columns.items():
+        chosen[role] = []
+        for name in [wanted] if isinstance(wanted, str) else wanted:
+            if role not in ROLES or name not in listed:
+                raise ValueError(
+                    f"there is no column {name!r} for {role!r}: give columns of {', '.join(listed)} for x, y, z or value"
+                )
+            chosen[role].append(listed[name])
+    taken = [k for some in chosen.values() for k in some]
+    meant = {k: axis_of(name) for k, name in names.items() if k not in taken}
+    for axis in "xyz":
+        of_axis = [k for k, one in meant.items() if one == axis]
+        last = axis == "z" and "value" not in chosen and len(names) - len(taken) < 2
+        if axis in chosen or not of_axis or last:
+            continue
+        if len(of_axis) > 1:
+            both = " and ".join(names[k] for k in of_axis)
+            raise ValueError(f"the columns {both} both mean {axis}: choose one by its name, {_example(listed, axis)}")
+        chosen[axis] = of_axis
+        taken += of_axis
+    if lacking := [axis for axis in "xy" if axis not in chosen]:
         raise ValueError(
-            f"the columns are {', '.join(header)}: put them in the order x (the column), y (the row), and the values"
+            f"no column of {', '.join(listed)} is called {lacking[0]}, or a word for it: name the columns, "
+            f"{_example(listed, 'x')}"
         )
+    values = chosen.get("value", [k for k in names if k not in taken])
+    if not values:
+        raise ValueError("the table has coordinates and no values: give x, y and one value or more")
+    if twice := [names[k] for k in (*taken, *values) if list(names.values()).count(names[k]) > 1 and names[k]]:
+        raise ValueError(f"two columns are called {twice[0]}: rename one")
+    return [chosen[axis][0] for axis in "xyz" if axis in chosen], values
 
 
-def _names(variables: int, header: Sequence[str] | None = None) -> tuple[str, ...]:
-    plain = ["value"] if variables == 1 else [f"value {k + 1}" for k in range(variables)]
-    return tuple(given or name for given, name in zip(header or plain, plain, strict=True))
+def _example(listed: Mapping[str, int], axis: str) -> str:
+    name = next(iter(listed))
+    return f"as {{{axis!r}: {name!r}, ...}} in Python or --columns {axis}={name},... on the command line"
+
+
+def _is_text(cell: str) -> bool:
+    return cell.lower() in _UNKNOWN or number_of(cell) is None
+
+
+def _numbers(cells: Sequence[str], column: int, lines: Sequence[int] | None, codes: dict[str, float] | None) -> Floats:
+    """Return the numbers of a column; ``codes`` are those of texts, or None for a column of coordinates."""
+    found = np.empty(len(cells))
+    for row, cell in enumerate(cells):
+        unknown = codes is not None and cell.lower() in _UNKNOWN
+        value = np.nan if unknown else (codes or {}).get(cell.lower(), number_of(cell))
+        if value is None:
+            where = f"row {row}" if lines is None else f"line {lines[row]}"
+            remedy = "write numbers with a decimal point"
+            if codes is not None:
+                remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
+            raise ValueError(f"{where} has {cell[:40]!r} in column {column + 1}, which is no number: {remedy}")
+        found[row] = value
+    return found
 
 
 def _table(array: Any) -> HardData:
@@ -209,7 +293,9 @@ def _table(array: Any) -> HardData:
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
     found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)
-    return HardData(found[:, :2], found[:, 2:], _names(numbers.shape[1] - 2))
+    variables = found.shape[1] - 2
+    names = ("value",) if variables == 1 else tuple(f"value {k + 1}" for k in range(variables))
+    return HardData(found[:, :2], found[:, 2:], names)
 
 
 def place_hard_data(
@@ -220,6 +306,7 @@ def place_hard_data(
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     several: str = "refuse",
+    outside: str = "refuse",
 ) -> np.ma.MaskedArray:
     """Return known values placed in the cells of a grid, or in the pixels of a picture.
 
@@ -242,6 +329,8 @@ def place_hard_data(
         Value for different data in one cell: an error; their mean, rounded to the nearest integer (halves up) unless
         the type is a float; or the most frequent value, the first in the table if several are equally frequent. Each
         variable is treated separately.
+    outside : {"refuse", "skip"}
+        Data outside the grid: an error; or they are left out, with a warning of their number.
 
     Returns
     -------
@@ -254,8 +343,9 @@ def place_hard_data(
     TypeError
         The table or the type is not of real numbers.
     ValueError
-        A coordinate is not finite, a datum is outside of the grid, two data of one cell have different values and
-        `several` is ``"refuse"``, the type cannot hold a value, or nothing is known; the message names the row.
+        A coordinate is not finite, a datum is outside of the grid and `outside` is ``"refuse"``, two data of one cell
+        have different values and `several` is ``"refuse"``, the type cannot hold a value, or nothing is known; the
+        message names the row.
 
     Examples
     --------
@@ -279,11 +369,21 @@ def place_hard_data(
     if kind.kind not in "buif":
         raise TypeError(f"dtype is {kind}: give bool, or a type of integers or real floats")
     one_of("several", several, SEVERAL)
+    one_of("outside", outside, OUTSIDE)
     if not len(data):
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
     if len(sides) > data.points.shape[1]:
         raise ValueError(f"shape is {shape!r}: give (rows, cols), or hard data with a column z after x and y")
     sites = _sites(data, sides, origin, cell)
+    inside = sites >= 0
+    if outside == "skip" and not inside.all():
+        skipped = f"{np.count_nonzero(~inside)} of {len(data)} data are outside of the grid and are left out"
+        warnings.warn(skipped, DataWarning, stacklevel=2)
+        rows = np.flatnonzero(inside)
+        lines = data.lines and tuple(data.lines[row] for row in rows)
+        data, sites = HardData(data.points[rows], data.values[rows], data.names, lines), sites[rows]
+    elif not inside.all():
+        _refuse_outside(data, int(inside.argmin()), sides, origin, cell)
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():
@@ -329,33 +429,42 @@ def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.int
     return found, values[first[order][chosen]]
 
 
+def _along(
+    data: HardData, shape: tuple[int, ...], origin: Sequence[float] | None, cell: Sequence[float] | None
+) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    """Return the first centres, the sizes of a cell, and the numbers of cells, along x, y and, of such data, z."""
+    axes, lies = data.points.shape[1], frame(origin, cell)
+    at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
+    return at, size, np.array((1, *shape)[: -axes - 1 : -1])
+
+
 def _sites(
     data: HardData, shape: tuple[int, ...], origin: Sequence[float] | None, cell: Sequence[float] | None
 ) -> NDArray[np.intp]:
-    """Return the index of each datum's site, row by row."""
-    axes = data.points.shape[1]
-    lies = frame(origin, cell)
-    at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
-    sides = np.array((1, *shape)[: -axes - 1 : -1])  # along x, y and z
+    """Return the index of each datum's site, row by row, or -1 if it is outside of the grid."""
+    at, size, sides = _along(data, shape, origin, cell)
     with np.errstate(invalid="ignore", over="ignore"):  # infinity is outside
         cells = (data.points - at) / size
         low = np.floor(cells)
         nearest = low + (cells - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
-    outside = ~((nearest >= 0) & (nearest < sides)).all(axis=1)  # NaN too
-    if outside.any():
-        row = int(outside.argmax())
-        there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
-        first, last = at - size / 2, at + (sides - 0.5) * size
-        ranges = ", ".join(f"{axis} from {a} to below {b}" for axis, a, b in zip("xyz", first, last, strict=False))
-        raise ValueError(
-            f"{data.where(row)} of the hard data is at {there}, outside of a picture of "
-            f"{' x '.join(map(str, sides))} pixels (width x height{' x depth' * (axes > 2)}): give {ranges}, or tell "
-            "`simulate` the origin and the size of its cells"
-        )
+    inside = ((nearest >= 0) & (nearest < sides)).all(axis=1)  # not of NaN
     found: NDArray[np.intp] = np.zeros(len(data), np.intp)
-    for axis in range(axes)[::-1]:
-        found = found * sides[axis] + nearest[:, axis].astype(np.intp)
-    return found
+    for axis in range(len(sides))[::-1]:
+        found = found * sides[axis] + np.where(inside, nearest[:, axis], 0).astype(np.intp)
+    return np.where(inside, found, -1)
+
+
+def _refuse_outside(data: HardData, row: int, shape: tuple[int, ...], origin: Any, cell: Any) -> None:
+    """Raise since a datum is outside of the grid."""
+    at, size, sides = _along(data, shape, origin, cell)
+    there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
+    first, last = at - size / 2, at + (sides - 0.5) * size
+    ranges = ", ".join(f"{axis} from {a} to below {b}" for axis, a, b in zip("xyz", first, last, strict=False))
+    raise ValueError(
+        f"{data.where(row)} of the hard data is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
+        f"pixels (width x height{' x depth' * (len(sides) > 2)}): give {ranges}, tell `simulate` the origin and the "
+        'size of its cells, or leave such data out with outside="skip" (--outside skip)'
+    )
 
 
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:

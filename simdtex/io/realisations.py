@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing the realisations of a simulation, by xarray, as NumPy arrays, or as a grid; and reading NetCDF.
+"""Writing the realisations of a simulation, by xarray, as NumPy arrays, or as a grid.
 
 Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns. The extra ``simulate`` installs the libraries:
 ``pip install 'simdtex[simulate]'``.
@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target
-from simdtex.io.grids import SUFFIXES, CartesianGrid, write_grid
-from simdtex.io.limits import check_array, reading
+from simdtex.io.grids import SUFFIXES, write_grid
+from simdtex.io.rasters import axis_place
 from simdtex.options import require
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
-__all__ = ["check_realisations_path", "read_netcdf", "write_realisations"]
+__all__ = ["check_realisations_path", "write_realisations"]
 
 MARK = "simdtex_realisations"
 """The attribute that lists the arrays of a Zarr store written here; only a store with it is replaced."""
@@ -98,7 +98,7 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     source = hasattr(array, "data_vars")
     suffix = check_realisations_path(path, source=source)
     if suffix in SUFFIXES:
-        origin, cell = zip(*(_axis(array, axis) for axis in "xyz"), strict=True)
+        origin, cell = zip(*(axis_place(array, axis) for axis in "xyz"), strict=True)
         write_grid(path, dict(_variables(array)), origin=origin, cell=cell)
         return
     if suffix == ".npz":
@@ -134,47 +134,6 @@ def _own(store: Path) -> bool:
         return False
 
 
-def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
-    """Return the variables of a NetCDF 4 file with the axes y and x, or z, y and x, as a grid.
-
-    Parameters
-    ----------
-    path : path
-        The file. Its coordinates z, y and x, if any, are evenly spaced and ascend.
-    max_pixels : int, optional
-        The most values of a variable that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
-
-    Returns
-    -------
-    CartesianGrid
-        Values (nz, ny, nx) in the file's types, for all variables with the axes of the first such variable; the centre
-        of the first cell, and the size of a cell.
-
-    Raises
-    ------
-    ValueError
-        The file is missing, damaged, too large, or has no such variable, or a library is not installed.
-    """
-    name = os.fspath(path)
-    require("simulate", *_NEEDED[".nc"])
-    import xarray
-
-    with (
-        reading(name, "the grid", max_pixels, kind="NetCDF") as most,
-        xarray.open_dataset(name, engine="h5netcdf") as data,
-    ):
-        found = [one for one in data.data_vars.values() if set(one.dims) in ({"x", "y"}, {"x", "y", "z"})]
-        found = [one for one in found if set(one.dims) == set(found[0].dims)]
-        for one in found:
-            check_array(one.shape, one.dtype.itemsize, most)
-        arrays = [one.transpose(..., "y", "x").load() for one in found]
-    if not arrays:
-        raise ValueError(f"{name} has no variable with the axes y and x, or z, y and x: rename its dimensions")
-    origin, cell = zip(*(_axis(arrays[0], axis) for axis in "xyz"), strict=True)
-    values = {str(one.name): one.values.reshape(-1, *one.shape[-2:]) for one in arrays}
-    return CartesianGrid(values, origin, cell)
-
-
 def _variables(array: Any) -> Iterator[tuple[str, Any]]:
     """Yield the name and the values, (z, y, x) or (y, x), of every variable of every realisation."""
     dims = [str(dim) for dim in array.dims]
@@ -192,16 +151,3 @@ def _variables(array: Any) -> Iterator[tuple[str, Any]]:
             names = [f"{name}{joint}{number}" for number in numbers for name in names]
     sides = planes.shape[sum(dim in dims for dim in ("realisation", "variable")) :]
     yield from zip(names, planes.reshape(-1, *sides), strict=True)
-
-
-def _axis(array: Any, axis: str) -> tuple[float, float]:
-    """Return the first coordinate along an axis, and the size of a cell, which is that of the attribute, if any."""
-    if axis not in array.coords:
-        return 0.0, float(array.attrs.get(f"cell_{axis}", 1.0))
-    values = np.atleast_1d(np.asarray(array.coords[axis].values, np.float64))
-    between = (values[-1] - values[0]) / (len(values) - 1) if len(values) > 1 else 1.0
-    size = float(array.attrs.get(f"cell_{axis}", between))
-    off = np.abs(values - (values[0] + size * np.arange(len(values))))
-    if not (size > 0 and (off <= size / 1000).all()):  # NaN too
-        raise ValueError(f"the coordinate {axis} is not evenly spaced in ascending order, as those of a grid are")
-    return float(values[0]), size

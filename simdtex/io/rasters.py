@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rasters of GDAL with their georeference and no-data, by rasterio; and grids of NetCDF and HDF5, by xarray.
+
+The extra ``rasters`` installs rasterio, and the extra ``simulate`` xarray and its readers.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.io.grids import CartesianGrid, axis_of
+from simdtex.io.limits import check_array
+from simdtex.options import DataWarning, require
+
+Array = NDArray[Any]
+PathLike = str | os.PathLike[str]
+
+DRIVERS = (
+    "GTiff",
+    "AAIGrid",
+    "HFA",
+    "EHdr",
+    "ENVI",
+    "GSAG",
+    "GSBG",
+    "GS7BG",
+    "SRTMHGT",
+    "USGSDEM",
+    "SAGA",
+    "RST",
+    "ILWIS",
+)
+"""The drivers of GDAL in use, since some others read further files or the network, for example VRT."""
+
+SUFFIXES = (".asc", ".img", ".bil", ".grd", ".hgt", ".dem", ".sdat", ".rst", ".mpr", ".flt")
+"""Suffixes of rasters that are not recognised by their first bytes."""
+
+NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
+"""How NetCDF and HDF5 files begin."""
+
+_TAGS = (33550, 33922, 34264, 34735, 42113)
+"""TIFF tags of georeference and no-data."""
+
+
+class Georeference(NamedTuple):
+    """Where the pixels of a raster lie.
+
+    Attributes
+    ----------
+    crs : str
+        The coordinate reference system as WKT; empty if unknown.
+    transform : tuple of float
+        a, b, c, d, e, f: the corner of the pixel in column i, row j, is at x = a i + b j + c, y = d i + e j + f.
+    nodata : float, optional
+        The number that marks an unknown value in the file.
+    """
+
+    crs: str
+    transform: tuple[float, float, float, float, float, float]
+    nodata: float | None = None
+
+    def moved(self, left: int, top: int) -> Georeference:
+        """Return the georeference of a raster with this many more columns at the left and rows at the top."""
+        a, b, c, d, e, f = self.transform
+        return self._replace(transform=(a, b, c - a * left - b * top, d, e, f - d * left - e * top))
+
+
+def is_raster(data: bytes) -> bool:
+    """Return whether the bytes of a file are a raster: ESRI ASCII, or a TIFF with georeference, no-data or a mask."""
+    if data[:5].lower() == b"ncols":
+        return True
+    if data[:4] not in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+        return False
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(io.BytesIO(data)) as tiff:
+            pages: Any = tiff.pages
+            return any(tag in pages.first.tags for tag in _TAGS) or any(page.subfiletype & 4 for page in pages)
+    except Exception:  # the reader of pictures reports the error
+        return False
+
+
+def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeference, list[str]]:
+    """Return the pixels of a raster of at most ``most`` pixels, its georeference, and the names of its bands.
+
+    Pixels are (rows, cols) or (rows, cols, bands) in the file's type. Unknown ones are NaN in floats, and masked in
+    integers; a band of alpha is a band. The first row is that of the file, most often the northern one.
+    """
+    require("rasters", "rasterio")
+    import rasterio
+    from rasterio.enums import ColorInterp
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        where = io.BytesIO(source) if isinstance(source, bytes) else os.fspath(source)
+        with rasterio.open(where, driver=list(DRIVERS)) as raster:
+            itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
+            check_array((raster.height, raster.width, raster.count), itemsize, most)
+            pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
+            crs = raster.crs.to_wkt() if raster.crs else ""
+            geo = Georeference(crs, tuple(raster.transform)[:6], raster.nodata)
+            names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
+            scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
+    if scaled:
+        warnings.warn(
+            "the scale and the offset of the raster are not applied to its numbers", DataWarning, stacklevel=2
+        )
+    hidden = np.ma.getmaskarray(pixels)
+    pixels = np.moveaxis(np.ma.getdata(pixels), 0, -1)
+    if hidden.any():
+        hidden = np.moveaxis(hidden, 0, -1)
+        pixels = np.where(hidden, np.nan, pixels) if pixels.dtype.kind == "f" else np.ma.MaskedArray(pixels, hidden)
+    return (pixels[..., 0] if len(names) == 1 else pixels), geo, names
+
+
+def raster_grid(path: PathLike, most: int) -> CartesianGrid:
+    """Return a raster as a grid: its bands as variables, rows in ascending order of y, unknown values NaN."""
+    pixels, geo, names = read_raster(path, most)
+    a, b, c, d, e, f = geo.transform
+    if b or d:
+        raise ValueError("its rows are not parallel to the x axis: warp it to north up first, for example by gdalwarp")
+    planes: Any = pixels.reshape(*pixels.shape[:2], -1)
+    if np.ma.isMaskedArray(planes):
+        planes = np.ma.filled(planes.astype(np.float64), np.nan)
+    rows, cols = planes.shape[:2]
+    values = {name: planes[None, :: -1 if e < 0 else 1, :: -1 if a < 0 else 1, k] for k, name in enumerate(names)}
+    first = min(c, c + a * cols) + abs(a) / 2, min(f, f + e * rows) + abs(e) / 2, 0.0
+    return CartesianGrid(values, first, (abs(a), abs(e), 1.0), geo.crs)
+
+
+def write_raster(path: Path, bands: Array, geo: Georeference, names: Sequence[str] = ()) -> None:
+    """Write bands (bands, rows, cols) as a GeoTIFF, over an existing file."""
+    require("rasters", "rasterio")
+    import rasterio
+    from rasterio.io import MemoryFile
+
+    bands = bands.astype(np.float32) if bands.dtype == np.float16 else bands
+    about = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype.name}
+    colours = {"photometric": "RGB"} | ({"alpha": "YES"} if len(bands) == 4 else {})
+    about |= colours if len(bands) in (3, 4) and bands.dtype in (np.uint8, np.uint16) else {}
+    about |= {"crs": geo.crs or None, "transform": rasterio.Affine(*geo.transform), "nodata": geo.nodata}
+    with MemoryFile() as memory:  # GDAL does not report every full disk
+        with memory.open(driver="GTiff", compress="deflate", **about) as raster:
+            raster.write(bands)
+            for k, name in enumerate(names, 1):
+                raster.set_band_description(k, name)
+        path.write_bytes(memory.read())
+
+
+def read_netcdf(path: PathLike, most: int) -> CartesianGrid:
+    """Return the variables of a NetCDF or HDF5 file that have the axes y and x, or z, y and x, as a grid.
+
+    All variables with the axes of the first such variable are read, in ascending order of the coordinates, unknown
+    values NaN. CF conventions and names such as lon, lat and northing tell the axes; without names of dimensions they
+    are (z, y, x) by position. A variable with further axes, for example time, gives one variable ``NAME[k]`` for each
+    of their steps.
+    """
+    require("simulate", "xarray", "cf_xarray", "h5netcdf", "h5py")
+    import cf_xarray  # noqa: F401 - the accessor cf
+    import xarray
+
+    with open(path, "rb") as file:
+        classic = file.read(3) == b"CDF"
+    how: dict[str, Any] = {"engine": "scipy"} if classic else {"engine": "h5netcdf", "phony_dims": "access"}
+    with xarray.open_dataset(os.fspath(path), decode_times=False, **how) as data:
+        told = data.cf.guess_coord_axis().cf
+        means = {"x": ("X", "longitude"), "y": ("Y", "latitude"), "z": ("Z", "vertical")}
+        known = {**told.coordinates, **told.axes}
+        axes = {name: axis for axis, keys in means.items() for key in keys for name in known.get(key, ())}
+        found: dict[str, Any] = {}
+        for name, one in data.data_vars.items():
+            dims = [str(dim) for dim in one.dims]
+            if all(dim.startswith("phony_dim") for dim in dims) and len(dims) in (2, 3):
+                one = one.rename(dict(zip(dims, "zyx"[-len(dims) :], strict=True)))
+            else:
+                named = {dim: axes.get(dim) or axis_of(dim) for dim in dims}
+                one = one.rename({dim: axis for dim, axis in named.items() if axis and axis != dim})
+            if {"x", "y"} <= set(one.dims):
+                found |= _steps(str(name), one)
+        if not found:
+            raise ValueError("it has no variable with the axes y and x, or z, y and x: rename its dimensions")
+        first = next(iter(found.values()))
+        found = {name: one for name, one in found.items() if one.sizes == first.sizes}
+        for one in found.values():
+            check_array(one.shape, one.dtype.itemsize, most // len(found))
+        arrays = {name: _ascending(one).load() for name, one in found.items()}
+        mapping = data.get(str(first.encoding.get("grid_mapping", "")))
+        about: Mapping[Any, Any] = {} if mapping is None else mapping.attrs
+    origin, cell = zip(*(axis_place(next(iter(arrays.values())), axis) for axis in "xyz"), strict=True)
+    values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
+    return CartesianGrid(values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))))
+
+
+def _steps(name: str, array: Any) -> dict[str, Any]:
+    """Return a variable without axes other than z, y and x: one for each of their steps, with its number."""
+    others = [dim for dim in array.dims if dim not in ("x", "y", "z")]
+    found = {}
+    for step in product(*(range(array.sizes[dim]) for dim in others)):
+        whole = all(array.sizes[dim] == 1 for dim in others)
+        found[name if whole else f"{name}[{','.join(map(str, step))}]"] = array.isel(
+            dict(zip(others, step, strict=True))
+        )
+    return found
+
+
+def _ascending(array: Any) -> Any:
+    """Return an array (z, y, x) in ascending order of its coordinates."""
+    down = [dim for dim in array.dims if dim in array.coords and array[dim].size > 1 and array[dim][0] > array[dim][-1]]
+    return array.isel({dim: slice(None, None, -1) for dim in down}).transpose(..., "y", "x")
+
+
+def axis_place(array: Any, axis: str) -> tuple[float, float]:
+    """Return the first coordinate along an axis, and the size of a cell, which is that of the attribute, if any."""
+    if axis not in array.coords:
+        return 0.0, float(array.attrs.get(f"cell_{axis}", 1.0))
+    values = np.atleast_1d(np.asarray(array.coords[axis].values, np.float64))
+    between = (values[-1] - values[0]) / (len(values) - 1) if len(values) > 1 else 1.0
+    size = float(array.attrs.get(f"cell_{axis}", between))
+    off = np.abs(values - (values[0] + size * np.arange(len(values))))
+    if not (size > 0 and (off <= size / 1000).all()):  # NaN too
+        raise ValueError(f"the coordinate {axis} is not evenly spaced in ascending order, as those of a grid are")
+    return float(values[0]), size
