@@ -20,6 +20,7 @@ from typing import Any, NoReturn
 import click
 
 from simdtex.cli.places import check_places
+from simdtex.options import DataWarning
 
 UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
 """Modules in which an exception does harm: the search for runtimes, and callbacks of collected objects."""
@@ -37,7 +38,7 @@ def reporting() -> Iterator[None]:
     """Check the paths of the running command, and report errors and signals in one sentence."""
     context = click.get_current_context()
     try:
-        with catch_signals(context):
+        with catch_signals(context), noting():
             check_places(context)
             yield
     except BrokenPipeError as error:
@@ -129,6 +130,23 @@ def afterwards() -> Iterator[None]:
 def note(sentence: str) -> None:
     """Print a sentence on standard error."""
     click.echo(f"simdtex: {sentence}", err=True)
+
+
+@contextmanager
+def noting() -> Iterator[None]:
+    """Print warnings about the data as notes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", DataWarning)
+        other = warnings.showwarning
+
+        def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, DataWarning):
+                note(str(message))
+            else:
+                other(message, category, *rest, **more)
+
+        warnings.showwarning = show
+        yield
 
 
 def settle(*errors: Exception) -> None:

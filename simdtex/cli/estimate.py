@@ -11,10 +11,10 @@ import click
 
 from simdtex.cli.command import DATA, command
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import output_shape, read_material
-from simdtex.cli.options import DEVICE, KNOWN, SAMPLE_MASK, given, option, places, size_option
+from simdtex.cli.inputs import output_shape, read_material, take_reading
+from simdtex.cli.options import DEVICE, SAMPLE_MASK, data_options, given, option, places, size_option
 from simdtex.cli.places import EITHER, READ
-from simdtex.cli.simulate import lies_of
+from simdtex.cli.simulate import georeferenced, lies_of
 
 
 @command(
@@ -30,10 +30,10 @@ from simdtex.cli.simulate import lies_of
     "--output",
     required=True,
     type=EITHER,
-    help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib or .sgems.",
+    help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.",
 )
 @size_option("that of --known, else of TRAINING_IMAGE", "maps")
-@KNOWN
+@data_options
 @places
 @SAMPLE_MASK
 @option("--categorical", is_flag=True, group=DATA, help="Treat values as categories.")
@@ -65,10 +65,11 @@ def estimate(
     from simdtex.io.grids import SUFFIXES, check_grid, write_grid
     from simdtex.io.realisations import check_realisations_path, write_realisations
 
-    began, material = time.perf_counter(), read_material(training_image)
+    began, how = time.perf_counter(), take_reading(options, deep=True)
+    material = read_material(training_image, how)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    data = read_data(material, options)
+    data = read_data(material, options, how)
     known, mask = data["known"], data["mask"]
     shape = output_shape(size, material.pixels[0], known, material.pixels[0])
     if known is None:
@@ -78,12 +79,13 @@ def estimate(
         check_grid(output, material.pixels, **lies)
     inputs = given(options) | lies
     made = estimate(material.array, known=known, shape=(shape[0], shape[1]), mask=mask, **inputs)
+    made = georeferenced(made, material.crs)
     if grid:
         variables = {str(name): one.values for name, one in made.data_vars.items() if name != "probability"}
         if "probability" in made:
             names = made.category.values.tolist()
             variables |= {f"probability_{name}": made.probability.values[k] for k, name in enumerate(names)}
-        write_grid(output, variables, **lies)
+        write_grid(output, variables, crs=material.crs, **lies)
     else:
         write_realisations(output, made)
     if not quiet:

@@ -90,8 +90,11 @@ def extend(
         folder.read(whole)
     else:
         image.check_writable(output, pixels.dtype, channels(pixels))
-        note_lossy(output, pixels)
-    writers = write_arranged(folder.write if folder else output, others, source_map, whole.metadata)
+        note_lossy(output, pixels, whole.metadata)
+    metadata = whole.metadata
+    if metadata and metadata.geo:
+        metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
+    writers = write_arranged(folder.write if folder else output, others, source_map, metadata)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

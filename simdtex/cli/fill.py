@@ -16,6 +16,7 @@ from simdtex.cli.inputs import (
     check_profiles,
     check_source_map,
     note_lossy,
+    parted,
     planes,
     read_also,
     read_material,
@@ -86,7 +87,7 @@ def fill(
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)
-    note_lossy(output, pixels)
+    note_lossy(output, pixels, whole.metadata)
     sample = texture and texture.array
     axis = None if pixels.ndim == 2 else -1
     return Task(
@@ -101,8 +102,9 @@ def _hole(pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArra
     """Return the picture, and its hole: where the mask is white or, without one, it is transparent; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
+    pixels, gone = parted(pixels)
     if mask:
         hole = read_mask(mask, pixels.shape)
     else:
         pixels, hole = split_alpha(pixels)
-    return pixels, hole | unknown_in(planes(pixels))
+    return pixels, hole | gone | unknown_in(planes(pixels))

@@ -8,11 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Material, channels, planes, read_known, read_masks, read_pair, read_pixels, without_alpha
+from simdtex.cli.inputs import (
+    Material,
+    Reading,
+    channels,
+    planes,
+    read_known,
+    read_masks,
+    read_pair,
+    read_pixels,
+    without_alpha,
+)
 from simdtex.model.pictures import unknown_in
 
 
-def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
+def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[str, Any]:
     """Return the mask, the known values and the guide that options name, as `simdtex.synthesize` takes them.
 
     These options are taken out; ``labels`` is set if the guides decide it.
@@ -24,7 +34,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples) if file else None,
+        "known": read_known(file, samples, how) if file else None,
         "guide": None,
     }
     if guide is not None:
@@ -43,8 +53,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
     from simdtex.methods.mrf.options import few
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
-    own = [read_pixels(path)[0] for path in paths]
-    wanted, lies, _ = read_pixels(out)
+    own = [read_pixels(path).pixels for path in paths]
+    wanted, _, lies, _ = read_pixels(out)
     wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     free = free | unknown_in(planes(wanted))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])

@@ -27,11 +27,31 @@ MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
 """The maps of a simulation, which have files of their own."""
 
 
+class Reading(NamedTuple):
+    """How files are read.
+
+    ``deep``: grids and rasters as cells in ascending order of y, and a file of several layers as a volume;
+    ``variables``: the names of those of a grid to take; ``missing``: further numbers that mean an unknown value;
+    ``valid``: the range of possible values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
+    """
+
+    deep: bool = False
+    variables: tuple[str, ...] = ()
+    missing: tuple[float, ...] = ()
+    valid: tuple[float, float] | None = None
+    columns: dict[str, list[str]] | None = None
+    categories: dict[str, float] | None = None
+
+
+PLAIN = Reading()
+"""How pictures are read without options."""
+
+
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``lies`` is where the cells of the first lie, if it is a grid; ``deep`` whether there is one volume; ``metadata``
-    what the file of the first says of its pixels.
+    ``lies`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system; ``deep``
+    whether there is one volume; ``metadata`` what the file of the first says of its pixels.
     """
 
     paths: tuple[Path, ...]
@@ -40,6 +60,7 @@ class Material(NamedTuple):
     lies: Frame | None = None
     deep: bool = False
     metadata: Metadata | None = None
+    crs: str = ""
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -103,19 +124,27 @@ def without_alpha(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArr
     return split_alpha(pixels) if channels(pixels) == count + 1 else (pixels, np.zeros(pixels.shape[:2], bool))
 
 
+def parted(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return a picture without the mask of a raster, and where a channel is masked."""
+    gone: NDArray[np.bool_] = np.asarray(np.ma.getmaskarray(pixels).reshape(*pixels.shape[:2], -1).any(-1))
+    return np.ma.getdata(pixels), gone
+
+
 def masked(pixels: NDArray[Any], gone: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
     """Return a picture that is masked in all channels where it is gone."""
     hidden = gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2))
     return np.ma.MaskedArray(pixels, np.broadcast_to(hidden, pixels.shape))
 
 
-def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
-    """Say so if the format of an output changes pixels that are to stay as they are."""
+def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = None) -> None:
+    """Say so if the format of an output changes pixels that are to stay as they are, or loses the georeference."""
     from simdtex.io.image import LOSSY, suitable_suffix
 
     if path.suffix.lower() in LOSSY:
         suffix = suitable_suffix(pixels.dtype, channels(pixels))
         note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
+    if metadata and metadata.geo and path.suffix.lower() not in (".tif", ".tiff"):
+        note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
 def read_picture(path: Path) -> Image:
@@ -141,46 +170,50 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
             raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
 
 
-def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
-    """Read a picture, or a grid as one, whose variables are channels.
+class Read(NamedTuple):
+    """What a file holds: ``pixels``; the ``metadata`` of a picture; where cells of a grid lie, and its ``crs``."""
 
-    Also return where the cells of a grid lie, and what the file of a picture says of it. With ``deep`` a file of
-    several layers is read, too, as a volume (layers, rows, cols, variables).
+    pixels: NDArray[Any]
+    metadata: Metadata | None = None
+    lies: Frame | None = None
+    crs: str = ""
+
+
+def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
+    """Read a picture (rows, cols[, channels]), or a grid as one, whose variables are channels.
+
+    With ``how.deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
     """
     from simdtex.io import grids
 
-    netcdf = deep and path.suffix.lower() == ".nc"
-    if grids.kind_of(path) is None and not netcdf:
-        if deep:
+    if not grids.is_grid(path, rasters=how.deep):
+        if how.deep:
             from simdtex.io import volume  # whose libraries take long to load
 
             if volume.is_volume(path):
                 values = volume.read(path)
-                return values if len(values) > 1 else values[0], None, None
+                return Read(values if len(values) > 1 else values[0])
         found = read_picture(path)
-        return found.pixels, None, found.metadata
-    if netcdf:
-        from simdtex.io.realisations import read_netcdf
-
-        grid = read_netcdf(path)
-    else:
-        grid = grids.read_grid(path)
+        return Read(found.pixels, found.metadata)
+    grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
+    if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
+        raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
     values = np.stack(list(grid.values.values()), -1)
-    if len(values) > 1 and not deep:
+    if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
-    return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell), None
+    return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
 
 
-def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
-    """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, lie, metadata = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
+    """Read pictures or grids, or with ``how.deep`` a volume; one of a single channel gets no axis for it."""
+    pictures, metadata, lie, crs = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
         raise ValueError(f"{paths[volumes.index(True)]} is a volume: give one volume only")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0])
+    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0], crs[0])
 
 
 def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
@@ -297,35 +330,79 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
-def read_map(name: str, path: Path, deep: bool = False) -> HardData | NDArray[Any]:
+def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
     from simdtex.io import grids, image
-    from simdtex.io.hard_data import read_hard_data
 
-    if name == "probabilities" and (path.suffix.lower() in TABLES or grids.kind_of(path) == "points"):
-        return read_hard_data(path)
-    if name == "region" and grids.kind_of(path) is None and not deep:
+    if name == "probabilities" and is_table(path):
+        return read_table(path, how)
+    if name == "region" and not how.deep and not grids.is_grid(path):
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = read_pixels(path, deep)[0]
+    pixels = read_pixels(path, how).pixels
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
     return np.moveaxis(pixels, -1, 0)
 
 
-def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[Any, Any]:
+def is_table(path: Path) -> bool:
+    """Return whether a file is a table of data, by its content if that is a grid or a point set, else by its name."""
+    from simdtex.io import grids
+
+    kind = grids.kind_of(path)
+    return kind == "points" or (kind is None and path.suffix.lower() in TABLES)
+
+
+def read_table(path: Path, how: Reading) -> HardData:
+    """Read a table of data."""
+    from simdtex.io.hard_data import read_hard_data
+
+    return read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=how.valid)
+
+
+def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     """
-    from simdtex.io import grids
-    from simdtex.io.hard_data import read_hard_data
-
-    if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
-        return read_hard_data(path)
-    values, lies, metadata = read_pixels(path, samples.deep)
+    how = how._replace(valid=samples.limits, variables=tuple((how.columns or {}).get("value", ())))
+    if is_table(path):
+        return read_table(path, how)
+    values, metadata, lies, _ = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    values, gone = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
-    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone)
+    values, gone = parted(values)
+    values, clear = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone | clear)
+
+
+def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
+    """Return how files are read, by the options about tables and grids, which are taken out."""
+    columns: dict[str, list[str]] = {}
+    for part in _pairs("--columns", options.pop("columns")):
+        columns.setdefault(part[0], []).append(part[1])
+    pairs = _pairs("--categories", options.pop("categories"))
+    return Reading(
+        deep,
+        options.pop("variables", ()),
+        options.pop("missing"),
+        columns=columns or None,
+        categories={name: number_of_option("--categories", value) for name, value in pairs} or None,
+    )
+
+
+def _pairs(option: str, text: str | None) -> list[tuple[str, str]]:
+    """Return the pairs of ``A=B,C=D``."""
+    parts = [part.partition("=") for part in (text or "").split(",") if part]
+    if any(not (sign and left.strip() and right.strip()) for left, sign, right in parts):
+        raise ValueError(f"{option} {text} is not NAME=NAME,...")
+    return [(left.strip(), right.strip()) for left, _, right in parts]
+
+
+def number_of_option(option: str, text: str) -> float:
+    """Return the number that an option gives; raise if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{option} has {text!r}, which is no number") from None

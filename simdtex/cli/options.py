@@ -176,12 +176,49 @@ SAMPLE_MASK = reads(
     method="mrf",
     help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
 )
-KNOWN = reads(
-    "--known",
-    method="mrf",
-    help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
-    "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
+TABLES = (
+    reads(
+        "--known",
+        method="mrf",
+        help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
+        "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
+    ),
+    option(
+        "--columns",
+        metavar="x=NAME,...",
+        group=DATA,
+        method="mrf",
+        help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
+        "number; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others are "
+        "values]",
+    ),
+    option(
+        "--categories",
+        metavar="NAME=NUMBER,...",
+        group=DATA,
+        method="mrf",
+        help="Read these texts of the table of --known as these numbers, as sand=1,shale=0.",
+    ),
+    option(
+        "--missing",
+        metavar="VALUE",
+        multiple=True,
+        type=float,
+        group=DATA,
+        method="mrf",
+        help="Take this number in tables and grids as unknown, too; may be repeated.  [codes such as -999, outside of "
+        "the values of the sample]",
+    ),
 )
+
+
+def data_options(command: Command) -> Command:
+    """Add ``--known`` and the options that say how its table is read."""
+    for one in reversed(TABLES):
+        command = one(command)
+    return command
+
+
 GUIDE = option(
     "--guide",
     group=DATA,
@@ -211,6 +248,19 @@ PLACES = (
         group=DATA,
         help="Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most "
         "frequent value (most).  [refuse]",
+    ),
+    option(
+        "--outside",
+        words=("refuse", "skip"),
+        group=DATA,
+        help="Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).  [refuse]",
+    ),
+    option(
+        "--variables",
+        metavar="NAME",
+        multiple=True,
+        group=DATA,
+        help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
     ),
 )
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from simdtex.cli.command import DEVICE_GROUP, OUTPUTS
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material
+from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import (
     GUIDE,
-    KNOWN,
     SAMPLE_MASK,
+    data_options,
     given,
     numbers,
     option,
@@ -50,13 +50,13 @@ from simdtex.cli.places import EITHER, READ
     "--output",
     required=True,
     type=EITHER,
-    help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib or .sgems.",
+    help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.",
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations")
 @places
-@KNOWN
+@data_options
 @SAMPLE_MASK
 @GUIDE
 @reads(
@@ -103,6 +103,7 @@ def simulate(
     origin: str | None,
     cell: str | None,
     several: str | None,
+    outside: str | None,
     source: bool,
     **options: Any,
 ) -> Task:
@@ -115,16 +116,17 @@ def simulate(
     from simdtex.io.realisations import check_realisations_path, write_realisations
     from simdtex.run import Output
 
-    material = read_material(training_image, deep=True)
+    how = take_reading(options, deep=True)
+    material = read_material(training_image, how)
     pixels = material.pixels[0]
-    data = read_data(material, options)
+    data = read_data(material, options, how)
     known = data["known"]
     files = {name: options.pop(name) for name in MAPS}
-    maps = {name: read_map(name, path, material.deep) for name, path in files.items() if path}
+    maps = {name: read_map(name, path, how) for name, path in files.items() if path}
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     lies = lies_of(material, origin, cell)
-    place = lies | ({} if several is None else {"several": several})
+    place = lies | given({"several": several, "outside": outside})
     if check_realisations_path(output, source=source) in SUFFIXES:
         check_grid(output, material.pixels, **lies)
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
@@ -138,7 +140,7 @@ def simulate(
     inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
-        made = simulate(material.array, number, **inputs, **call)
+        made = georeferenced(simulate(material.array, number, **inputs, **call), material.crs)
         return made, Output(None, statistics=made.attrs)
 
     return Task(
@@ -157,6 +159,16 @@ def lies_of(material: Material, origin: str | None, cell: str | None) -> dict[st
         axes = min((len(one) for one in found if one), default=3)
         found = [one or own[:axes] for one, own in zip(found, material.lies, strict=True)]
     return dict(zip(("origin", "cell"), found, strict=True))
+
+
+def georeferenced(made: Any, crs: str) -> Any:
+    """Return an array or dataset of xarray with a coordinate reference system, if it is known, as CF describes it."""
+    if not crs:
+        return made
+    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": crs})).assign_attrs(crs=crs)
+    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+        one.encoding["grid_mapping"] = "spatial_ref"
+    return found
 
 
 def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:

@@ -18,6 +18,7 @@ from simdtex.cli.inputs import (
     output_shape,
     read_also,
     read_material,
+    take_reading,
     write_arranged,
 )
 from simdtex.cli.job import Task, command_line, job
@@ -25,10 +26,10 @@ from simdtex.cli.maps import folder_of
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
-    KNOWN,
     METHODS,
     SAMPLE_MASK,
     SOURCE_MAP,
+    data_options,
     given,
     option,
     report_option,
@@ -65,7 +66,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
 @SAMPLE_MASK
-@KNOWN
+@data_options
 @GUIDE
 @SOURCE_MAP
 @ALSO
@@ -95,9 +96,10 @@ def synth(
     if method == "pyramid" and (source_map or also or folder):
         what = "give one picture" if folder else "leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
-    material = read_material([folder.lead] if folder else samples)
+    how = take_reading(options)
+    material = read_material([folder.lead] if folder else samples, how)
     pixels = material.pixels[0]
-    data = read_data(material, options)
+    data = read_data(material, options, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
     inputs = data | given(options, without=("tiles", "workers", "dry_run"))
@@ -122,7 +124,7 @@ def synth(
         raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
     if known is not None:
         note_lossy(output, pixels)
-    like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
+    like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
     writers = write_arranged(folder.write if folder else output, others, source_map, like)
     if report:
         from simdtex.report.synthesis import write_synthesis

@@ -18,6 +18,7 @@ import PIL.ExifTags
 import PIL.Image
 from numpy.typing import NDArray
 
+from simdtex.io import rasters
 from simdtex.io.limits import check_array, check_size, read_npy
 
 Array = NDArray[Any]
@@ -57,12 +58,15 @@ class Metadata(NamedTuple):
         and preview.
     more : bool
         Whether the file has further frames or pages, which are not read.
+    geo : Georeference, optional
+        Where the pixels of a raster lie, and its number for unknown values.
     """
 
     profile: bytes | None = None
     dpi: tuple[float, float] | None = None
     exif: bytes | None = None
     more: bool = False
+    geo: rasters.Georeference | None = None
 
 
 NOTHING = Metadata()
@@ -83,7 +87,10 @@ def decode(data: bytes, most: int) -> Decoded:
             return read_npy(io.BytesIO(data), len(data), most), NOTHING
         if header := _PNM.match(data):
             return _read_pnm(data, header, most), NOTHING
-        if data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+        if data[:5].lower() == b"ncols" or (data[:4] in rasters.TIFF and rasters.is_raster(io.BytesIO(data))):
+            pixels, geo, _ = rasters.read_raster(data, most)
+            return pixels, Metadata(geo=geo)
+        if data[:4] in rasters.TIFF:
             return _read_tiff(data, most)
         if data.startswith(b"\x89PNG\r\n\x1a\n") and data[24:25] == b"\x10":  # bits per sample: 16
             return _read_png16(data, most)

@@ -23,14 +23,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
 from simdtex.io.limits import BYTES, check_size, reading
-from simdtex.options import DataWarning, check_real, shown
+from simdtex.io.rasters import NETCDF, RASTERS, TIFF, Library, is_raster, read_cells, read_netcdf, write_cells
+from simdtex.options import DataWarning, check_real, require, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
-SUFFIXES = (".gslib", ".sgems")
+SUFFIXES = (".gslib", ".sgems", ".tif")
 """The suffixes for writing grids; files to read are recognised by their first lines."""
 
 MISSING = (-99.0, -999.0, -999.25, -9999.0, -99999.0, -997799.0, -9966699.0, -9999999.0)
@@ -47,9 +48,6 @@ MAGIC = b"\xb2\x11\x17\x5d"
 _BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
 _WHOLE = (np.uint8, np.int16, np.int32)
 _SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
-_NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
-"""Names of an axis that do not have its letter."""
-
 _FAR = 1e30
 """The largest coordinate, far below the largest 32-bit float."""
 
@@ -110,19 +108,6 @@ def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
     if len(found) not in (2, 3) or not all(abs(number) < _FAR for number in found):
         raise ValueError(f"{name} is {shown(values)}; give (x, y) or (x, y, z), numbers below {_FAR:g}")
     return found
-
-
-def axis_of(name: str) -> str | None:
-    """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None.
-
-    Examples
-    --------
-    >>> [axis_of(name) for name in ("X", "Ycoord", "Northing (m)", "lon", "UTM_X", "z_loc", "Zn", "depth")]
-    ['x', 'y', 'y', 'x', 'x', 'z', None, None]
-    """
-    word = re.sub(r"\(.*|\[.*|[^a-z]", "", name.lower())
-    around = "(utm|point|coord|loc|pos)?", "(m|km|ft|utm|(coord|loc|pos)[a-z]*)?"
-    return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
 
 
 def known_numbers(
@@ -250,14 +235,14 @@ def read_grid(
     """
     with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
         head = file.read(len(MAGIC))
-        read = None if head.startswith(MAGIC) or kind_of(path) else _others(head, path)
+        read = None if kind_of(path) else _library(path)
         if read is None:
             columns, sides, lies = (_sgems if head.startswith(MAGIC) else _gslib)(file, most)
             values = {name: column.reshape(sides[::-1]) for name, column in columns.items()}
             grid = CartesianGrid(values, *lies)
         else:
             try:
-                grid = read(path, most)
+                grid = CartesianGrid(*read(path, most))
             except (MemoryError, ValueError):
                 raise
             except Exception as error:  # each library has its own for a damaged file
@@ -269,15 +254,20 @@ def read_grid(
     return replace(grid, values={name: one if read else _typed(one) for name, one in values.items()})
 
 
-def _others(head: bytes, path: PathLike) -> Callable[[PathLike, int], CartesianGrid] | None:
-    """Return the reader of a file that is not a grid of GSLIB or SGeMS; None if it is none of NetCDF and GDAL."""
-    from simdtex.io import rasters  # which grids are a part of
+def is_grid(path: PathLike, rasters: bool = True) -> bool:
+    """Return whether a file is a grid that `read_grid` reads; without ``rasters``, whether it is one but a raster."""
+    return kind_of(path) == "grid" or (os.path.isfile(path) and _library(path, rasters) is not None)
 
-    if head.startswith(rasters.NETCDF):
-        return rasters.read_netcdf
-    suffix = Path(path).suffix.lower()
-    raster = suffix in rasters.SUFFIXES or (suffix in (".tif", ".tiff") and rasters.is_raster(Path(path).read_bytes()))
-    return rasters.raster_grid if raster else None
+
+def _library(path: PathLike, rasters: bool = True) -> Callable[[PathLike, int], Library] | None:
+    """Return the reader of a NetCDF or HDF5 file or, with ``rasters``, of a raster; None if a file is neither."""
+    with open(path, "rb") as file:
+        head = file.read(5)
+        if head.startswith(NETCDF):
+            return read_netcdf
+        tiff = head.startswith(TIFF) and is_raster(file)
+    raster = tiff or head.lower() == b"ncols" or Path(path).suffix.lower() in RASTERS
+    return read_cells if rasters and raster else None
 
 
 Read = tuple[dict[str, Array], tuple[int, ...], Frame]
@@ -480,20 +470,24 @@ def write_grid(
     *,
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
+    crs: str = "",
 ) -> None:
-    """Write a grid for GSLIB, MPSlib, DeeSse and others as a text, or for SGeMS, atomically.
+    """Write a grid for GSLIB, MPSlib, DeeSse and others as a text, for SGeMS, or as a GeoTIFF, atomically.
 
     Parameters
     ----------
     path : path
-        ``.gslib``, a text, or ``.sgems``. An existing file is replaced.
+        ``.gslib``, a text, ``.sgems``, or ``.tif``, which needs the extra ``rasters``. An existing file is replaced.
     values : mapping of str to array_like, (nz, ny, nx) or (ny, nx)
         The variables by name. NaN or masked is unknown, and is written as -9966699. A text keeps every digit; SGeMS has
-        32-bit floats, to which longer floats are rounded.
+        32-bit floats, to which longer floats are rounded. A GeoTIFF has a band for each variable, of one type, and one
+        layer; unknown values are NaN or, of integers, -9999.
     origin : (x, y) or (x, y, z), optional
         The centre of the first cell. None is 0.
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None is 1.
+    crs : str
+        The coordinate reference system as WKT or, for example, ``"EPSG:32633"``, for a GeoTIFF; empty if unknown.
 
     Raises
     ------
@@ -518,6 +512,12 @@ def write_grid(
     sides = (1, *next(iter(shapes)))[-3:]
     whole = Frame(*((*one, last)[:3] for one, last in zip(lies, (0.0, 1.0), strict=True)))
     layers = {name: array.reshape(sides) for name, array in arrays.items()}
+    if _suffix(path) == ".tif":
+        if sides[0] > 1:
+            raise ValueError(f"{path} is a GeoTIFF, which has no layers: end its name in .gslib or .sgems")
+        with atomic_path(path) as temporary:
+            write_cells(temporary, layers, whole.origin, whole.cell, crs)
+        return
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.writelines((_sgems_parts if _suffix(path) == ".sgems" else _gslib_parts)(layers, sides[::-1], whole))
 
@@ -531,6 +531,9 @@ def check_grid(
         raise ValueError(f"{target} names no format of grids: end its name in one of {', '.join(SUFFIXES)}")
     check_target(target)
     lies = frame(origin, cell)
+    if _suffix(path) == ".tif":
+        require("rasters", "rasterio")
+        return lies
     for array in arrays:
         _check_values(target, np.ma.asanyarray(array))
     if _suffix(path) == ".sgems":

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import os
-import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,9 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.grids import axis_of, count_of, frame, known_numbers, number_of
+from simdtex.io.grids import count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
+from simdtex.io.rasters import axis_of
 from simdtex.options import DataWarning, check_real, one_of
 
 PathLike = str | os.PathLike[str]
@@ -228,7 +228,7 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         for name in [wanted] if isinstance(wanted, str) else wanted:
             if role not in ROLES or name not in listed:
                 raise ValueError(
-                    f"there is no column {name!r} for {role!r}: give columns of {', '.join(listed)} for x, y, z or value"
+                    f"there is no column {name!r} for {role!r}: name x, y, z and value of {', '.join(listed)}"
                 )
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]

@@ -20,6 +20,7 @@ import numpy as np
 import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io import rasters
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.limits import TooLarge, max_pixels_or_default, reading
@@ -121,7 +122,8 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
             "or TIFF"
         ) from None
     try:
-        pixels = native(pixels_of("the picture", found))
+        pixels = native(pixels_of("the picture", np.ma.getdata(found)))
+        pixels = np.ma.MaskedArray(pixels, np.ma.getmaskarray(found)) if np.ma.is_masked(found) else pixels
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
@@ -462,6 +464,8 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         said = pillow_bytes(PIL.Image.new("RGB" if pixels.ndim == 3 else "L", (1, 1)), "PNG", **beside)
         head = 33  # bytes of the signature and the header; Pillow's chunks on colours and size follow
         path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
+    elif suffix in (".tif", ".tiff") and metadata.geo:
+        rasters.write_raster(path, np.moveaxis(pixels if pixels.ndim == 3 else pixels[..., None], -1, 0), metadata.geo)
     elif suffix in (".tif", ".tiff"):
         write_tiff(path, [pixels], metadata)
     else:

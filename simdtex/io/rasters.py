@@ -6,18 +6,18 @@ The extra ``rasters`` installs rasterio, and the extra ``simulate`` xarray and i
 
 from __future__ import annotations
 
-import io
 import os
+import re
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.grids import CartesianGrid, axis_of
 from simdtex.io.limits import check_array
 from simdtex.options import DataWarning, require
 
@@ -41,14 +41,24 @@ DRIVERS = (
 )
 """The drivers of GDAL in use, since some others read further files or the network, for example VRT."""
 
-SUFFIXES = (".asc", ".img", ".bil", ".grd", ".hgt", ".dem", ".sdat", ".rst", ".mpr", ".flt")
+RASTERS = (".asc", ".img", ".bil", ".grd", ".hgt", ".dem", ".sdat", ".rst", ".mpr", ".flt")
 """Suffixes of rasters that are not recognised by their first bytes."""
 
 NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 """How NetCDF and HDF5 files begin."""
 
+TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+"""How TIFF files begin."""
+
 _TAGS = (33550, 33922, 34264, 34735, 42113)
 """TIFF tags of georeference and no-data."""
+
+
+_NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
+"""Names of an axis that do not have its letter."""
+
+Library = tuple[dict[str, Array], tuple[float, ...], tuple[float, ...], str]
+"""What a library reads of a grid: the members of `simdtex.io.grids.CartesianGrid`."""
 
 
 class Georeference(NamedTuple):
@@ -74,16 +84,26 @@ class Georeference(NamedTuple):
         return self._replace(transform=(a, b, c - a * left - b * top, d, e, f - d * left - e * top))
 
 
-def is_raster(data: bytes) -> bool:
-    """Return whether the bytes of a file are a raster: ESRI ASCII, or a TIFF with georeference, no-data or a mask."""
-    if data[:5].lower() == b"ncols":
-        return True
-    if data[:4] not in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return False
+def axis_of(name: str) -> str | None:
+    """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None.
+
+    Examples
+    --------
+    >>> [axis_of(name) for name in ("X", "Ycoord", "Northing (m)", "lon", "UTM_X", "z_loc", "Zn", "depth")]
+    ['x', 'y', 'y', 'x', 'x', 'z', None, None]
+    """
+    word = re.sub(r"\(.*|\[.*|[^a-z]", "", name.lower())
+    around = "(utm|point|coord|loc|pos)?", "(m|km|ft|utm|(coord|loc|pos)[a-z]*)?"
+    return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
+
+
+def is_raster(file: BinaryIO) -> bool:
+    """Return whether a TIFF has georeference, no-data or a mask, which the reader of pictures would not heed."""
     import tifffile
 
+    file.seek(0)
     try:
-        with tifffile.TiffFile(io.BytesIO(data)) as tiff:
+        with tifffile.TiffFile(file) as tiff:
             pages: Any = tiff.pages
             return any(tag in pages.first.tags for tag in _TAGS) or any(page.subfiletype & 4 for page in pages)
     except Exception:  # the reader of pictures reports the error
@@ -99,18 +119,20 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
     require("rasters", "rasterio")
     import rasterio
     from rasterio.enums import ColorInterp
+    from rasterio.io import DatasetReader, MemoryFile
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), rasterio.Env(), ExitStack() as closing:
         warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
-        where = io.BytesIO(source) if isinstance(source, bytes) else os.fspath(source)
-        with rasterio.open(where, driver=list(DRIVERS)) as raster:
-            itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
-            check_array((raster.height, raster.width, raster.count), itemsize, most)
-            pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
-            crs = raster.crs.to_wkt() if raster.crs else ""
-            geo = Georeference(crs, tuple(raster.transform)[:6], raster.nodata)
-            names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
-            scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
+        in_memory = isinstance(source, bytes)
+        where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
+        raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
+        itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
+        check_array((raster.height, raster.width, raster.count), itemsize, most)
+        pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
+        crs = raster.crs.to_wkt() if raster.crs else ""
+        geo = Georeference(crs, tuple(raster.transform)[:6], raster.nodata)
+        names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
+        scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
     if scaled:
         warnings.warn(
             "the scale and the offset of the raster are not applied to its numbers", DataWarning, stacklevel=2
@@ -123,7 +145,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
     return (pixels[..., 0] if len(names) == 1 else pixels), geo, names
 
 
-def raster_grid(path: PathLike, most: int) -> CartesianGrid:
+def read_cells(path: PathLike, most: int) -> Library:
     """Return a raster as a grid: its bands as variables, rows in ascending order of y, unknown values NaN."""
     pixels, geo, names = read_raster(path, most)
     a, b, c, d, e, f = geo.transform
@@ -135,7 +157,22 @@ def raster_grid(path: PathLike, most: int) -> CartesianGrid:
     rows, cols = planes.shape[:2]
     values = {name: planes[None, :: -1 if e < 0 else 1, :: -1 if a < 0 else 1, k] for k, name in enumerate(names)}
     first = min(c, c + a * cols) + abs(a) / 2, min(f, f + e * rows) + abs(e) / 2, 0.0
-    return CartesianGrid(values, first, (abs(a), abs(e), 1.0), geo.crs)
+    return values, first, (abs(a), abs(e), 1.0), geo.crs
+
+
+def write_cells(
+    path: Path, layers: Mapping[str, Any], origin: Sequence[float], cell: Sequence[float], crs: str
+) -> None:
+    """Write variables (1, ny, nx), masked or NaN if unknown, as the bands of a GeoTIFF with the north at the top."""
+    bands: Any = np.ma.concatenate(  # type: ignore[no-untyped-call]
+        [one[:, ::-1] for one in layers.values()]
+    )
+    nodata = float("nan") if bands.dtype.kind == "f" else None
+    if np.ma.is_masked(bands) and nodata is None:
+        bands, nodata = bands.astype(np.result_type(bands.dtype, np.int16)), -9999.0
+    west, north = origin[0] - cell[0] / 2, origin[1] + cell[1] * (bands.shape[1] - 0.5)
+    geo = Georeference(crs, (cell[0], 0.0, west, 0.0, -cell[1], north), nodata)
+    write_raster(path, bands if nodata is None else bands.filled(nodata), geo, list(layers))
 
 
 def write_raster(path: Path, bands: Array, geo: Georeference, names: Sequence[str] = ()) -> None:
@@ -144,20 +181,20 @@ def write_raster(path: Path, bands: Array, geo: Georeference, names: Sequence[st
     import rasterio
     from rasterio.io import MemoryFile
 
-    bands = bands.astype(np.float32) if bands.dtype == np.float16 else bands
+    bands = bands.astype({"float16": np.float32, "bool": np.uint8}.get(bands.dtype.name, bands.dtype))
     about = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype.name}
-    colours = {"photometric": "RGB"} | ({"alpha": "YES"} if len(bands) == 4 else {})
-    about |= colours if len(bands) in (3, 4) and bands.dtype in (np.uint8, np.uint16) else {}
+    if not names and len(bands) in (3, 4) and bands.dtype.kind == "u":
+        about |= {"photometric": "RGB", "alpha": "YES" if len(bands) == 4 else "NO"}
     about |= {"crs": geo.crs or None, "transform": rasterio.Affine(*geo.transform), "nodata": geo.nodata}
     with MemoryFile() as memory:  # GDAL does not report every full disk
         with memory.open(driver="GTiff", compress="deflate", **about) as raster:
-            raster.write(bands)
+            raster.write(np.ascontiguousarray(bands))
             for k, name in enumerate(names, 1):
                 raster.set_band_description(k, name)
         path.write_bytes(memory.read())
 
 
-def read_netcdf(path: PathLike, most: int) -> CartesianGrid:
+def read_netcdf(path: PathLike, most: int) -> Library:
     """Return the variables of a NetCDF or HDF5 file that have the axes y and x, or z, y and x, as a grid.
 
     All variables with the axes of the first such variable are read, in ascending order of the coordinates, unknown
@@ -198,7 +235,7 @@ def read_netcdf(path: PathLike, most: int) -> CartesianGrid:
         about: Mapping[Any, Any] = {} if mapping is None else mapping.attrs
     origin, cell = zip(*(axis_place(next(iter(arrays.values())), axis) for axis in "xyz"), strict=True)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
-    return CartesianGrid(values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))))
+    return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", "")))
 
 
 def _steps(name: str, array: Any) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     suffix = check_realisations_path(path, source=source)
     if suffix in SUFFIXES:
         origin, cell = zip(*(axis_place(array, axis) for axis in "xyz"), strict=True)
-        write_grid(path, dict(_variables(array)), origin=origin, cell=cell)
+        write_grid(path, dict(_variables(array)), origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
         return
     if suffix == ".npz":
         coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}

@@ -36,6 +36,7 @@ def estimate(
     known: ArrayLike | HardData | str | os.PathLike[str],
     shape: tuple[int, int] | None = None,
     several: str = "refuse",
+    outside: str = "refuse",
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     mask: ArrayLike | None = None,
@@ -55,7 +56,7 @@ def estimate(
         The data, as in `simdtex.simulate`.
     shape : (int, int), optional
         Rows and columns of the result. None: those of `known` if it is an array, else of the training image.
-    several, origin, cell, mask
+    several, outside, origin, cell, mask
         As in `simdtex.simulate`.
     categorical : bool
         Whether values are categories.
@@ -109,7 +110,7 @@ def estimate(
     size = pictures.pixels[0].shape[:2] if shape is None else shape
     size = check_shape(known.shape if shape is None and isinstance(known, np.ndarray) and known.ndim == 2 else size)
     along, sides_of_cells = grid_axes(size, origin, cell)
-    place = partial(place_hard_data, origin=origin, cell=cell, several=several)
+    place = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)
     given = check_known(known, size, None, pictures, place=place)
     mrf.check_categories(pictures, given)
     sample, machine = Sample(pictures, pictures.channels * (nearest + 1), reach), open_machine(device)

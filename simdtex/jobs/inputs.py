@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from math import prod
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
-from simdtex.options import check_real, unmasked
+from simdtex.options import DataWarning, check_real, unmasked
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
@@ -140,7 +141,8 @@ def check_known(
     if isinstance(known, HardData):
         if len(known.names) != variables:
             raise ValueError(
-                f"a datum has {len(known.names)} values and a pixel of the sample {variables}; give as many"
+                f"a datum has {len(known.names)} values, {', '.join(known.names)}, and a pixel of the sample "
+                f"{variables}; give as many, or choose columns: value of read_hard_data, --columns value=NAME"
             )
         memory.require_host(prod(shape) * variables * (dtype.itemsize + 1))  # values and a mask
         array = place(known, shape, dtype).reshape(*shape, variables)
@@ -169,7 +171,25 @@ def check_known(
         raise ValueError(
             f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type"
         )
+    _warn_beyond(found, there, pictures)
     return Given(found, there, None if source is None else _check_source(source, there, pictures))
+
+
+def _warn_beyond(values: NDArray[Any], there: NDArray[np.bool_], pictures: Pictures) -> None:
+    """Warn of known values beyond those of the samples, which no candidate has."""
+    axes = tuple(range(values.ndim - 1))
+    low, high = (
+        extreme.reduce([extreme.reduce(one, axes) for one in pictures.pixels]) for extreme in (np.fmin, np.fmax)
+    )
+    beyond = there & ((values < low) | (values > high))
+    if beyond.any():
+        variable = int(np.argwhere(beyond)[0][-1])
+        warnings.warn(
+            f"{np.count_nonzero(beyond)} of {np.count_nonzero(there)} known values are beyond those of the sample, "
+            f"{low[variable]:g} to {high[variable]:g}, the first {values[beyond][0]:g}; no candidate is like them",
+            DataWarning,
+            stacklevel=2,
+        )
 
 
 def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:

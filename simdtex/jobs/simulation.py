@@ -53,6 +53,7 @@ def simulate(
     shape: tuple[int, ...] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
     several: str = "refuse",
+    outside: str = "refuse",
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,
@@ -90,6 +91,8 @@ def simulate(
     several : {"refuse", "mean", "most"}
         Value for different data of a table in one cell: an error, their mean, or the most frequent value, as in
         `simdtex.place_hard_data`.
+    outside : {"refuse", "skip"}
+        Data of a table outside the cells: an error, or left out with a warning.
     origin : (x, y) or (x, y, z), optional
         The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. None
         is 0.
@@ -195,7 +198,7 @@ def simulate(
     size = check_sides((maps.shape(axes) or pictures.pixels[0].shape[:-1]) if shape is None else shape, sides)
     if shape is None and isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
         size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
-    place = partial(place_hard_data, origin=origin, cell=cell, several=several)
+    place = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
     inputs = inputs if region is None else check_region(maps.region, size, inputs)
     missing: Any = None if region is None else missing_value(pictures.pixels)
