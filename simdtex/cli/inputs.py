@@ -167,7 +167,7 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
         grid = grids.read_grid(path)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not deep:
-        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
+        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1, or use simdtex simulate")
     return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell), None
 
 

@@ -17,15 +17,15 @@ from simdtex.cli.inputs import (
     note_lossy,
     output_shape,
     read_also,
-    read_material,
     write_arranged,
 )
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import folder_of
+from simdtex.cli.maps import folder_of, read_flat
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
     KNOWN,
+    MAP,
     METHODS,
     SAMPLE_MASK,
     SOURCE_MAP,
@@ -67,6 +67,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @SAMPLE_MASK
 @KNOWN
 @GUIDE
+@MAP
 @SOURCE_MAP
 @ALSO
 @report_option("its pictures, how evenly it uses the sample, and how much it copies")
@@ -77,6 +78,7 @@ def synth(
     size: str | None,
     method: str,
     source_map: Path | None,
+    roles: tuple[str, ...],
     also: tuple[str, ...],
     report: Path | None,
     **options: Any,
@@ -91,11 +93,11 @@ def synth(
 
     context = click.get_current_context()
     check_tiles(context)
-    folder = folder_of(samples[0], output) if len(samples) == 1 and options["tiles"] is None else None
+    folder = folder_of(samples if options["tiles"] is None else (), output, roles)
     if method == "pyramid" and (source_map or also or folder):
         what = "give one picture" if folder else "leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
-    material = read_material([folder.lead] if folder else samples)
+    material = read_flat([folder.lead] if folder else samples)
     pixels = material.pixels[0]
     data = read_data(material, options)
     known, guide = data["known"], data["guide"]
