@@ -91,7 +91,7 @@ def test_what_is_transparent_is_a_mask(folder):
 
 
 def test_what_is_not_opaque_is_filled(folder):
-    cut = pixels(folder, "cut.png")
+    cut = pixels(folder, "cut.png").copy()
     cut[5:17, 7:20, :3], cut[5:17, 7:20, 3] = (0, 255, 0), 200
     cut[8:14, 10:17, 3], cut[0, 0, 3] = 0, 254
     image.write(folder / "soft.png", cut)
@@ -105,7 +105,7 @@ def test_inverted_widened_and_blended(folder):
     image.write(folder / "inverse.png", 255 - pixels(folder, "mask.png"))
     for name, mask in (("a.png", ["mask.png"]), ("b.png", ["inverse.png", "--invert"])):
         result = small(folder, "fill", "photo.png", "--mask", *mask, "-o", name, "--grow", 1, "--feather", 2)
-        assert result.exit_code == 0 and "144 of 768 pixels filled" in result.output, result.output
+        assert result.exit_code == 0 and "136 of 768 pixels filled" in result.output, result.output
     photo, hole = pixels(folder, "photo.png"), pixels(folder, "mask.png") > 0
     made = simdtex.fill(photo, hole, channel_axis=-1, rng=5, grow=1, feather=2, **OPTIONS)
     assert np.array_equal(pixels(folder, "a.png"), made) and np.array_equal(pixels(folder, "b.png"), made)
