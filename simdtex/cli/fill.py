@@ -11,15 +11,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import (
-    channels,
-    check_profiles,
-    check_source_map,
-    note_lossy,
-    planes,
-    read_also,
-    write_arranged,
-)
+from simdtex.cli.inputs import channels, check_profiles, check_source_map, note_lossy, planes, read_also, write_arranged
 from simdtex.cli.job import Task, job
 from simdtex.cli.maps import folder_of, read_flat
 from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given
@@ -31,10 +23,7 @@ from simdtex.model.pictures import unknown_in
     ("fill photo.png -o whole.png --mask hole.png", "Fill the white parts of a mask."),
     ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
     ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
-    (
-        "fill photo.png -o grass.png --mask car.png --sample meadow.png",
-        "Fill with another texture.",
-    ),
+    ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
 )
 @click.argument("picture", type=ENTER)
 @click.option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")

@@ -89,13 +89,17 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
 
     Else None. ``roles`` are the texts of ``--map``.
     """
-    from simdtex.model.material import READABLE, find_maps
+    from simdtex.model.material import READABLE, ROLES, find_maps
 
     picture = pictures[0] if len(pictures) == 1 else Path("-")
     whole = picture.is_dir()
     folder = picture if whole else picture.parent
-    named = dict(_named(text, folder) for text in roles)
-    found = None
+    named, found = {}, None
+    for text in roles:
+        role, _, name = text.partition("=")
+        if role not in ROLES or not name:
+            raise ValueError(f"--map {text} must be ROLE=FILE, with one of the roles {', '.join(ROLES)}")
+        named[folder / name if name == Path(name).name else Path(name)] = role
     if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
         lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
         found = find_maps(folder, lead, named)
@@ -118,16 +122,6 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
     for path in found.files:
         check_input(output, path)
     return Folder(found, albedos[0], output)
-
-
-def _named(text: str, folder: Path) -> tuple[Path, str]:
-    """Return the map in a folder and its role, from ROLE=FILE; a name alone is in the folder."""
-    from simdtex.model.material import ROLES
-
-    role, _, name = text.partition("=")
-    if role not in ROLES or not name:
-        raise ValueError(f"--map {text} must be ROLE=FILE, with one of the roles {', '.join(ROLES)}")
-    return (Path(name) if Path(name).name != name else folder / name), role
 
 
 def _written(path: Path, pixels: NDArray[Any]) -> str:

@@ -135,15 +135,14 @@ def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray
     pixels : array_like, (rows, cols) or (rows, cols, channels)
         The last of two or four channels is alpha; a picture with another number of channels has none.
     opaque : bool
-        Whether everything that is not fully opaque is transparent, and not only what is below half.
+        Whether all that is not fully opaque is transparent.
 
     Returns
     -------
     pixels : ndarray, (rows, cols) or (rows, cols, channels)
         The picture without alpha, its values unchanged: (rows, cols) from two channels, (rows, cols, 3) from four.
     transparent : ndarray of bool, (rows, cols)
-        True where alpha is below half of full scale (255 in 8 bits, 65535 in 16, 1 in floats) or, with `opaque`, below
-        full scale; or NaN.
+        True where alpha is below half of full scale (255 in 8 bits, 65535 in 16, 1 in floats), or NaN.
 
     Raises
     ------

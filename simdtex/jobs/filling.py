@@ -124,7 +124,7 @@ def fill(
         Widen the holes by this distance, pixels.
     feather : int
         Blend the filled pixels with the picture up to this distance around the holes, pixels. Values without a mean
-        (categories, 16 different pixels or fewer) change there without a blend, half-way.
+        (categories, 16 different pixels or fewer) change half-way instead.
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, checkpoint
@@ -333,8 +333,7 @@ class Filling:
     """The job of `fill`: a sequence of runs, one for each window.
 
     ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample`` or, if it is
-    None, from their surroundings up to ``reach`` pixels around a hole. ``share`` (rows, cols), if any, is that of the
-    filled pixels in the result, 1 to 0; the rest is the picture.
+    None, from their surroundings up to ``reach`` pixels around a hole; ``share`` is from `widened`.
     """
 
     pixels: NDArray[Any]
@@ -342,15 +341,13 @@ class Filling:
     sample: Pictures | None
     reach: int | None
     options: Options
-    share: NDArray[np.float64] | None = None
+    share: NDArray[Any]
 
     def inputs(self) -> dict[str, Any]:
         """Return everything but the seed that determines the result, by the parameters' names."""
-        unknown = self.hole if self.share is None else self.share == 1
-        known = np.where(unknown[..., None], 0, self.pixels)
+        known = np.where(self.hole[..., None], 0, self.pixels)
         sample = self.sample and (self.sample.pixels, self.sample.known)
-        found = {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
-        return found if self.share is None else found | {"share": self.share}
+        return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
 
     def run(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
@@ -376,8 +373,7 @@ class Filling:
             hole = self.hole[at]
             whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
             whole.source[at][hole] = shifted(found.source, found.corner)
-        if self.share is not None:
-            self._blend(whole, self.share)
+        self._blend(whole)
         runs = [found.statistics for found in finished]
         seconds = [run["device_seconds"] for run in runs]
         statistics = {
@@ -387,18 +383,16 @@ class Filling:
         }
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
-    def _blend(self, whole: Whole, share: NDArray[np.float64]) -> None:
-        """Blend the picture into a result around the holes; sources and values without a mean change half-way."""
-        before = self.begin()
-        kept = share < 0.5
-        whole.source[kept], whole.temperature[kept] = before.source[kept], 0
+    def _blend(self, whole: Whole) -> None:
+        """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""
+        rim = self.hole & (self.share < 1)
+        if not rim.any():
+            return
+        mixed = self.pixels[rim] + self.share[rim, None] * (whole.image[rim] - self.pixels[rim].astype(np.float64))
+        kept = self.share < 0.5
+        whole.image[kept], whole.source[kept], whole.temperature[kept] = self.pixels[kept], self.begin().source[kept], 0
         if _has_tones(self.options, Pictures((self.pixels,))):
-            ring = (share > 0) & (share < 1)
-            part = share[ring, None]
-            mixed = part * whole.image[ring] + (1 - part) * self.pixels[ring]
-            whole.image[ring] = np.round(mixed) if self.pixels.dtype.kind in "iu" else mixed
-        else:
-            whole.image[kept] = self.pixels[kept]
+            whole.image[rim] = np.round(mixed) if self.pixels.dtype.kind in "iu" else mixed
 
     def windows(self) -> list[Window]:
         """Return the windows, in the order in which they are filled."""
@@ -499,15 +493,15 @@ def filling(
     if given:
         check_alike("the sample", given.pixels[0], "the picture", pixels)
     chosen = resolve(Options, "fill", options)
-    return Filling(pixels, hole, given, reach, chosen, share if feather else None)
+    return Filling(pixels, hole, given, reach, chosen, share)
 
 
-def widened(hole: Mask, grow: int, feather: int) -> NDArray[np.float64]:
+def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
     """Return the share of filled pixels in the result of `fill` with these options, from 1 in the hole down to 0."""
     if not (grow or feather):
-        return hole.astype(np.float64)
-    away = ndimage.distance_transform_edt(~hole) - grow
-    return np.where(away > feather, 0, np.clip(1 - away / (feather + 1), 0, 1))
+        return hole
+    away = np.ceil(ndimage.distance_transform_edt(~hole) - grow)
+    return np.asarray(np.clip(1 - away / (feather + 1), 0, 1))
 
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:

@@ -56,15 +56,8 @@ class Maps(NamedTuple):
     unknown: list[str]
 
 
-class _Name(NamedTuple):
-    """A file's name: the ``word`` of its role, and the ``stem``, its letters and digits before that, and a size."""
-
-    stem: str
-    word: str
-
-
-def _split(path: str | os.PathLike[str]) -> _Name | None:
-    """Return the parts of a file's name, in lower case, or None if it has no word of a role."""
+def _split(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """Return the stem of a file's name, with a size, and the word of its role or, if it has none, the name and ""."""
     name = Path(path).stem
     parts = list(_PARTS.finditer(name))
     words = [part[0].lower() for part in parts]
@@ -72,8 +65,8 @@ def _split(path: str | os.PathLike[str]) -> _Name | None:
         word, after, before = "".join(words[first:last]), words[last:], name[: parts[first].start()]
         if word in _WORDS and _AFTER.fullmatch(" ".join(after)) and (word not in LETTERS or before[-1:] in (*"_-. ",)):
             sizes = [one for one in after if re.fullmatch("[0-9]+k|[0-9]{4}", one)]
-            return _Name(re.sub(r"[\W_]", "", before).lower() + "".join(sizes), word)
-    return None
+            return re.sub(r"[\W_]", "", before).lower() + "".join(sizes), word
+    return re.sub(r"[\W_]", "", name).lower(), ""
 
 
 def map_role(name: str | os.PathLike[str]) -> str | None:
@@ -87,9 +80,8 @@ def map_role(name: str | os.PathLike[str]) -> str | None:
     >>> [map_role(name) for name in ("brick_normal.png", "Brick-Roughness.tif", "T_Brick_BC.png", "brick_n.png")]
     ['normal', 'roughness', 'albedo', None]
     """
-    found = _split(name)
-    short = found and found.word in LETTERS and not Path(name).name.startswith(("T_", "t_"))
-    return _WORDS[found.word] if found and not short else None
+    word = _split(name)[1]
+    return _WORDS.get(word) if word not in LETTERS or Path(name).name.startswith(("T_", "t_")) else None
 
 
 def find_maps(
@@ -104,15 +96,14 @@ def find_maps(
     ----------
     folder : path
     lead : path, optional
-        One of the maps, whose material is returned if there are several.
+        A map of the material that is returned if there are several.
     roles : mapping of paths to roles, optional
-        Maps whose names do not show their roles.
+        The maps whose names do not show their roles.
 
     Raises
     ------
     ValueError
-        The folder cannot be read, has several materials and there is no `lead`, lacks a path of `roles`, or has a map
-        in a format that is not read.
+        The folder cannot be read, has several materials and there is no `lead`, or a map in a format that is not read.
     """
     try:
         found = sorted(path for path in Path(folder).iterdir() if path.name[0] != "." and path.is_file())
@@ -120,31 +111,23 @@ def find_maps(
         raise ValueError(
             f"{os.fspath(folder)} cannot be read ({error.strerror}): check the path of the folder"
         ) from None
-    found = [path for path in found if path.suffix.lower() in (*READABLE, *UNREADABLE)]
-    roles = roles or {}
-    if missing := [str(path) for path in roles if path not in found]:
-        raise ValueError(f"{missing[0]} is no picture of the folder {os.fspath(folder)}: check its name")
-    names = {path: name for path in found if (name := _split(path))}
-    words = {(name.stem, name.word) for name in names.values()}
-    files = dict(roles)
-    for path, name in names.items():
-        beside = {word for stem, word in words if stem == name.stem}
-        if map_role(path) or beside >= {"d", "n"} or not beside <= LETTERS.keys():
-            files.setdefault(path, _WORDS[name.word])
-    stems = {path: names[path].stem for path in files if path not in roles}
-    if len({(stem, files[path]) for path, stem in stems.items()}) > len({files[path] for path in stems}):
+    names = {path: _split(path) for path in found if path.suffix.lower() in (*READABLE, *UNREADABLE)}
+    files = dict(roles or {})
+    for path, (stem, word) in names.items():
+        beside = {other for one, other in names.values() if one == stem and other}
+        if map_role(path) or (word and (beside >= {"d", "n"} or not beside <= LETTERS.keys())):
+            files.setdefault(path, _WORDS[word])
+    unknown = [path.name for path in names if path not in files and path.suffix.lower() in READABLE]
+    told = {path: names[path][0] for path in files if not roles or path not in roles}
+    if len({(stem, files[path]) for path, stem in told.items()}) > len({files[path] for path in told}):
         if lead is None:
-            firsts: dict[str, str] = {}
-            for path in sorted(stems, key=lambda path: files[path] != "albedo"):
-                firsts.setdefault(stems[path], str(path))
-            some = " or ".join([*list(firsts.values())[:4], *["..."] * (len(firsts) > 4)])
-            raise ValueError(f"{folder} holds {len(firsts)} materials: instead of it give a map of one, {some}")
-        chosen = names[lead].stem if lead in names else None
-        files = {path: role for path, role in files.items() if path in roles or stems[path] == chosen}
+            some = " or ".join(map(str, sorted(told, key=lambda path: files[path] != "albedo")[:4]))
+            raise ValueError(f"{folder} holds several materials: instead of it give a map of one, such as {some}")
+        stem = names.get(lead, ("",))[0]
+        files = {path: role for path, role in files.items() if told.get(path, stem) == stem}
     if unread := [path for path in files if path.suffix.lower() in UNREADABLE]:
         raise ValueError(f"{unread[0]} is of a format that is not read: save it as TIFF or as 16-bit PNG")
-    readable = [path.name for path in found if path.suffix.lower() in READABLE]
-    return Maps(files, [name for name in readable if Path(folder, name) not in {*files, *stems}])
+    return Maps(files, unknown)
 
 
 def unit_normals(pixels: NDArray[Any], where: NDArray[np.bool_]) -> NDArray[Any]:
