@@ -25,7 +25,7 @@ class Folder:
     def __init__(self, maps: Maps, lead: Path, output: Path) -> None:
         self.output, self.lead, self.role = output, lead, maps.files[lead]
         self.paths = [path for path in maps.files if path != lead]
-        self.unknown = maps.unknown
+        self.unknown = [name for name in maps.unknown if lead.with_name(name) not in maps.files]
         self.sample: NDArray[Any] = np.empty(0)
         self.others: list[Also] = []
         self.name = ""
@@ -102,7 +102,8 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
         named[folder / name if name == Path(name).name else Path(name)] = role
     if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
         lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
-        found = find_maps(folder, lead, named)
+        found = find_maps(folder, lead)
+        found.files.update(named)
     if found is None or not (whole or picture in found.files):
         if roles:
             raise ValueError("--map requires a folder of maps: give a folder for the sample and for the output")

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,21 +83,11 @@ def map_role(name: str | os.PathLike[str]) -> str | None:
     return _WORDS.get(word) if word not in LETTERS or Path(name).name.startswith(("T_", "t_")) else None
 
 
-def find_maps(
-    folder: str | os.PathLike[str], lead: Path | None = None, roles: Mapping[Path, str] | None = None
-) -> Maps:
-    """Return the maps of the material in a folder, by their names.
+def find_maps(folder: str | os.PathLike[str], lead: Path | None = None) -> Maps:
+    """Return the maps of the material in a folder, by their names; of several materials that of the map ``lead``.
 
-    Hidden files, subfolders, and files that are no pictures are ignored. Maps of one material have one stem, the name
-    before the word of the role, if a role occurs with several.
-
-    Parameters
-    ----------
-    folder : path
-    lead : path, optional
-        A map of the material that is returned if there are several.
-    roles : mapping of paths to roles, optional
-        The maps whose names do not show their roles.
+    Hidden files, subfolders, and files that are no pictures are ignored. There are several materials if a role occurs
+    with several stems: a stem is the name before the word of the role.
 
     Raises
     ------
@@ -112,19 +101,17 @@ def find_maps(
             f"{os.fspath(folder)} cannot be read ({error.strerror}): check the path of the folder"
         ) from None
     names = {path: _split(path) for path in found if path.suffix.lower() in (*READABLE, *UNREADABLE)}
-    files = dict(roles or {})
+    files = {}
     for path, (stem, word) in names.items():
         beside = {other for one, other in names.values() if one == stem and other}
         if map_role(path) or (word and (beside >= {"d", "n"} or not beside <= LETTERS.keys())):
-            files.setdefault(path, _WORDS[word])
+            files[path] = _WORDS[word]
     unknown = [path.name for path in names if path not in files and path.suffix.lower() in READABLE]
-    told = {path: names[path][0] for path in files if not roles or path not in roles}
-    if len({(stem, files[path]) for path, stem in told.items()}) > len({files[path] for path in told}):
+    if len({(names[path][0], role) for path, role in files.items()}) > len(set(files.values())):
         if lead is None:
-            some = " or ".join(map(str, sorted(told, key=lambda path: files[path] != "albedo")[:4]))
+            some = " or ".join(map(str, sorted(files, key=lambda path: files[path] != "albedo")[:4]))
             raise ValueError(f"{folder} holds several materials: instead of it give a map of one, such as {some}")
-        stem = names.get(lead, ("",))[0]
-        files = {path: role for path, role in files.items() if told.get(path, stem) == stem}
+        files = {path: role for path, role in files.items() if names[path][0] == _split(lead)[0]}
     if unread := [path for path in files if path.suffix.lower() in UNREADABLE]:
         raise ValueError(f"{unread[0]} is of a format that is not read: save it as TIFF or as 16-bit PNG")
     return Maps(files, unknown)
