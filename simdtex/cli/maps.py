@@ -70,15 +70,15 @@ class Folder:
         return f"{self.output} ({1 + len(self.others)} maps arranged by {self.lead.name})"
 
 
-def read_flat(paths: Sequence[Path]) -> Material:
-    """Read pictures of one type; raise ValueError if one is a volume."""
+def read_flat(paths: Sequence[Path], **how: Any) -> Material:
+    """Read pictures of one type, as `read_material` does; raise ValueError if one is a volume."""
     for path in paths:
         if path.suffix.lower() in (".npy", ".nrrd", ".tif", ".tiff"):
             from simdtex.io import volume  # whose libraries take long to load
 
             if volume.is_volume(path):
                 raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
-    found = read_material(paths)
+    found = read_material(paths, **how)
     if (count := channels(found.pixels[0])) > 4 and paths[0].suffix.lower() == ".npy":
         note(f"{paths[0]} is read as a picture of {count} channels; for a volume use simdtex simulate, with --known")
     return found
