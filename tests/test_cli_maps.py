@@ -130,7 +130,7 @@ def test_a_map_of_one_of_several_materials(folder):
     refused(
         folder,
         ["extend", "brick", *TO],
-        "brick holds several materials: instead of it give a map of one, such as brick/brick_albe",
+        "brick holds 2 materials: instead of it give a map of one, such as brick/brick_albe",
     )
     done = run("extend", "brick/brick_albedo.png", *TO)
     assert done.exit_code == 0 and "5 maps arranged by brick_albedo.png" in done.output, done.output
@@ -234,7 +234,7 @@ def refused(folder, args, said):
 
 TO = ["-o", "tiled", *SEAMLESS]
 BAD = {
-    "two materials": (["extend", "brick", *TO], "brick holds several materials: instead of it give", "brick/color.png"),
+    "two materials": (["extend", "brick", *TO], "brick holds 2 materials: instead of it give", "brick/color.png"),
     "no such role": (["extend", "brick", *TO, "--map", "gold=height.npy"], "must be ROLE=FILE, with one of the", None),
     "no such map": (
         ["fill", "brick", *TO[:2], "--map", "ao=x.png"],

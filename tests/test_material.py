@@ -118,7 +118,7 @@ def test_maps_with_letters_and_variants(tmp_path, names, count):
 def test_materials_of_a_folder_are_told_apart_by_their_stems(tmp_path):
     folder_with(tmp_path, "oak_albedo.png", "Oak-Normal.png", "T_Brick_D.png", "T_Brick_N.png", "a.png", "oak_disp.exr")
     with pytest.raises(
-        ValueError, match=r"holds several materials: .* give a map of one, .*/T_Brick_D.png or .*/oak_albedo.png"
+        ValueError, match=r"holds 2 materials: .* give a map of one, .*/T_Brick_D.png or .*/oak_albedo.png"
     ):
         find_maps(tmp_path)
     lead = tmp_path / "T_Brick_N.png"

@@ -109,8 +109,9 @@ def find_maps(folder: str | os.PathLike[str], lead: Path | None = None) -> Maps:
     unknown = [path.name for path in names if path not in files and path.suffix.lower() in READABLE]
     if len({(names[path][0], role) for path, role in files.items()}) > len(set(files.values())):
         if lead is None:
-            some = " or ".join(map(str, sorted(files, key=lambda path: files[path] != "albedo")[:4]))
-            raise ValueError(f"{folder} holds several materials: instead of it give a map of one, such as {some}")
+            one = {names[path][0]: str(path) for path in sorted(files, key=lambda path: files[path] == "albedo")}
+            some = " or ".join(sorted(one.values())[:4])
+            raise ValueError(f"{folder} holds {len(one)} materials: instead of it give a map of one, such as {some}")
         files = {path: role for path, role in files.items() if names[path][0] == _split(lead)[0]}
     if unread := [path for path in files if path.suffix.lower() in UNREADABLE]:
         raise ValueError(f"{unread[0]} is of a format that is not read: save it as TIFF or as 16-bit PNG")
