@@ -90,6 +90,38 @@ def test_what_is_transparent_is_a_mask(folder):
     assert np.array_equal(made, pixels(folder, "masked.png"))
 
 
+def test_what_is_not_opaque_is_filled(folder):
+    cut = pixels(folder, "cut.png").copy()
+    cut[5:17, 7:20, :3], cut[5:17, 7:20, 3] = (0, 255, 0), 200
+    cut[8:14, 10:17, 3], cut[0, 0, 3] = 0, 254
+    image.write(folder / "soft.png", cut)
+    assert small(folder, "fill", "soft.png", "-o", "out.png").exit_code == 0
+    made = pixels(folder, "out.png")
+    assert not (made == (0, 255, 0)).all(-1).any()
+    assert np.array_equal(made[cut[..., 3] == 255], cut[cut[..., 3] == 255][:, :3])
+
+
+def test_inverted_widened_and_blended(folder):
+    image.write(folder / "inverse.png", 255 - pixels(folder, "mask.png"))
+    for name, mask in (("a.png", ["mask.png"]), ("b.png", ["inverse.png", "--invert"])):
+        result = small(folder, "fill", "photo.png", "--mask", *mask, "-o", name, "--grow", 1, "--feather", 2)
+        assert result.exit_code == 0 and "136 of 768 pixels filled" in result.output, result.output
+    photo, hole = pixels(folder, "photo.png"), pixels(folder, "mask.png") > 0
+    made = simdtex.fill(photo, hole, channel_axis=-1, rng=5, grow=1, feather=2, **OPTIONS)
+    assert np.array_equal(pixels(folder, "a.png"), made) and np.array_equal(pixels(folder, "b.png"), made)
+
+
+@pytest.mark.parametrize(
+    ("command", "more"), [("fill", ["--mask", "mask.png"]), ("extend", ["--left", 3]), ("synth", [])]
+)
+def test_a_volume_leads_to_simulate(folder, command, more):
+    image.write(folder / "layers.npy", np.zeros((24, 32, 40), np.uint8))
+    np.save(folder / "volume.npy", np.zeros((4, 24, 32, 1), np.uint8))
+    refused(folder, command, ["volume.npy", "-o", "out.npy", *more], "is a volume: use simdtex simulate")
+    result = small(folder, command, "layers.npy", "-o", "layers.png", *more)
+    assert result.exit_code == 2 and "a picture of 40 channels; for a volume use simdtex simulate" in result.output
+
+
 def test_alpha_beside_a_mask_is_a_channel(folder):
     assert small(folder, "fill", "cut.png", "--mask", "mask.png", "-o", "out.npy").exit_code == 0
     made, cut = pixels(folder, "out.npy"), pixels(folder, "cut.png")
@@ -140,6 +172,8 @@ BAD_FILL = {
     "maps beside a sample": ([*MASKED, "--sample", "texture.png", "--also", "normal.png=n.png"], "leave --also out"),
     "a map of another size": ([*MASKED, "--also", "small.png=n.png"], "32x24"),
     "a source map that holds no -1": ([*MASKED, "--sample", "texture.png", "--source-map", "s.png"], ".npz"),
+    "inverted alpha": (["cut.png", "-o", "out.png", "--invert"], "--invert requires --mask"),
+    "a hole that grows inwards": ([*MASKED, "--grow", "-1"], "grow is -1"),
     "weights in words": ([*MASKED, "--weights", "much"], "numbers separated by commas"),
 }
 

@@ -1,4 +1,4 @@
-"""``simdtex extend`` and ``synth`` of a folder of maps, end to end."""
+"""``simdtex extend``, ``synth`` and ``fill`` of a folder of maps, end to end."""
 
 import os
 
@@ -92,6 +92,79 @@ def test_a_map_that_is_named_decides_and_mixed_normals_have_length_1(folder):
     assert names(folder / "tiled") == NAMES
 
 
+def erased(folder):
+    """The hole of the brick: its albedo gets an alpha with a soft rim, and a wrong colour below it."""
+    albedo = pixels("brick", "brick_albedo.png").copy()
+    alpha = np.full(albedo.shape[:2], 255, np.uint8)
+    alpha[6:13, 8:16], alpha[7:12, 9:15], alpha[8:11, 10:14] = 254, 130, 0
+    albedo[alpha < 255] = (0, 255, 0)
+    image.write("brick/brick_albedo.png", np.dstack([albedo, alpha]))
+    return alpha < 255
+
+
+@pytest.mark.parametrize("lead", ["brick_albedo.png", "brick_normal.png"])
+def test_all_maps_are_filled_alike(folder, lead):
+    hole = erased(folder)
+    image.write("hole.png", np.where(hole, 255, 0).astype(np.uint8))
+    more = [] if "albedo" in lead else ["--mask", "hole.png"]
+    done = run("fill", "brick" if not more else f"brick/{lead}", *more, "-o", "whole", "--source-map", "s.npz")
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith(f"whole (5 maps arranged by {lead}): {hole.sum()} of 480 pixels filled")
+    source = load_source_map("s.npz")
+    assert not hole[source[..., 0], source[..., 1]].any()
+    for name in NAMES:
+        before, after = pixels("brick", name.replace("ao.png", "ao.jpg")), pixels("whole", name)
+        if name == "brick_albedo.png":
+            before = before[..., :3]
+            assert not (after == (0, 255, 0)).all(-1).any(), "the rim comes back"
+        np.testing.assert_array_equal(after[~hole], before[~hole])
+        if name == lead and more:
+            np.testing.assert_allclose(np.linalg.norm(after / 65535 * 2 - 1, axis=2), 1, atol=1e-4)
+        elif name != lead:
+            np.testing.assert_array_equal(after, apply_source_map(source, before))
+
+
+def test_a_map_of_one_of_several_materials(folder):
+    os.rename("brick/height.npy", "brick/brick_height.npy")
+    image.write("brick/tile_albedo.png", np.zeros((3, 3), np.uint8))
+    refused(
+        folder,
+        ["extend", "brick", *TO],
+        "brick holds 2 materials: instead of it give a map of one, such as brick/brick_albe",
+    )
+    done = run("extend", "brick/brick_albedo.png", *TO)
+    assert done.exit_code == 0 and "5 maps arranged by brick_albedo.png" in done.output, done.output
+    assert names(folder / "tiled") == NAMES - {"height.npy"} | {"brick_height.npy"}
+
+
+@pytest.mark.parametrize("command", ["extend", "synth", "fill"])
+def test_a_role_that_the_name_does_not_show(folder, command):
+    os.rename("brick/brick_albedo.png", "brick/one.png")
+    os.rename("brick/brick_normal.png", "brick/two.png")
+    image.write("hole.png", np.pad(np.full((3, 4), 255, np.uint8), ((5, 12), (9, 11))))
+    more = {"extend": SEAMLESS, "synth": ["--size", "30x26"], "fill": ["--mask", "hole.png"]}[command]
+    done = run(command, "brick", "-o", "tiled", *more, "--map", "albedo=one.png", "--map", "normal-dx=brick/two.png")
+    assert done.exit_code == 0 and "left out" not in done.output and "5 maps arranged by one.png" in done.output, (
+        done.output
+    )
+    assert names(folder / "tiled") == NAMES - {"brick_albedo.png", "brick_normal.png"} | {"one.png", "two.png"}
+
+
+def test_maps_that_would_get_one_name_are_refused(folder):
+    image.write("brick/brick_ao.png", pixels("brick", "brick_ao.jpg"))
+    refused(folder, ["extend", "brick", *TO], "tiled/brick_ao.png would be written twice: move one of the maps out")
+
+
+def test_variants_of_the_albedo(folder):
+    image.write("brick/brick_color_var2.png", pixels("brick", "brick_albedo.png")[::-1])
+    refused(
+        folder, ["extend", "brick", *TO], "brick_albedo.png and brick_color_var2.png are both albedo maps: give the"
+    )
+    for args in (["brick", "--map", "albedo=brick_color_var2.png"], ["brick/brick_color_var2.png"]):
+        done = run("extend", *args, *TO)
+        assert done.exit_code == 0 and "6 maps arranged by brick_color_var2.png" in done.output, done.output
+
+
 def test_an_earlier_output_is_replaced_and_nothing_else(folder):
     assert run("extend", "brick", "-o", "tiled", *SEAMLESS).exit_code == 0
     first = pixels("tiled", "brick_albedo.png")
@@ -161,14 +234,27 @@ def refused(folder, args, said):
 
 TO = ["-o", "tiled", *SEAMLESS]
 BAD = {
-    "two of one role": (["extend", "brick", *TO], "are both albedo maps", "brick/color.png"),
+    "two materials": (["extend", "brick", *TO], "brick holds 2 materials: instead of it give", "brick/color.png"),
+    "no such role": (["extend", "brick", *TO, "--map", "gold=height.npy"], "must be ROLE=FILE, with one of the", None),
+    "no such map": (
+        ["fill", "brick", *TO[:2], "--map", "ao=x.png"],
+        "brick/x.png",
+        None,
+    ),
+    "a map of no folder": (["synth", "a.png", "-o", "b.png", "--map", "ao=a.png"], "--map requires a folder", "a.png"),
+    "no hole": (["fill", "brick", "-o", "tiled"], "there is nothing to fill; give a mask", None),
+    "another texture": (
+        ["fill", "brick", "-o", "t", "--sample", "brick/brick_ao.jpg"],
+        "cannot be filled with --s",
+        None,
+    ),
     "a size that differs": (
         ["extend", "brick", *TO],
         "opacity.png is 5x4 and brick_albedo.png 24x20",
         "brick/opacity.png",
     ),
-    "no albedo": (["extend", "none", *TO], "has no albedo: end the name of a map in _albedo", "none/b_normal.png"),
-    "no maps at all": (["extend", "none", *TO], "no albedo (b.png is of unknown kind): end", "none/b.png"),
+    "no albedo": (["extend", "none", *TO], "has no albedo: give --map albedo=FILE", "none/b_normal.png"),
+    "no maps at all": (["extend", "none", *TO], "no albedo (b.png is of unknown kind): give", "none/b.png"),
     "a file as output": (["extend", "brick", "-o", "out.png", *SEAMLESS], "give a folder for the output", None),
     "a store as output": (["synth", "brick", "-o", "out.zarr"], "give a folder for the output", None),
     "a suffix": (["extend", "brick/brick_ao.jpg", "-o", "out.pgn", *SEAMLESS], "ends in .pgn: end its name", None),

@@ -69,7 +69,7 @@ def words(option, text):
 def reading(option, text):
     """An option that reads a file; of a pair, on the left."""
     if isinstance(option.type, Pair) and option.type.named:
-        text = f"name={text}"
+        text = f"albedo={text}"
     elif isinstance(option.type, Pair):
         text = f"{text}={'new.png' if option.type.role == 'write' else 'map.png'}"
     return words(option, text)
@@ -215,6 +215,8 @@ def test_a_missing_input_is_named(folder, pair):
         rest += ["--mask", "map.png"]
     if name == "extend":
         rest += ["--left", "3"]
+    if given.name == "roles":
+        rest = [{"sample.png": "in", "out.png": "out"}.get(word, word) for word in rest]
     refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path")
     if isinstance(given.type, Place) and given.type.role == "read":
         refused(folder, name, [*words(given, "in"), *rest], "is a folder")

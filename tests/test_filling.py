@@ -5,6 +5,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import ndimage
 
 import simdtex
 from simdtex.jobs.filling import FEW, windows
@@ -82,6 +83,30 @@ def test_what_a_hole_holds_makes_no_difference():
     image, other = texture(SHAPE), texture(SHAPE)
     other[MIDDLE] = 255 - other[MIDDLE]
     assert_same_bits(fill(image, MIDDLE), fill(other, MIDDLE))
+
+
+def test_a_hole_is_widened_and_its_rim_blended():
+    image = texture((30, 40))
+    mask = hole_at(np.s_[12:16, 15:21], shape=image.shape)
+    away = ndimage.distance_transform_edt(~mask)
+    assert_same_bits(fill(image, mask, grow=2), fill(image, away <= 2))
+    filled, far = fill(image, away <= 5, full_output=True)
+    blended, output = fill(image, mask, grow=2, feather=3, full_output=True)
+    share = np.clip(1 - np.ceil(away - 2) / 4, 0, 1)
+    assert ((share > 0) == (away <= 5)).all()
+    assert_same_bits(blended, np.round(share * filled + (1 - share) * image).astype(np.uint8))
+    assert ((blended != filled) & (blended != image)).any()
+    assert_same_bits(output.source[share >= 0.5], far.source[share >= 0.5])
+    kept = fill(image, mask, grow=2, full_output=True)[1].source
+    assert_same_bits(output.source[share < 0.5], kept[share < 0.5])
+
+
+@pytest.mark.parametrize("few", [{"categorical": True}, {}], ids=["categories", "few"])
+def test_values_without_a_mean_change_half_way(few):
+    image = np.where(texture((30, 40)) > 128, 200, 7).astype(np.uint8)
+    found, output = fill(image, hole_at(np.s_[12:16, 15:21], shape=image.shape), feather=4, full_output=True, **few)
+    assert set(np.unique(found)) == {7, 200}
+    assert_same_bits(found, apply_source_map(output.source, image))
 
 
 EDGES = {

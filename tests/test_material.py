@@ -26,9 +26,39 @@ NAMES = {
     "rock.Metalness.png": "metallic",
     "brick_albedo.1001.png": "albedo",
     "brick_metallic_roughness.png": "packed",
+    "rock_Normal_OpenGL.png": "normal",
+    "rock_Normal_DirectX.png": "normal-dx",
+    "rock-normal-ogl.png": "normal",
+    "rock_Mixed_AO.png": "ao",
+    "rock_depth.png": "height",
+    "rock_AlbedoTransparency.png": "albedo",
+    "rock_MetallicSmoothness.png": "packed",
+    "rock_MaskMap.png": "packed",
+    "rock_OcclusionRoughnessMetallic.png": "packed",
+    "vlkhcbxia_2K_Albedo.jpg": "albedo",
+    "vlkhcbxia_2K_Normal_LOD0.jpg": "normal",
+    "vlkhcbxia_2K_Cavity.jpg": "cavity",
+    "vlkhcbxia_2K_Translucency.jpg": "translucency",
+    "vlkhcbxia_2K_Fuzz.jpg": "fuzz",
+    "Ground003_COL_VAR1_3K.jpg": "albedo",
+    "Ground003_NRM16_3K.tif": "normal",
+    "Ground003_DISP16_3K.tif": "height",
+    "Ground003_REFL_3K.jpg": "specular",
+    "Metal001_COL_2K_METALNESS.png": "albedo",
+    "Metal001_METALNESS_2K_METALNESS.png": "metallic",
+    "Metal001_NRM16_4K_LOD0_METALNESS.png": "normal",
+    "rock_arm_2k.png": "packed",
+    "T_Rock_BC.png": "albedo",
+    "T_Rock_N.png": "normal",
+    "T_Rock_ORM.png": "packed",
     "rough_wood.png": None,
     "normal_wall.png": None,
     "abnormal.png": None,
+    "color_metalness_old.png": None,
+    "wood_r.png": None,
+    "brick_n.png": None,
+    "T_Sign_3D.png": None,
+    "brick_mask.png": None,
     "2k.png": None,
     "brick.png": None,
 }
@@ -51,27 +81,56 @@ def test_the_words_of_the_page_are_known():
             assert map_role(f"brick {word}.png") == role
 
 
-def test_maps_of_a_folder(tmp_path):
-    for name in ("b_albedo.png", "b_normal.tif", "preview.png", "normal.txt", "material.mtlx", "._b_ao.png"):
+def folder_with(tmp_path, *names):
+    for name in names:
         (tmp_path / name).touch()
+    return tmp_path
+
+
+def roles_in(*args):
+    return {path.name: role for path, role in find_maps(*args).files.items()}
+
+
+def test_maps_of_a_folder(tmp_path):
+    folder_with(tmp_path, "b_albedo.png", "b_normal.tif", "preview.png", "normal.txt", "material.mtlx", "._b_ao.png")
     (tmp_path / "roughness.png").mkdir()
     found = find_maps(tmp_path)
-    assert found.files == {"albedo": tmp_path / "b_albedo.png", "normal": tmp_path / "b_normal.tif"}
+    assert found.files == {tmp_path / "b_albedo.png": "albedo", tmp_path / "b_normal.tif": "normal"}
     assert found.unknown == ["preview.png"]
 
 
 @pytest.mark.parametrize(
-    ("names", "said"),
+    ("names", "count"),
     [
-        (("b_color.png", "b_diffuse.png"), r"b_color.png and b_diffuse.png are both albedo maps: move one out"),
-        (("b_color.png", "b_disp.exr"), "b_disp.exr is of a format that is not read: save it as TIFF"),
+        (("wood_d.png", "wood_n.png", "wood_r.png"), 3),
+        (("wood_d.png", "wood_r.png", "wood_AO.png"), 3),
+        (("wood_r.png", "wood_d.png", "sky_AO.png"), 1),
+        (("coast_n.png", "coast_e.png", "coast_s.png"), 0),
+        (("G_COL_VAR1_3K.jpg", "G_COL_VAR2_3K.jpg", "G_DISP_3K.jpg", "G_DISP16_3K.tif", "G_NRM_3K.jpg"), 5),
+        (("R_Normal_OpenGL.png", "r-normal-dx.png", "R_Base_Color.png", "height.npy"), 4),
     ],
 )
-def test_a_folder_that_is_unclear_is_refused(tmp_path, names, said):
-    for name in names:
-        (tmp_path / name).touch()
-    with pytest.raises(ValueError, match=said):
+def test_maps_with_letters_and_variants(tmp_path, names, count):
+    found = find_maps(folder_with(tmp_path, *names))
+    assert len(found.files) == count and len(found.unknown) == len(names) - count
+
+
+def test_materials_of_a_folder_are_told_apart_by_their_stems(tmp_path):
+    folder_with(tmp_path, "oak_albedo.png", "Oak-Normal.png", "T_Brick_D.png", "T_Brick_N.png", "a.png", "oak_disp.exr")
+    with pytest.raises(
+        ValueError, match=r"holds 2 materials: .* give a map of one, .*/T_Brick_D.png or .*/oak_albedo.png"
+    ):
         find_maps(tmp_path)
+    lead = tmp_path / "T_Brick_N.png"
+    assert roles_in(tmp_path, lead) == {"T_Brick_D.png": "albedo", "T_Brick_N.png": "normal"}
+    assert find_maps(tmp_path, lead).unknown == ["a.png"]
+    with pytest.raises(ValueError, match=r"oak_disp.exr is of a format that is not read: save it as TIFF"):
+        find_maps(tmp_path, tmp_path / "oak_albedo.png")
+
+
+def test_sizes_are_parts_of_stems(tmp_path):
+    folder_with(tmp_path, "floor_diff_1k.png", "floor_diff_2k.png", "floor_disp_1k.png")
+    assert set(roles_in(tmp_path, tmp_path / "floor_diff_1k.png")) == {"floor_diff_1k.png", "floor_disp_1k.png"}
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path):

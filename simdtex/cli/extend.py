@@ -12,7 +12,7 @@ import click
 from simdtex.cli.inputs import channels, check_source_map, note_lossy, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.maps import folder_of
-from simdtex.cli.options import ALSO, SOURCE_MAP, given, option, report_option
+from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given, option, report_option
 from simdtex.cli.places import EITHER, ENTER
 
 SIDES = ("top", "bottom", "left", "right")
@@ -49,6 +49,7 @@ SIDES = ("top", "bottom", "left", "right")
     type=int,
     help="Replace this many pixels along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
 )
+@MAP
 @ALSO
 @SOURCE_MAP
 @report_option("its pictures, and how evenly it uses the picture")
@@ -57,6 +58,7 @@ def extend(
     output: Path,
     size: str | None,
     seamless: str | None,
+    roles: tuple[str, ...],
     also: tuple[str, ...],
     source_map: Path | None,
     report: Path | None,
@@ -71,7 +73,7 @@ def extend(
     from simdtex import extend
     from simdtex.io import image
 
-    folder = folder_of(picture, output)
+    folder = folder_of([picture], output, roles)
     whole = read_material([folder.lead if folder else picture])
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     sides = {name: options.pop(name) for name in SIDES}

@@ -23,27 +23,34 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import ALSO, SOURCE_MAP, given
-from simdtex.cli.places import READ, WRITE
+from simdtex.cli.maps import folder_of
+from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given
+from simdtex.cli.places import EITHER, ENTER, READ
 from simdtex.model.pictures import unknown_in
 
 
 @job(
     ("fill photo.png -o whole.png --mask hole.png", "Fill the white parts of a mask."),
     ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
-    (
-        "fill photo.png -o grass.png --mask car.png --sample meadow.png",
-        "Fill with another texture.",
-    ),
+    ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
+    ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
 )
-@click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@click.argument("picture", type=ENTER)
+@click.option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")
 @click.option(
     "--mask",
     type=READ,
     metavar="FILE",
-    help="Fill the white parts of this mask, of the same size.  [the parts of PICTURE that are transparent or NaN; "
-    "the output then has no alpha]",
+    help="Fill the white parts of this mask, of the same size.  [the parts of PICTURE that are not fully opaque, or "
+    "NaN; the output then has no alpha]",
+)
+@click.option("--invert", is_flag=True, help="Fill all but the white parts of --mask.")
+@click.option("--grow", type=int, default=0, help="Make the holes wider by this many pixels.")
+@click.option(
+    "--feather",
+    type=int,
+    default=0,
+    help="Blend the filled pixels with the picture up to this many pixels around the holes.",
 )
 @click.option(
     "--sample",
@@ -58,53 +65,66 @@ from simdtex.model.pictures import unknown_in
     type=int,
     help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
 )
+@MAP
 @ALSO
 @SOURCE_MAP
 def fill(
     picture: Path,
     output: Path,
     mask: Path | None,
+    invert: bool,
     samples: tuple[Path, ...],
-    reach: int | None,
+    roles: tuple[str, ...],
     also: tuple[str, ...],
     source_map: Path | None,
     **options: Any,
 ) -> Task:
     """Fill the holes of PICTURE with the texture around them.
 
-    Pixels outside the holes do not change.
+    Pixels outside the holes do not change, except with --grow and --feather. PICTURE may be a folder with the maps of a
+    material, as in `simdtex extend`; the holes are those of the albedo, or of --mask.
     """
     from simdtex import fill
     from simdtex.io import image
+    from simdtex.jobs.filling import widened
 
-    whole = read_material([picture])
-    pixels, hole = _hole(whole.pixels[0], mask)
+    folder = folder_of([picture], output, roles)
+    whole = read_material([folder.lead if folder else picture])
+    pixels, hole = _hole(whole.pixels[0], mask, invert)
+    whole = whole._replace(pixels=[pixels])
     texture = read_material(samples) if samples else None
     if texture:
-        check_profiles([picture, samples[0]], [whole.metadata, texture.metadata])
-    if texture and also:
-        raise ValueError("--also cannot be used with --sample, since no pixel comes from the picture; leave --also out")
+        check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
+    if texture and (also or folder):
+        what = "give one picture" if folder else "leave --also out"
+        raise ValueError(f"maps cannot be filled with --sample, since no pixel comes from the picture; {what}")
     others = read_also(also, whole)
-    image.check_writable(output, pixels.dtype, channels(pixels))
+    if folder:
+        folder.read(whole)
+    else:
+        image.check_writable(output, pixels.dtype, channels(pixels))
+        note_lossy(output, pixels, whole.metadata)
     check_source_map(source_map, texture or whole, everywhere=not texture)
-    note_lossy(output, pixels, whole.metadata)
     sample = texture and texture.array
+    filled = np.count_nonzero(widened(hole, options["grow"], options["feather"]))
     axis = None if pixels.ndim == 2 else -1
     return Task(
-        partial(fill, pixels, hole, sample=sample, reach=reach, channel_axis=axis, **given(options)),
-        lambda made: f"{np.count_nonzero(hole)} of {hole.size} pixels filled",
-        str(output),
-        write_arranged(output, others, source_map, whole.metadata),
+        partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
+        lambda made: f"{filled} of {hole.size} pixels filled",
+        str(folder or output),
+        write_arranged(folder.write if folder else output, others, source_map, whole.metadata),
     )
 
 
-def _hole(pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return the picture, and its hole: where the mask is white or, without one, it is transparent; or it is NaN."""
+def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
     pixels, gone = parted(pixels)
     if mask:
-        hole = read_mask(mask, pixels.shape)
+        hole = read_mask(mask, pixels.shape) != invert
+    elif invert:
+        raise ValueError("--invert requires --mask; leave it out")
     else:
-        pixels, hole = split_alpha(pixels)
+        pixels, hole = split_alpha(pixels, opaque=True)
     return pixels, hole | gone | unknown_in(planes(pixels))

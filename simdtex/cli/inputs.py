@@ -200,7 +200,7 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
         raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
-        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
+        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1, or use simdtex simulate")
     return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +22,10 @@ if TYPE_CHECKING:
 class Folder:
     """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``."""
 
-    def __init__(self, maps: Maps, role: str, output: Path) -> None:
-        self.output, self.lead, self.role = output, maps.files[role], role
-        self.paths = [path for path in maps.files.values() if path != self.lead]
-        self.unknown = maps.unknown
+    def __init__(self, maps: Maps, lead: Path, output: Path) -> None:
+        self.output, self.lead, self.role = output, lead, maps.files[lead]
+        self.paths = [path for path in maps.files if path != lead]
+        self.unknown = [name for name in maps.unknown if lead.with_name(name) not in maps.files]
         self.sample: NDArray[Any] = np.empty(0)
         self.others: list[Also] = []
         self.name = ""
@@ -44,6 +45,8 @@ class Folder:
                 )
             self.others.append(Also(maps, self.output / _written(path, maps.pixels[0])))
         names = [self.name, *(one.out.name for one in self.others)]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
         if self.unknown:
             note(f"left out, because the name does not show the kind of map: {', '.join(self.unknown)}")
@@ -67,29 +70,45 @@ class Folder:
         return f"{self.output} ({1 + len(self.others)} maps arranged by {self.lead.name})"
 
 
-def folder_of(picture: Path, output: Path) -> Folder | None:
-    """Return the maps of a folder, if `picture` is one, or is a map in one and `output` a folder; else None."""
-    from simdtex.model.material import READABLE, find_maps, map_role
+def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> Folder | None:
+    """Return the maps of a folder, if it is the only one of `pictures`, or a map in it is and `output` is a folder.
 
-    role = map_role(picture)
+    Else None. ``roles`` are the texts of ``--map``.
+    """
+    from simdtex.model.material import READABLE, ROLES, find_maps
+
+    picture = pictures[0] if len(pictures) == 1 else Path("-")
     whole = picture.is_dir()
-    if not whole and (role is None or not picture.is_file() or (output.suffix and not output.is_dir())):
+    folder = picture if whole else picture.parent
+    named, found = {}, None
+    for text in roles:
+        role, _, name = text.partition("=")
+        if role not in ROLES or not name:
+            raise ValueError(f"--map {text} must be ROLE=FILE, with one of the roles {', '.join(ROLES)}")
+        named[folder / name if name == Path(name).name else Path(name)] = role
+    if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
+        lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
+        found = find_maps(folder, lead)
+        found.files.update(named)
+    if found is None or not (whole or picture in found.files):
+        if roles:
+            raise ValueError("--map requires a folder of maps: give a folder for the sample and for the output")
         return None
-    found = find_maps(picture if whole else picture.parent)
-    if whole:
-        role = "albedo"
-    if role is None or role not in found.files:
-        there = next(iter(found.files.values()), picture / "brick_normal.png")
+    albedos = [lead] if lead else [path for path, role in found.files.items() if role == "albedo"]
+    if len(albedos) > 1:
+        raise ValueError(f"{albedos[0]} and {albedos[1].name} are both albedo maps: give the path of one")
+    if not albedos:
+        there = next(iter(found.files), picture / "brick_normal.png")
         what = f" ({found.unknown[0]} is of unknown kind)" if found.unknown else ""
         raise ValueError(
-            f"{picture} has no albedo{what}: end the name of a map in _albedo, or give the map that decides the "
+            f"{picture} has no albedo{what}: give --map albedo=FILE, or instead of the folder the map that decides the "
             f"arrangement, such as {there}"
         )
     if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
-    for path in found.files.values():
+    for path in found.files:
         check_input(output, path)
-    return Folder(found, role, output)
+    return Folder(found, albedos[0], output)
 
 
 def _written(path: Path, pixels: NDArray[Any]) -> str:

@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.places import FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -288,6 +288,15 @@ ALSO = option(
     metavar="MAP=OUT",
     help="Arrange another map of the material (normal, height) like the output; may be repeated.",
     with_tiles="Give MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
+)
+MAP = option(
+    "--map",
+    "roles",
+    group=DATA,
+    multiple=True,
+    type=READ_NAMED,
+    metavar="ROLE=FILE",
+    help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
 )
 
 

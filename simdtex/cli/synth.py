@@ -26,6 +26,7 @@ from simdtex.cli.maps import folder_of
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
+    MAP,
     METHODS,
     SAMPLE_MASK,
     SOURCE_MAP,
@@ -68,6 +69,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @SAMPLE_MASK
 @data_options
 @GUIDE
+@MAP
 @SOURCE_MAP
 @ALSO
 @report_option("its pictures, how evenly it uses the sample, and how much it copies")
@@ -78,6 +80,7 @@ def synth(
     size: str | None,
     method: str,
     source_map: Path | None,
+    roles: tuple[str, ...],
     also: tuple[str, ...],
     report: Path | None,
     **options: Any,
@@ -92,7 +95,7 @@ def synth(
 
     context = click.get_current_context()
     check_tiles(context)
-    folder = folder_of(samples[0], output) if len(samples) == 1 and options["tiles"] is None else None
+    folder = folder_of(samples if options["tiles"] is None else (), output, roles)
     if method == "pyramid" and (source_map or also or folder):
         what = "give one picture" if folder else "leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")

@@ -129,13 +129,15 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
 
 
-def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray[np.bool_]]:
     """Return a picture without its alpha channel, if any, and the mask of its transparent pixels.
 
     Parameters
     ----------
     pixels : array_like, (rows, cols) or (rows, cols, channels)
         The last of two or four channels is alpha; a picture with another number of channels has none.
+    opaque : bool
+        Whether all that is not fully opaque is transparent.
 
     Returns
     -------
@@ -160,7 +162,8 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     values = pixels_of("the picture", pixels)
     if values.ndim == 2 or values.shape[2] not in (2, 4):
         return values, np.zeros(values.shape[:2], dtype=bool)
-    return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= _half(values.dtype))
+    least = _half(values.dtype) * (2 if opaque else 1)
+    return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= least)
 
 
 def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None) -> NDArray[np.bool_]:

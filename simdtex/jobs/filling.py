@@ -97,6 +97,8 @@ def fill(
     *,
     sample: ArrayLike | None = None,
     reach: int | None = None,
+    grow: int = 0,
+    feather: int = 0,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
@@ -118,6 +120,11 @@ def fill(
     reach : int, optional
         Distance around a hole up to which the picture is its sample, pixels. None: 128, or twice the hole's longer side
         if that is more. It has no effect with `sample`.
+    grow : int
+        Widen the holes by this distance, pixels.
+    feather : int
+        Blend the filled pixels with the picture up to this distance around the holes, pixels. Values without a mean
+        (categories, 16 different pixels or fewer) change half-way instead.
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, checkpoint
@@ -130,7 +137,7 @@ def fill(
     Returns
     -------
     image : array of the image's shape and type
-        Pixels outside the holes are those of the image, to the bit.
+        Pixels outside the holes, widened by `grow` and `feather`, are those of the image, to the bit.
     output : simdtex.run.Output
         Only with ``full_output=True``. ``source`` has positions in the image, and known pixels have their own. With
         `sample` it has positions in the sample, and -1 at known pixels.
@@ -161,7 +168,7 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    job = filling(image, mask, sample, reach, channel_axis, options)
+    job = filling(image, mask, sample, reach, channel_axis, options, grow, feather)
     return execute("fill", job.run, job.inputs, channel_axis, rng, device, callback, full_output, checkpoint)
 
 
@@ -326,7 +333,7 @@ class Filling:
     """The job of `fill`: a sequence of runs, one for each window.
 
     ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample`` or, if it is
-    None, from their surroundings up to ``reach`` pixels around a hole.
+    None, from their surroundings up to ``reach`` pixels around a hole; ``share`` is from `widened`.
     """
 
     pixels: NDArray[Any]
@@ -334,6 +341,7 @@ class Filling:
     sample: Pictures | None
     reach: int | None
     options: Options
+    share: NDArray[Any]
 
     def inputs(self) -> dict[str, Any]:
         """Return everything but the seed that determines the result, by the parameters' names."""
@@ -365,6 +373,7 @@ class Filling:
             hole = self.hole[at]
             whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
             whole.source[at][hole] = shifted(found.source, found.corner)
+        self._blend(whole)
         runs = [found.statistics for found in finished]
         seconds = [run["device_seconds"] for run in runs]
         statistics = {
@@ -373,6 +382,17 @@ class Filling:
             "device_seconds": None if None in seconds else sum(seconds),
         }
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
+
+    def _blend(self, whole: Whole) -> None:
+        """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""
+        rim = self.hole & (self.share < 1)
+        if not rim.any():
+            return
+        mixed = self.pixels[rim] + self.share[rim, None] * (whole.image[rim] - self.pixels[rim].astype(np.float64))
+        kept = self.share < 0.5
+        whole.image[kept], whole.source[kept], whole.temperature[kept] = self.pixels[kept], self.begin().source[kept], 0
+        if _has_tones(self.options, Pictures((self.pixels,))):
+            whole.image[rim] = np.round(mixed) if self.pixels.dtype.kind in "iu" else mixed
 
     def windows(self) -> list[Window]:
         """Return the windows, in the order in which they are filled."""
@@ -453,12 +473,18 @@ def filling(
     reach: int | None,
     channel_axis: int | None,
     options: dict[str, Any],
+    grow: int = 0,
+    feather: int = 0,
 ) -> Filling:
     """Return the job of `fill` for the same parameters; raise ValueError or TypeError if one is invalid."""
     pixels, hole = check_picture(image, channel_axis)
     hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
+    whole("grow", grow, 0)
+    whole("feather", feather, 0)
     if not hole.any():
         raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
+    share = widened(hole, grow, feather)
+    hole = share > 0
     if hole.all():
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     if reach is not None:
@@ -467,7 +493,15 @@ def filling(
     if given:
         check_alike("the sample", given.pixels[0], "the picture", pixels)
     chosen = resolve(Options, "fill", options)
-    return Filling(pixels, hole, given, reach, chosen)
+    return Filling(pixels, hole, given, reach, chosen, share)
+
+
+def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
+    """Return the share of filled pixels in the result of `fill` with these options, from 1 in the hole down to 0."""
+    if not (grow or feather):
+        return hole
+    away = np.ceil(ndimage.distance_transform_edt(~hole) - grow)
+    return np.asarray(np.clip(1 - away / (feather + 1), 0, 1))
 
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:

@@ -131,6 +131,8 @@ class FillOptions(MrfOptions, total=False):
 
     sample: ArrayLike | None
     reach: int | None
+    grow: int
+    feather: int
 
 
 class ExtendOptions(MrfOptions, total=False):
