@@ -66,23 +66,23 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: in
 
 def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
     field, tally = tiles.entered(here.run, turn.level, tile, _above(here, turn, tile))
-    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
+    here.store.write(turn, tile, field)
     return tally
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
     field = tiles.whole(here.run, turn.level, _above(here, turn, tile))
-    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
+    here.store.write(turn, tile, field)
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
-    before, penalty = here.store.read(level, turn.read, frame.window), here.store.penalty(turn)
+    before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
     done, free = turn.cooling + turn.free, not turn.active
     field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, penalty, done, free)
-    here.store.write(level, turn.write, tile, field)
+    here.store.write(turn, tile, field)
     return tally
 
 
@@ -90,7 +90,7 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     run, work, level = here.run, here.work, here.work.layout.levels[0]
     sd = run.options.finish or 0
     frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
-    state = here.store.read(level, turn.read, frame.window)
+    state = here.store.read(level, turn.number - 1, frame.window)
     known = here.store.held(level, frame.window).known if work.held else None
     field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
     shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
@@ -109,10 +109,10 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
 
 def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
     levels = here.work.layout.levels
-    if turn.level + 1 == len(levels):
+    if turn.reads == len(levels):
         return None
     (top, rows), (left, cols) = here.run.grid(turn.level).window(*tile).above
-    return here.store.read(levels[turn.level + 1], turn.read, Tile(top, left, rows, cols))
+    return here.store.read(levels[turn.reads], turn.number - 1, Tile(top, left, rows, cols))
 
 
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
