@@ -232,11 +232,31 @@ def _more(path):
     zarr.open_group(path).create_array("depths", data=np.arange(4))
 
 
-@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more])
+def _inside(path):
+    write_realisations(path, some())
+    (path / "rock" / "notes.txt").write_text("kept")
+
+
+def _attribute(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"].attrs["checked_by"] = "me"
+
+
+def _title(path):
+    write_realisations(path, some())
+    zarr.open_group(path).attrs["title"] = "mine"
+
+
+def _edited(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"][0, 0, 0] = 77
+
+
+@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more, _inside, _attribute, _title, _edited])
 def test_only_a_store_of_ones_own_is_replaced(tmp_path, make):
     path = tmp_path / "lab.zarr"
     make(path)
-    before = sorted(path.rglob("*"))
+    before = {one: one.is_file() and one.read_bytes() for one in path.rglob("*")}
     with pytest.raises(ValueError, match=r"lab.zarr is a folder and not a store of realisations alone: remove it, or"):
         write_realisations(path, some())
-    assert sorted(path.rglob("*")) == before
+    assert {one: one.is_file() and one.read_bytes() for one in path.rglob("*")} == before

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 
 import click
 
-from simdtex.cli.places import check_places
+from simdtex.cli.places import check_places, outputs
 
 UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
 """Modules in which an exception does harm: the search for runtimes, and callbacks of collected objects."""
@@ -36,6 +36,7 @@ class Ended(KeyboardInterrupt):
 def reporting() -> Iterator[None]:
     """Check the paths of the running command, and report errors and signals in one sentence."""
     context = click.get_current_context()
+    before = outputs(context)
     try:
         with catch_signals(context):
             check_places(context)
@@ -50,14 +51,16 @@ def reporting() -> Iterator[None]:
         note("there is not enough memory; give a smaller size")
         sys.exit(2)
     except KeyboardInterrupt as signalled:
-        give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
+        give_up(context, signalled.args[0] if signalled.args else signal.SIGINT, before)
     settle()
 
 
-def give_up(context: click.Context, number: int) -> NoReturn:
-    """Say that the command was stopped, and how to go on, and exit with the code of a signal."""
+def give_up(context: click.Context, number: int, before: dict[Path, Any]) -> NoReturn:
+    """Say that the command was stopped, and how to go on or what was written, and exit with the code of a signal."""
     path: Path | None = context.meta.get(RESUME)
-    how = f"continue with: simdtex resume {path}" if path and path.exists() else "only stages may have been written"
+    written = ", ".join(str(one) for one, state in outputs(context).items() if before.get(one) != state)
+    how = f"written so far: {written}" if written else "nothing was written"
+    how = f"continue with: simdtex resume {path}" if path and path.exists() else how
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
     note(f"stopped; {how}")
     sys.exit(128 + number)

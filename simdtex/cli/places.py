@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -81,6 +82,16 @@ def check_places(context: click.Context) -> None:
                         f"{inner.path} would be written into {outer.path}, the folder of another output; "
                         "give it another folder"
                     )
+
+
+def outputs(context: click.Context) -> dict[Path, tuple[int, int]]:
+    """Return the outputs of a command that exist, each with its inode and the time of its last change."""
+    found = {}
+    for one in _named(context):
+        with suppress(OSError, ValueError):  # no such file, or no valid name
+            if one.role not in READING:
+                found[one.path] = one.path.stat().st_ino, one.path.stat().st_mtime_ns
+    return found
 
 
 def check_input(folder: Path, path: Path) -> None:
