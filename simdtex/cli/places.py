@@ -121,13 +121,25 @@ def _named(context: click.Context) -> Iterator[_Named]:
             if isinstance(kind, Place):
                 yield _Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
-                left, _, right = str(one).partition("=")
-                left, right = (right, "") if kind.named else (left, right)
-                # how many files the left names depends on the samples; a file that is not there harms nothing
-                for text in {left, *(part.strip() for part in left.split(","))} - {""}:
-                    yield _Named(Path(text), "read")
-                if right:
-                    yield _Named(Path(right), kind.role)
+                pairs = [(str(one).partition("=")[2], "")] if kind.named else split_pair(str(one))
+                for left, right in pairs:
+                    # how many files the left names depends on the samples; a file that is not there harms nothing
+                    for text in {left, *(part.strip() for part in left.split(","))} - {""}:
+                        yield _Named(Path(text), "read")
+                    if right:
+                        yield _Named(Path(right), kind.role)
+
+
+def split_pair(text: str) -> list[tuple[str, str]]:
+    """Return the two sides of ``A=B`` or ``A0,A1=B``, for each = before which files are named; else at the first =."""
+    at = [number for number, letter in enumerate(text) if letter == "="] or [len(text)]
+    sides = [(text[:end], text[end + 1 :]) for end in at]
+    found = [
+        one
+        for one in sides
+        if os.path.exists(one[0]) or all(os.path.exists(part.strip()) for part in one[0].split(","))
+    ]
+    return found or sides[:1]
 
 
 def _real(path: Path) -> Path:
