@@ -11,7 +11,7 @@ import simdtex
 from simdtex import distributed
 from simdtex.distributed import layout
 from simdtex.distributed.store import Store
-from simdtex.distributed.tasks import forget
+from simdtex.distributed.tasks import contexts
 from simdtex.io import atomic
 from simdtex.methods.mrf.tiles import Tally
 
@@ -87,7 +87,7 @@ def part_of(path, part):
 def gone_on(path, sentences):
     """Resume until the output is there, and return it; None if it has to begin anew."""
     for _ in range(5):
-        forget()
+        contexts.clear()
         try:
             return distributed.resume(path, device=REFERENCE)
         except ValueError as error:
@@ -353,7 +353,7 @@ def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
     store = Store(str(path))
-    turn, work = store.turn, store.work()
+    turn, work = store.turn, store.work
     assert store.done(turn, work, 0)  # which opens the arrays
     shutil.rmtree(path)
     with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
@@ -405,7 +405,7 @@ def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
 def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
-    forget()
+    contexts.clear()
     with monkeypatch.context() as patch:
         patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "

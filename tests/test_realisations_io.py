@@ -2,15 +2,20 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 
+import click
+import h5netcdf
 import numpy as np
 import pytest
 import xarray
 import zarr
 
 from simdtex import distributed
+from simdtex.cli.ending import catch_signals
 from simdtex.io.grids import read_grid
 from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
 
@@ -180,6 +185,23 @@ def test_what_is_no_data_array_is_refused(tmp_path):
         with pytest.raises(TypeError):
             write_realisations(tmp_path / f"a{suffix}", some().assign_attrs(a=object()))
     assert os.listdir(tmp_path) == []
+
+
+def test_an_interrupt_waits_until_a_netcdf_file_is_closed(tmp_path, monkeypatch):
+    """A file that is half open prints a traceback when it is collected."""
+    interrupted, flush = [], h5netcdf.core.File.flush
+
+    def interrupting(file):
+        if not interrupted:
+            interrupted.append(os.kill(os.getpid(), signal.SIGINT))
+        flush(file)
+
+    monkeypatch.setattr(h5netcdf.core.File, "flush", interrupting)
+    with pytest.raises(KeyboardInterrupt) as said, catch_signals(click.Context(click.Command("simulate"))):
+        write_realisations(tmp_path / "a.nc", some())
+        time.sleep(10)
+    assert interrupted and not any("h5netcdf" in str(entry.path) for entry in said.traceback)
+    assert os.listdir(tmp_path) in ([], ["a.nc"])
 
 
 @pytest.mark.parametrize("layers", [None, 3])

@@ -21,8 +21,8 @@ import click
 
 from simdtex.cli.places import check_places, outputs
 
-UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
-"""Modules in which an exception does harm: the search for runtimes, and callbacks of collected objects."""
+UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
+"""Beginnings of modules in which an exception does harm: see `postponed`."""
 
 RESUME, FAILURES = f"{__name__}.resume", f"{__name__}.failures"
 """Keys of a context's `meta`: the path that ``simdtex resume`` takes, and errors that wait for the end."""
@@ -107,11 +107,12 @@ def postponed(frame: FrameType | None) -> bool:
     """Return whether an exception would do harm in a frame, and if so have SIGINT come again a little later.
 
     An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
-    but printed; the search for runtimes would leave its temporary folder.
+    but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
+    traceback when it is collected.
     """
     while frame:
-        name, path = frame.f_globals.get("__name__"), frame.f_code.co_filename
-        if name in UNINTERRUPTED or path.startswith("<frozen importlib"):
+        name, path = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
+        if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib"):
             again = threading.Timer(0.02, interrupt_main)
             again.daemon = True
             again.start()

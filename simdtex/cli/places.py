@@ -132,14 +132,8 @@ def _named(context: click.Context) -> Iterator[_Named]:
 
 def split_pair(text: str) -> list[tuple[str, str]]:
     """Return the two sides of ``A=B`` or ``A0,A1=B``, for each = before which files are named; else at the first =."""
-    at = [number for number, letter in enumerate(text) if letter == "="] or [len(text)]
-    sides = [(text[:end], text[end + 1 :]) for end in at]
-    found = [
-        one
-        for one in sides
-        if os.path.exists(one[0]) or all(os.path.exists(part.strip()) for part in one[0].split(","))
-    ]
-    return found or sides[:1]
+    sides = [(text[:at], text[at + 1 :]) for at, letter in enumerate(text) if letter == "="] or [(text, "")]
+    return [one for one in sides if all(os.path.exists(part.strip()) for part in one[0].split(","))] or sides[:1]
 
 
 def _real(path: Path) -> Path:

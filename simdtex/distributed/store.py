@@ -158,7 +158,7 @@ class Files(zarr.storage.LocalStore):
 
 
 class Checked:
-    """An array of a store, which raises Damaged with the name of a chunk that cannot be read."""
+    """An array of a store, which raises Damaged with the name of a chunk, or of the array, that cannot be read."""
 
     def __init__(self, array: Any, name: str) -> None:
         self._array, self._name = array, name
@@ -171,19 +171,10 @@ class Checked:
         except Damaged:
             raise
         except Exception:  # each codec has errors of its own
-            raise Damaged(self._damaged()) from None
+            raise Damaged(self._name) from None
 
     def __setitem__(self, where: Any, values: Any) -> None:
         self._array[where] = values
-
-    def _damaged(self) -> str:
-        """Return the name of the first chunk that cannot be read."""
-        for place in np.ndindex(self._array.cdata_shape):
-            try:
-                self._array.get_block_selection(place)
-            except Exception:
-                return "/".join((self._name, "c", *map(str, place)))
-        return f"{self._name}/zarr.json"
 
 
 class Sources:
@@ -204,14 +195,14 @@ class Store:
     def __init__(self, where: str) -> None:
         self.where = where
         self._arrays: dict[str, Checked] = {}
-        self._work: Work | None = None
+        self._files = Files(where)
         try:
-            self.root: Any = zarr.open_group(Files(where), mode="r+")
+            self.root: Any = zarr.open_group(self._files, mode="r+")
         except Exception:  # of JSON, of its members, of the files
             if not self._file("run").exists():
                 raise Damaged("zarr.json") from None
             Path(where, "zarr.json").unlink(missing_ok=True)
-            self.root = zarr.open_group(Files(where), mode="a")
+            self.root = zarr.open_group(self._files, mode="a")
 
     @staticmethod
     def create(
@@ -232,7 +223,7 @@ class Store:
         """
         zarr.open_group(Files(where), mode="w-")
         store, held, scattered = Store(where), False, {}
-        store.root.store.name = secrets.token_hex(8)
+        store._files.name = secrets.token_hex(8)
         store.root.create_group("work")
         options, given = plan.options, plan.given
         conditions = Conditioning(plan)
@@ -249,12 +240,9 @@ class Store:
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._pixels(f"work/given/{name}", layout.levels[0], array.shape[2:], array.dtype)[:] = array
-        about = {
-            **{"format": FORMAT, "version": version("simdtex"), "name": store._name, "seed": seed},
-            **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
-            **{"held": held, "given": given is not None, "channels": channels, "source": source, "command": command},
-        }
-        store._keep("run", about, [described(plan), scattered, maps])
+        about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command}
+        more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
+        store._keep("run", about, [described(plan), layout.levels[0].side, *more])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
 
@@ -263,19 +251,13 @@ class Store:
         """The description of the run, as JSON types."""
         return self._state("run")[0]
 
+    @cached_property
     def work(self) -> Work:
-        """Return the plan and its data, which are read once."""
-        if self._work is not None:
-            return self._work
-        about, (tree, scattered, maps) = self._state("run")
+        """The plan and its data."""
+        about, (tree, side, confidences, held, given, scattered, *more) = self._state("run")
         plan, seed = restored(tree), about["seed"]
-        guides, own, centre, hard = about["confidences"]
-        confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
-        layout = planned(plan, seed, about["tile"])
         between = {number: Data(*data) for number, data in scattered.items()}
-        held, given, channels, source = (about[name] for name in ("held", "given", "channels", "source"))
-        self._work = Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
-        return self._work
+        return Work(plan, seed, planned(plan, seed, side), Confidences(*confidences), held, given, between, *more)
 
     @property
     def finished(self) -> bool:
@@ -330,12 +312,12 @@ class Store:
 
     def samples(self) -> list[NDArray[Any]]:
         """Return the pictures of the sample, with a channel axis if the image has one."""
-        pixels = self.work().plan.sample.pictures.pixels
-        return [one if self.work().channels else one[..., 0] for one in pixels]
+        pixels = self.work.plan.sample.pictures.pixels
+        return [one if self.work.channels else one[..., 0] for one in pixels]
 
     def finish(self, work: Work) -> None:
         """Note that the output is complete, with its description."""
-        about = {"format": FORMAT, "version": version("simdtex"), "name": self._name, "seed": work.seed}
+        about = {"format": FORMAT, "version": version("simdtex"), "name": self._files.name, "seed": work.seed}
         arrays = {name: self._description(name) for name in work.outputs}
         self.root.attrs["simdtex"] = about | {"options": asdict(work.plan.options), "arrays": arrays}
 
@@ -343,14 +325,11 @@ class Store:
         """Raise Damaged if a chunk of a complete output is missing or in the wrong place; its content is not read."""
         try:
             about = dict(self.root.attrs["simdtex"])
-            arrays = dict(about["arrays"])
+            arrays, self._files.name = dict(about["arrays"]), str(about.get("name"))
         except (KeyError, TypeError, ValueError):
             raise Damaged("zarr.json") from None
         if about.get("format") != FORMAT:
-            raise ValueError(
-                f"{self.where} has another format than {FORMAT}, or its zarr.json is damaged: read its array image with "
-                "zarr, or begin anew"
-            )
+            raise ValueError(f"{self.where} is of another format or damaged: read its image by zarr, or begin anew")
         every = self._at("checksums")[:]
         if len(every) != len(arrays):
             raise Damaged("checksums/zarr.json")
@@ -375,7 +354,7 @@ class Store:
         if not (level or part == "work/turn"):  # the current turn finds the missing parts
             return "it is made again"
         first = int(level[1]) if level else 0
-        for number in range(first, len(self.work().layout.levels)):
+        for number in range(first, len(self.work.layout.levels)):
             try:
                 turn = Turn(*self._state(f"begun{number}")[1][0])
             except Damaged:
@@ -461,7 +440,7 @@ class Store:
         try:
             with open(Path(self.where, part), "rb") as file:
                 file.seek(-4, os.SEEK_END)
-                return int.from_bytes(file.read(), "little") ^ crc32(self._name.encode())
+                return int.from_bytes(file.read(), "little") ^ crc32(self._files.name.encode())
         except OSError:
             raise Damaged(part) from None
 
@@ -477,17 +456,12 @@ class Store:
     def _chunk(self, name: str, row: int, col: int) -> str:
         return "/".join((name, "c", str(row), str(col), *("0" for _ in self._at(name).shape[2:])))
 
-    @property
-    def _name(self) -> str:
-        """The random name of the store, which a complete output has in its attributes."""
-        return str(self.root.attrs["simdtex"].get("name") if self.finished else self.root.store.name)
-
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
 
     def _keep(self, name: str, about: dict[str, Any], state: Any) -> None:
         """Write a checked file of ``work``, which contains its name and that of the store."""
-        write_state(self._file(name), {"file": name, "name": self._name, **about}, state)
+        write_state(self._file(name), {"file": name, "name": self._files.name, **about}, state)
 
     def _state(self, name: str) -> tuple[dict[str, Any], Any]:
         """Return the content of a checked file of ``work``."""
@@ -495,7 +469,7 @@ class Store:
             about, state = read_state(self._file(name))
         except (Damaged, OSError):
             raise Damaged(f"work/{name}") from None
-        if about.get("file", name) != name or about.get("name") != self._name:  # an older format has none
+        if about.get("file", name) != name or about.get("name") != self._files.name:  # an older format has none
             raise Damaged(f"work/{name}")
         return about, state
 

@@ -28,7 +28,7 @@ class Context:
     run: Run
 
 
-_contexts: dict[tuple[str, str, Any], Context] = {}
+contexts: dict[tuple[str, str, Any], Context] = {}
 _one = Lock()
 """A process has one device, which two tiles would share."""
 
@@ -36,18 +36,13 @@ _one = Lock()
 def context(where: str, name: str, device: str | Machine | None) -> Context:
     """Return the context of a store, which is put on a device once."""
     key = (where, name, device)
-    if key not in _contexts:
-        _contexts.clear()  # one at a time, which bounds the memory
+    if key not in contexts:
+        contexts.clear()  # one at a time, which bounds the memory
         store, machine = Store(where), open_machine(device)
-        work = store.work()
+        work = store.work
         run = Run(work.plan, machine, work.seed, Stored(store, work))
-        _contexts[key] = Context(store, work, run)
-    return _contexts[key]
-
-
-def forget() -> None:
-    """Drop the kept context."""
-    _contexts.clear()
+        contexts[key] = Context(store, work, run)
+    return contexts[key]
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
@@ -71,8 +66,7 @@ def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field = tiles.whole(here.run, turn.level, _above(here, turn, tile))
-    here.store.write(turn, tile, field)
+    here.store.write(turn, tile, tiles.whole(here.run, turn.level, _above(here, turn, tile)))
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 

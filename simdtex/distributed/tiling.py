@@ -44,7 +44,7 @@ class Run:
     """The turns of an output; the state is the current turn, which the store keeps."""
 
     def __init__(self, tiles: Tiles, machine: Machine) -> None:
-        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work()
+        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work
         work = self.work
         self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store, work))
 

@@ -258,8 +258,6 @@ def exclusive(path: PathLike) -> Iterator[None]:
     with ExitStack() as held:
         try:
             lock = held.enter_context(_locked(hidden, os.O_CREAT))
-            while not _is_at(lock, hidden):  # the process that held the lock has removed the file
-                lock = held.enter_context(_locked(hidden, os.O_CREAT))
         except BlockingIOError:
             raise ValueError(f"another run is at work in {os.fspath(path)} now; wait for it, or stop it") from None
         except OSError as error:
@@ -282,17 +280,19 @@ def _locked(path: Path, flags: int = 0) -> Iterator[int | None]:
         return
     import fcntl
 
-    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | flags, 0o666)
-    try:
+    while True:
+        descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | flags, 0o666)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise
-        except OSError:  # a file system without locks
-            pass
-        yield descriptor
-    finally:
-        os.close(descriptor)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if isinstance(error, BlockingIOError):  # else a file system without locks
+                    raise
+            if _is_at(descriptor, path):  # else the process that held the lock has removed the file
+                yield descriptor
+                return
+        finally:
+            os.close(descriptor)
 
 
 def _is_at(descriptor: int | None, path: Path) -> bool:

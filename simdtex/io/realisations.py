@@ -123,32 +123,25 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
         whole.to_zarr(store, mode="w-", zarr_format=3)
-        about = _description(store)
-        about["attributes"][MARK] = _checksum(store)
+        about = json.loads((store / "zarr.json").read_bytes())
+        about["attributes"][MARK] = _checksum(store, about)
         (store / "zarr.json").write_text(json.dumps(about, indent=2))
 
 
-def _description(store: Path) -> dict[str, Any]:
-    return dict(json.loads((store / "zarr.json").read_bytes()))
-
-
-def _checksum(store: Path) -> str:
-    """Return the SHA-256 of the names and contents of all files of a Zarr store, without the attribute `MARK`."""
-    about, found = _description(store), hashlib.sha256()
-    about["attributes"].pop(MARK, None)
-    found.update(json.dumps(about, sort_keys=True).encode())
+def _checksum(store: Path, about: dict[str, Any]) -> str:
+    """Return the SHA-256 of a Zarr store: of its description ``about``, and of the names and contents of its files."""
+    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     for path in sorted(store.rglob("*")):
-        found.update(repr(path.relative_to(store).parts).encode())
-        if path.is_file() and path != store / "zarr.json":
-            with path.open("rb") as file:
-                found.update(hashlib.file_digest(file, "sha256").digest())
+        content = path.read_bytes() if path.is_file() and path != store / "zarr.json" else b""
+        found.update(repr((path.relative_to(store).parts, hashlib.sha256(content).digest())).encode())
     return found.hexdigest()
 
 
 def _own(store: Path) -> bool:
     """Return whether a folder holds only what `write_realisations` wrote."""
     try:
-        return bool(_description(store)["attributes"][MARK] == _checksum(store))
+        about = json.loads((store / "zarr.json").read_bytes())
+        return bool(about["attributes"].pop(MARK) == _checksum(store, about))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
