@@ -204,7 +204,12 @@ def test_ctrl_c_leaves_no_file(folder):
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], [], "nothing was written"),
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
         ("simdtex.synthesis.synthesize", ["synth", "a.png", "-o", "o.png", "--stages", "st"], ["st/level0.png"], "st"),
-        ("simdtex.synthesis.synthesize", ["synth", "a.png", "-o", "o.png", "--stages", "st"], [], "nothing was written"),
+        (
+            "simdtex.synthesis.synthesize",
+            ["synth", "a.png", "-o", "o.png", "--stages", "st"],
+            [],
+            "nothing was written",
+        ),
         (
             "simdtex.synthesis.synthesize",
             ["synth", "a.png", "-o", "old.png", "--stages", "st"],

@@ -16,7 +16,7 @@ from simdtex import distributed
 from simdtex.distributed import store as store_module
 from simdtex.distributed.layout import planned
 from simdtex.distributed.store import Store, cut
-from simdtex.distributed.tasks import do, forget
+from simdtex.distributed.tasks import contexts, do
 from simdtex.distributed.tiling import Tiles
 from simdtex.driver import drive
 from simdtex.methods.mrf import Options

@@ -154,7 +154,12 @@ def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
     [
         ("sweep", "work/level0/READ/values/c/0/0/0", "work/level0/READ/values/c/0/0/1", "level 0 begins again with"),
         ("sweep", "work/level0/WRITE/values/c/0/0/0", "work/level0/READ/values/c/0/0/0", "level 0 begins again with"),
-        ("sweep", "work/level0/READ/source/c/0/0", "work/level0/WRITE/source/c/0/0", None),  # the present turn writes it
+        (
+            "sweep",
+            "work/level0/READ/source/c/0/0",
+            "work/level0/WRITE/source/c/0/0",
+            None,
+        ),  # the present turn writes it
         ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
         ("sweep", "work/begun0", "work/turn", "level 0 begins again with"),
         ("sweep", "work/turn", "work/run", "and nothing makes it again"),

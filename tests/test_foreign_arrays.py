@@ -161,7 +161,9 @@ READERS = {
 @pytest.mark.parametrize("path", ["a.png", Path("a.png")], ids=["str", "Path"])
 @pytest.mark.parametrize("name", READERS)
 def test_a_path_is_to_be_read_first(name, path):
-    with pytest.raises(TypeError, match=r" is the path a\.png: read it first, by simdtex\.io\.image\.read\(path\)\.pix"):
+    with pytest.raises(
+        TypeError, match=r" is the path a\.png: read it first, by simdtex\.io\.image\.read\(path\)\.pix"
+    ):
         READERS[name](path)
 
 

@@ -164,6 +164,8 @@ class Watch:
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         found = []
         for row in range(0, levels[number].rows, step):
-            values, source, _ = self._run.store.read(levels[number], turn.number - 1, Tile(row, 0, 1, levels[number].cols))
+            values, source, _ = self._run.store.read(
+                levels[number], turn.number - 1, Tile(row, 0, 1, levels[number].cols)
+            )
             found.append(sample.picture(values[..., ::step], source[:, ::step]))
         return np.concatenate(found)

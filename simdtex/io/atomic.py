@@ -71,7 +71,8 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
     An existing folder `path`, which the caller has checked, is replaced as a whole at the end, and the new one has its
-    permissions. The block must not replace the temporary folder itself, which is locked. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    permissions. The block must not replace the temporary folder itself, which is locked. If the block fails, also by
+    Ctrl-C, the temporary folder is removed and `path` is left as it was.
     Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
