@@ -29,7 +29,7 @@ import simdtex
 from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
-from simdtex.distributed.tasks import contexts
+from simdtex.distributed.tasks import context
 
 RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "stores.csv"
 
@@ -84,7 +84,7 @@ class Run:
         """Return the picture that the run in a folder makes."""
         if self.name == "checkpoint":
             return self._again(Checkpoint(folder / "state"))
-        contexts.clear()
+        context.cache_clear()
         return distributed.resume(folder / "o.zarr", device="reference").compute()
 
 

@@ -16,7 +16,7 @@ from simdtex import distributed
 from simdtex.distributed import store as store_module
 from simdtex.distributed.layout import planned
 from simdtex.distributed.store import Store, cut
-from simdtex.distributed.tasks import contexts, do
+from simdtex.distributed.tasks import context, do
 from simdtex.distributed.tiling import Tiles
 from simdtex.driver import drive
 from simdtex.methods.mrf import Options
@@ -43,7 +43,7 @@ def assert_same(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
     theirs, output = simdtex.synthesize(sample, shape, full_output=True, **options)
     assert_same_bits(ours.compute(), theirs)
     assert_same_bits(zarr.open_group(path)["source"][...], output.source)
-    contexts.clear()
+    context.cache_clear()
 
 
 slow = pytest.mark.slow

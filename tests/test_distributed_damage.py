@@ -11,7 +11,7 @@ import simdtex
 from simdtex import distributed
 from simdtex.distributed import layout
 from simdtex.distributed.store import Store
-from simdtex.distributed.tasks import contexts
+from simdtex.distributed.tasks import context
 from simdtex.io import atomic
 from simdtex.methods.mrf.tiles import Tally
 
@@ -87,7 +87,7 @@ def part_of(path, part):
 def gone_on(path, sentences):
     """Resume until the output is there, and return it; None if it has to begin anew."""
     for _ in range(5):
-        contexts.clear()
+        context.cache_clear()
         try:
             return distributed.resume(path, device=REFERENCE)
         except ValueError as error:
@@ -410,7 +410,7 @@ def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
 def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
-    contexts.clear()
+    context.cache_clear()
     with monkeypatch.context() as patch:
         patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -86,12 +85,8 @@ def check_places(context: click.Context) -> None:
 
 def outputs(context: click.Context) -> dict[Path, tuple[int, int]]:
     """Return the outputs of a command that exist, each with its inode and the time of its last change."""
-    found = {}
-    for one in _named(context):
-        with suppress(OSError, ValueError):  # no such file, or no valid name
-            if one.role not in READING:
-                found[one.path] = one.path.stat().st_ino, one.path.stat().st_mtime_ns
-    return found
+    there = [one.path for one in _named(context) if one.role not in READING and os.path.exists(one.path)]
+    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in there}
 
 
 def check_input(folder: Path, path: Path) -> None:

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 from threading import Lock
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from simdtex.ops.finish import around
 from simdtex.ops.neighbourhood import Field
 
 
-@dataclass(frozen=True)
-class Context:
+class Context(NamedTuple):
     """The data that a process keeps from one tile to the next."""
 
     store: Store
@@ -28,21 +27,16 @@ class Context:
     run: Run
 
 
-contexts: dict[tuple[str, str, Any], Context] = {}
 _one = Lock()
 """A process has one device, which two tiles would share."""
 
 
+@lru_cache(1)
 def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """Return the context of a store, which is put on a device once."""
-    key = (where, name, device)
-    if key not in contexts:
-        contexts.clear()  # one at a time, which bounds the memory
-        store, machine = Store(where), open_machine(device)
-        work = store.work
-        run = Run(work.plan, machine, work.seed, Stored(store, work))
-        contexts[key] = Context(store, work, run)
-    return contexts[key]
+    """Return the context of a store, which is put on a device once; only the latest is kept."""
+    store, machine = Store(where), open_machine(device)
+    run = Run(store.work.plan, machine, store.work.seed, Stored(store, store.work))
+    return Context(store, store.work, run)
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
