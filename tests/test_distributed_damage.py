@@ -416,6 +416,8 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "
         with pytest.raises(ValueError, match=words):
             distributed.resume(path, device=REFERENCE)
+        with pytest.raises(ValueError, match=rf"^{tmp_path}/new\.zarr/.* could not be written .*: free some space"):
+            distributed.synthesize(SAMPLE, SHAPE, tmp_path / "new.zarr", **OPTIONS)
     assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
     (path / "image" / "zarr.json").unlink()
     with pytest.raises(
