@@ -149,7 +149,7 @@ def scaling(device: str | None) -> None:
         many = planned(small, 1, side // 32)
         store = Store.create(str(Path(folder, "s.zarr")), small, 1, many, channels=False, source=False, maps={})
         turn, rows = Turn(1, "begin", 0), many.levels[0].tasks
-        store.prepare(turn, store.work(), pixels.size)
+        store.prepare(turn, store.work, pixels.size)
         for number in range(rows):
             store.note(turn, number, Tally(np.arange(pixels.size), 1, 1))
         began = time.perf_counter()

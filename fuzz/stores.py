@@ -4,8 +4,9 @@
     python -m fuzz.stores [--tries 200 | --every 1] [--minutes M] [--seed 1] [--first 0] [--workers N] [--record]
 
 Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips
-bits of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the
-picture has its bytes, or a sentence says that the run has to begin anew. Every fault is printed with the try's number.
+bits of one of its files, cuts, empties or removes it, or copies another file over it; or takes each file from one of
+two moments, as a backup made during the run has them; and goes on. It passes if the picture has its bytes, or a
+sentence says that the run has to begin anew. Every fault is printed with the try's number.
 """
 
 import argparse
@@ -28,7 +29,7 @@ import simdtex
 from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
-from simdtex.distributed.tasks import forget
+from simdtex.distributed.tasks import context
 
 RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "stores.csv"
 
@@ -48,7 +49,7 @@ TILED = {
 """Runs in tiles: the sample, the side of a tile, and options."""
 
 ALONE = ("bit", "cut", "empty", "remove")
-HOWS = (*ALONE, "bits", "another")
+HOWS = (*ALONE, "bits", "another", "moments")
 """Kinds of damage."""
 
 RESUMES = 6
@@ -83,7 +84,7 @@ class Run:
         """Return the picture that the run in a folder makes."""
         if self.name == "checkpoint":
             return self._again(Checkpoint(folder / "state"))
-        forget()
+        context.cache_clear()
         return distributed.resume(folder / "o.zarr", device="reference").compute()
 
 
@@ -106,6 +107,14 @@ def damage(folder, name, how, rng):
         near = [one for one in others if one.parent.parent == name.parent.parent] or others
         data = (folder / near[rng.integers(len(near))]).read_bytes()
     path.unlink() if how == "remove" else path.write_bytes(b"" if how == "empty" else data)
+
+
+def mix(folder, moment, rng):
+    """Replace half of the files of a folder by those of another moment."""
+    for name in files(moment):
+        if rng.random() < 0.5:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(moment / name, folder / name)
 
 
 def tried(run, folder):
@@ -183,7 +192,10 @@ def one_try(seed, number, moments):
         name, how = names[rng.integers(len(names))], str(rng.choice(HOWS))
     folder = Path(_place[0], "try")
     shutil.copytree(moment, folder)
-    damage(folder, name, how, rng)
+    if how == "moments":
+        mix(folder, run.moments[rng.integers(len(run.moments))], rng)
+    else:
+        damage(folder, name, how, rng)
     end = tried(run, folder)
     shutil.rmtree(folder)
     return run.name, f"{how} {name}", end

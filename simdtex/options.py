@@ -240,6 +240,11 @@ def preset_values(options: Any, preset: str) -> dict[str, Any]:
     return {name: one.paper for name, one in declared if one.paper is not UNSET}
 
 
+ARGUMENTS = {"seed": "rng", "random_state": "rng"}
+ARGUMENTS |= {name: name for name in ("rng", "device", "channel_axis", "callback", "checkpoint", "full_output")}
+"""Arguments of the functions beside the options, by their names and by those of other libraries."""
+
+
 def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     """Return the options of a job: the method's defaults < the job's < the preset's < the user's values.
 
@@ -251,8 +256,8 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     known = ["preset"] * has_presets(own) + [*own]
     for name in given:
         if name not in known:
-            near = get_close_matches(name, known, 1, 0.75)
-            meant = f" (did you mean {near[0]!r}?)" if near else ""
+            near = get_close_matches(name, [*known, *ARGUMENTS], 1, 0.66)
+            meant = f" (did you mean {ARGUMENTS.get(near[0], near[0])!r}?)" if near else ""
             method = options.__module__.split(".")[2]
             raise TypeError(f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join(known)}")
     values = {name: one.default_of(job) for name, one in own.items()}

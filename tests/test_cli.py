@@ -197,6 +197,45 @@ def test_ctrl_c_leaves_no_file(folder):
     assert not [path for path in folder.rglob("*") if path.name.startswith((".", "tmp"))]
 
 
+@pytest.mark.parametrize(
+    ("function", "args", "writes", "said"),
+    [
+        ("simdtex.bench.run.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
+        ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], [], "nothing was written"),
+        ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
+        ("simdtex.synthesis.synthesize", ["synth", "a.png", "-o", "o.png", "--stages", "st"], ["st/level0.png"], "st"),
+        (
+            "simdtex.synthesis.synthesize",
+            ["synth", "a.png", "-o", "o.png", "--stages", "st"],
+            [],
+            "nothing was written",
+        ),
+        (
+            "simdtex.synthesis.synthesize",
+            ["synth", "a.png", "-o", "old.png", "--stages", "st"],
+            ["old.png", "st/level0.png"],
+            "old.png, st",
+        ),
+    ],
+)
+def test_a_stopped_command_says_what_was_written(tmp_path, monkeypatch, function, args, writes, said):
+    monkeypatch.chdir(tmp_path)
+    image.write("a.png", np.indices((9, 9)).sum(0).astype(np.uint8))
+    for name in ("old.json", "old.png"):
+        (tmp_path / name).touch()
+
+    def stopped(*_, **__):
+        for name in writes:
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            image.write(name, np.ones((2, 2), np.uint8))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(function, stopped)
+    result = run(*args)
+    assert result.exit_code == 130
+    assert result.stderr == f"simdtex: stopped; {said if 'nothing' in said else f'written so far: {said}'}\n"
+
+
 def test_the_demo(tmp_path, monkeypatch):
     result = run("demo", "-o", tmp_path / "demo", "--size", "16x12")
     assert result.exit_code == 0, result.output

@@ -233,3 +233,25 @@ def test_an_empty_size_is_no_default(folder, name):
         args += ["-o", "report"]
     refused(folder, name, args, "size '' is not ")
     assert not Path("report").exists()
+
+
+def test_a_file_name_in_a_pair_may_contain_an_equals_sign(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("sample.png", "a=b.png", "g=1.png"):
+        image.write(name, np.indices((9, 9)).sum(0).astype(np.uint8) // 4)
+    more = ["-o", "o.png", "--size", "9", "--order", "1", "--device", "reference"]
+
+    def synth(*args):
+        result = CliRunner().invoke(cli.main, ["synth", "sample.png", *args, *more])
+        return result.exit_code, result.stderr
+
+    assert synth("--guide", "g=1.png=g=1.png", "--also", "a=b.png=new=1.png")[0] == 0
+    assert (tmp_path / "new=1.png").exists()
+    assert "a=b.png is an input and would be overwritten" in synth("--also", "a=b.png=a=b.png")[1]
+    (tmp_path / "a").touch()
+    words = "--also a=b.png=x.png has two meanings, since a and a=b.png exist: rename one of them"
+    assert synth("--also", "a=b.png=x.png") == (2, f"simdtex: {words}\n")
+    (tmp_path / "a").unlink()
+    image.write("c.png", np.zeros((9, 9), np.uint8))
+    code, said = synth("sample.png", "--also", "a=b.png, c.png=x=1.png")
+    assert (code, (tmp_path / "x=1.png").exists()) == (0, True), said

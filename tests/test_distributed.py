@@ -16,7 +16,7 @@ from simdtex import distributed
 from simdtex.distributed import store as store_module
 from simdtex.distributed.layout import planned
 from simdtex.distributed.store import Store, cut
-from simdtex.distributed.tasks import do, forget
+from simdtex.distributed.tasks import context, do
 from simdtex.distributed.tiling import Tiles
 from simdtex.driver import drive
 from simdtex.methods.mrf import Options
@@ -43,7 +43,7 @@ def assert_same(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
     theirs, output = simdtex.synthesize(sample, shape, full_output=True, **options)
     assert_same_bits(ours.compute(), theirs)
     assert_same_bits(zarr.open_group(path)["source"][...], output.source)
-    forget()
+    context.cache_clear()
 
 
 slow = pytest.mark.slow
@@ -158,7 +158,7 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
     layout = planned(plan, seed, 10)
     store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False, maps={})
-    work = store.work()
+    work = store.work
     assert (work.plan.options, work.seed, work.layout) == (plan.options, seed, layout)
     assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
     assert_same_bits(work.plan.sample.working, plan.sample.working)
@@ -171,7 +171,7 @@ class Stop(Exception):
 
 def shuffled(store, seed, stop=None):
     """Tiles in any order; an exception after so many of them, over all turns."""
-    order, done, work = np.random.default_rng(seed), [0], store.work()
+    order, done, work = np.random.default_rng(seed), [0], store.work
 
     def execute(turn, tasks):
         for number in order.permutation(tasks).tolist():
@@ -310,7 +310,7 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     level = planned(plan, 1, 40).levels[0]
     run = Run(plan, REFERENCE, 1)
     sites = 0
-    for tile in level.tiles():
+    for tile in map(level.tile, range(level.count)):
         frame = framed(level.lattice, tile, level.halo)
         window = run.level(0, frame.window)
         schedule = Trimmed(window.schedule, frame.rows.start, frame.rows.stop)

@@ -11,7 +11,7 @@ import simdtex
 from simdtex import distributed
 from simdtex.distributed import layout
 from simdtex.distributed.store import Store
-from simdtex.distributed.tasks import forget
+from simdtex.distributed.tasks import context
 from simdtex.io import atomic
 from simdtex.methods.mrf.tiles import Tally
 
@@ -77,10 +77,17 @@ def finished(tmp_path_factory):
     return path
 
 
+def part_of(path, part):
+    """Return the file of a store that a pattern names; READ and WRITE are the states that its turn reads and writes."""
+    number = Store(str(path)).turn.number if "READ" in part or "WRITE" in part else 0
+    (found,) = path.glob(part.replace("READ", str(number - 1)).replace("WRITE", str(number)))
+    return found
+
+
 def gone_on(path, sentences):
     """Resume until the output is there, and return it; None if it has to begin anew."""
     for _ in range(5):
-        forget()
+        context.cache_clear()
         try:
             return distributed.resume(path, device=REFERENCE)
         except ValueError as error:
@@ -91,11 +98,11 @@ def gone_on(path, sentences):
 
 
 PARTS = [
-    ("sweep", "work/level0/1/values/c/0/1/1", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/1/source/c/1/1", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/1/temperature/zarr.json", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/0/values/c/0/0/0", None),  # what the present turn writes
-    ("sweep", "work/level0/0/source/zarr.json", None),
+    ("sweep", "work/level0/READ/values/c/0/1/1", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/READ/source/c/1/1", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/READ/temperature/zarr.json", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/WRITE/values/c/0/0/0", None),  # what the present turn writes
+    ("sweep", "work/level0/WRITE/source/zarr.json", None),
     ("sweep", "work/turn", "level 0 begins again with: simdtex resume"),
     ("sweep", "work/tally*/c/1/0", None),
     ("sweep", "work/tally*/zarr.json", None),
@@ -119,7 +126,7 @@ PARTS = [
 def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, damage):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
-    (where,) = path.glob(part)
+    where = part_of(path, part)
     DAMAGES[damage](where)
     image = gone_on(path, sentences)
     if words is None:
@@ -135,18 +142,24 @@ def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, 
 def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped("sweep", 3, 2), path)
-    flipped(path / "work/level0/1/source/c/0/0")
+    where = part_of(path, "work/level0/READ/source/c/0/0")
+    flipped(where)
     image = gone_on(path, sentences)
-    assert [sentence.split(" of ")[0] for sentence in sentences] == ["work/level0/1/source/c/0/0"]
+    assert [sentence.split(" of ")[0] for sentence in sentences] == [str(where.relative_to(path))]
     assert_same_bits(image.compute(), whole)
 
 
 @pytest.mark.parametrize(
     ("phase", "part", "other", "words"),
     [
-        ("sweep", "work/level0/1/values/c/0/0/0", "work/level0/1/values/c/0/0/1", "level 0 begins again with"),
-        ("sweep", "work/level0/0/values/c/0/0/0", "work/level0/1/values/c/0/0/0", "level 0 begins again with"),
-        ("sweep", "work/level0/1/source/c/0/0", "work/level0/0/source/c/0/0", None),  # the present turn writes it
+        ("sweep", "work/level0/READ/values/c/0/0/0", "work/level0/READ/values/c/0/0/1", "level 0 begins again with"),
+        ("sweep", "work/level0/WRITE/values/c/0/0/0", "work/level0/READ/values/c/0/0/0", "level 0 begins again with"),
+        (
+            "sweep",
+            "work/level0/READ/source/c/0/0",
+            "work/level0/WRITE/source/c/0/0",
+            None,
+        ),  # the present turn writes it
         ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
         ("sweep", "work/begun0", "work/turn", "level 0 begins again with"),
         ("sweep", "work/turn", "work/run", "and nothing makes it again"),
@@ -160,7 +173,7 @@ def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
 def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finished, whole, phase, part, other, words):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
-    (one,), (two,) = path.glob(part), path.glob(other)
+    one, two = part_of(path, part), part_of(path, other)
     assert one.read_bytes() != two.read_bytes()
     shutil.copyfile(one, two)
     image = gone_on(path, sentences)
@@ -177,7 +190,7 @@ def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finish
 @pytest.mark.parametrize(
     ("phase", "part", "old", "new", "words"),
     [
-        ("sweep", "work/level0/1/values", b'"separator": "/"', b'"separator": "."', "level 0 begins again"),
+        ("sweep", "work/level0/READ/values", b'"separator": "/"', b'"separator": "."', "level 0 begins again"),
         ("begin", "work/given/held0/known", b'"separator": "/"', b'"separator": "."', "nothing makes it again"),
         ("show", "image", b"26", b"27", None),
         ("show", "image", b'"separator": "/"', b'"separator": "."', None),
@@ -186,15 +199,92 @@ def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finish
 def test_one_flipped_bit_in_the_description_of_an_array(tmp_path, stopped, whole, phase, part, old, new, words):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
-    where = path / part / "zarr.json"
+    where = part_of(path, f"{part}/zarr.json")
     assert old in where.read_bytes()
     where.write_bytes(where.read_bytes().replace(old, new))
     image = gone_on(path, sentences)
     assert (words is None) == (sentences == [])
     if words:
-        assert f"{part}/zarr.json of " in sentences[0] and words in sentences[0]
+        assert f"{where.relative_to(path)} of " in sentences[0] and words in sentences[0]
     if image is not None:
         assert_same_bits(image.compute(), whole)
+
+
+SMALL, FEW = (14, 15), OPTIONS | {"tiles": 8, "source_map": True}
+
+
+@pytest.fixture(scope="module")
+def moments(tmp_path_factory):
+    """Return copies of three stores after every tile, and when finished: two of one run, and one of another seed."""
+    found, place = {}, tmp_path_factory.mktemp("moments")
+    for name, rng in (("one", 11), ("again", 11), ("other", 12)):
+        path, copies = place / f"{name}.zarr", []
+
+        def keep(progress, path=path, copies=copies):
+            copies.append(path.with_name(f"{path.stem}{len(copies)}"))
+            shutil.copytree(path, copies[-1])
+
+        image = distributed.synthesize(SAMPLE, SMALL, path, callback=keep, **FEW | {"rng": rng}).compute()
+        keep(None)
+        found[name] = copies, image
+    return found
+
+
+def mixed(path, one, other, chosen):
+    """Make a store of the files of two copies: those that are chosen from the other."""
+    names = {file.relative_to(copy) for copy in (one, other) for file in copy.rglob("*") if file.is_file()}
+    for name in sorted(names):
+        if (source := (other if chosen(name) else one) / name).exists():
+            (path / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, path / name)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("how", ["older first", "newer first", "at random", "again", "other", "finished"])
+def test_a_copy_of_several_moments_gives_the_same_picture_or_a_sentence(tmp_path, moments, how, seed):
+    """As of a backup that was made while the run went on, or a restored part; never another picture."""
+    rng = np.random.default_rng(seed)
+    copies, expected = moments["one"]
+    picked = sorted(rng.choice(len(copies) - 1, 2, replace=False))
+    one, other = (copies[number] for number in picked)
+    if how in moments:
+        other = moments[how][0][picked[1]]
+    elif how == "finished":
+        one, other = copies[-1], moments["other"][0][-1]
+    names = sorted(file.relative_to(one) for file in one.rglob("*") if file.is_file())
+    part = names[rng.integers(len(names))]
+    chosen = {"older first": lambda name: name > part, "newer first": lambda name: name < part}
+    path, sentences = tmp_path / "o.zarr", []
+    mixed(path, one, other, chosen.get(how, lambda name: rng.random() < 0.5))
+    try:
+        image = gone_on(path, sentences)
+        found = None if image is None else image.compute()
+    except ValueError as error:
+        assert how == "finished" and "checksum" in str(error)  # Zarr's, of a chunk
+        return
+    if found is not None:
+        root = zarr.open_group(path)
+        copies, expected = moments["one" if root.attrs["simdtex"]["seed"] == 11 else "other"]
+        assert_same_bits(found, expected)
+        assert_same_bits(root["source"][:], zarr.open_group(copies[-1])["source"][:])
+    else:
+        assert how in ("again", "other", "finished")
+
+
+def test_a_plane_of_an_earlier_turn_is_damage(tmp_path, moments):
+    copies, expected = moments["one"]
+    stores = [Store(str(copy)) for copy in copies[:-1]]
+    late = next(n for n, store in enumerate(stores) if (turn := store.turn).level == 0 and turn.cooling == 1)
+    early = next(store for store in stores if store.turn.number == stores[late].turn.number - 1)
+    for plane in ("values/c/0/0/1", "source/c/0/1", "temperature/c/0/1"):
+        path, sentences = tmp_path / plane[0], []
+        shutil.copytree(copies[late], path)
+        where, old = (part_of(Path(store), f"work/level0/READ/{plane}") for store in (path, early.where))
+        assert old.read_bytes() != where.read_bytes()
+        shutil.copyfile(old, where)
+        image = gone_on(path, sentences)
+        assert f"{where.relative_to(path)} of {path} is missing or damaged; level 0 begins again" in sentences[0]
+        assert_same_bits(image.compute(), expected)
 
 
 @pytest.mark.parametrize("damage", ["removed", "cut", "another"])
@@ -222,6 +312,9 @@ def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
         ("source/zarr.json", b"26", b"27"),
         ("zarr.json", b'"arrays"', b'"arrayc"'),
         ("checksums/zarr.json", b"2,", b"1,"),
+        ("image/zarr.json", b'"name": "bytes"', b'"name": "bytes2"'),
+        ("source/zarr.json", b'"little"', b'"big"'),
+        ("source/zarr.json", b'"fill_value": 0', b'"fill_value": 1'),
         ("image/zarr.json", b'"attributes": {}', b'"attributes": {"mine": 1}'),
     ],
 )
@@ -265,7 +358,7 @@ def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
     store = Store(str(path))
-    turn, work = store.turn, store.work()
+    turn, work = store.turn, store.work
     assert store.done(turn, work, 0)  # which opens the arrays
     shutil.rmtree(path)
     with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
@@ -293,12 +386,13 @@ def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_pat
 
     monkeypatch.setattr(atomic, "_sync", sync)
     distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **OPTIONS)
-    chunk, row = "o.zarr/work/level0/1/values/c/0/2", "o.zarr/work/tally{}/c/2"
-    turns = [n for n in range(1, 99) if row.format(n) in flushed]
-    at = flushed.index(chunk)
-    assert flushed[at - 1] == "file"
-    assert set(flushed[:at]) > {"o.zarr/work/level0/1/values/c/0", "o.zarr/work/level0/1/values/c"}
-    assert any(flushed.index(row.format(n)) > at for n in turns)
+    turns = [n for n in range(1, 99) if f"o.zarr/work/level0/{n}/values/c/0/2" in flushed]
+    for folder in (f"o.zarr/work/level0/{n}/values/c" for n in turns):
+        at = flushed.index(f"{folder}/0/2")
+        assert flushed[at - 1] == "file"
+        assert set(flushed[:at]) > {folder, f"{folder}/0"}
+        assert flushed.index(f"o.zarr/work/tally{folder.split('/')[3]}/c/6") > at
+    assert len(turns) > 3
     assert "." in flushed  # the name of the store itself
 
 
@@ -316,12 +410,14 @@ def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
 def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
-    forget()
+    context.cache_clear()
     with monkeypatch.context() as patch:
         patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "
         with pytest.raises(ValueError, match=words):
             distributed.resume(path, device=REFERENCE)
+        with pytest.raises(ValueError, match=rf"^{tmp_path}/new\.zarr/.* could not be written .*: free some space"):
+            distributed.synthesize(SAMPLE, SHAPE, tmp_path / "new.zarr", **OPTIONS)
     assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
     (path / "image" / "zarr.json").unlink()
     with pytest.raises(

@@ -16,7 +16,7 @@ import pytest
 from volumes import loaded
 
 from simdtex.io import atomic, image, realisations, volume
-from simdtex.io.atomic import Damaged, atomic_folder, atomic_path, read_checked, write_checked
+from simdtex.io.atomic import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, write_report
 from simdtex.report.stages import StageWriter
@@ -186,6 +186,61 @@ def test_old_leftovers_are_removed_and_recent_ones_are_not(tmp_path):
     os.utime(tmp_path / f".simdtex-{'2' * 16}.zarr", (0, 0))
     image.write(tmp_path / "b.npy", picture(1))
     assert sorted(os.listdir(tmp_path)) == [f".simdtex-{'1' * 16}", ".simdtex-notes", "b.npy"]
+
+
+@pytest.mark.parametrize("writer", [atomic_path, atomic_folder])
+def test_an_unfinished_output_that_looks_old_is_kept_while_its_writer_lives(tmp_path, writer):
+    pytest.importorskip("fcntl")
+    with writer(tmp_path / "a.zarr") as temporary:
+        os.utime(temporary, (0, 0))
+        image.write(tmp_path / "b.npy", picture(1))
+        assert temporary.exists()
+    assert sorted(os.listdir(tmp_path)) == ["a.zarr", "b.npy"]
+
+
+def test_a_lock_has_one_holder_at_a_time(tmp_path):
+    pytest.importorskip("fcntl")
+    inside, counts, end = [], [], time.monotonic() + 2
+
+    def take():
+        while time.monotonic() < end:
+            try:
+                with exclusive(tmp_path / "state"):
+                    inside.append(1)
+                    time.sleep(0.0002)
+                    counts.append(len(inside))
+                    inside.pop()
+            except ValueError as error:
+                assert "another run is at work in" in str(error)
+                time.sleep(0)
+
+    threads = [threading.Thread(target=take) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(counts) > 20 and set(counts) == {1}
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_lock_that_was_replaced_is_left_to_its_holder(tmp_path):
+    pytest.importorskip("fcntl")
+    (tmp_path / ".state.lock").touch()  # of a process that was killed
+    with exclusive(tmp_path / "state"):
+        (tmp_path / ".state.lock").unlink()
+        with exclusive(tmp_path / "other"), open(tmp_path / ".state.lock", "w"):
+            pass
+    assert os.listdir(tmp_path) == [".state.lock"]
+
+
+def test_a_failed_write_into_a_folder_names_the_folder(tmp_path, monkeypatch):
+    """Whatever writes into it, such as the atomic writer of one of its files, and whichever way the path was given."""
+    monkeypatch.chdir(tmp_path)
+    for path in ("out", tmp_path / "out"):
+        words = rf"^{re.escape(str(path))}/a\.npy could not be written \(.+\): (free some|choose another) .*$"
+        with full_after(100), pytest.raises(ValueError, match=words), atomic_folder(path) as temporary:
+            image.write(temporary / "a.npy", picture(1))
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_folder_in_which_a_thread_still_writes_is_removed(tmp_path):

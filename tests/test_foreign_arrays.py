@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What goes into public functions and what comes out: arrays of other libraries, and generators."""
 
+from pathlib import Path
+
 import dask.array
 import numpy as np
 import pandas
@@ -10,6 +12,7 @@ import xarray
 from cases import assert_same_bits
 
 import simdtex
+import simdtex.distributed
 from simdtex.model.source_map import apply_source_map
 
 RNG = np.random.default_rng(1)
@@ -126,14 +129,42 @@ def test_known_values_with_nan_are_taken():
         (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
         (pandas.DataFrame(GREY).astype("Int64"), "holds object values; convert it"),
         (xarray.DataArray(GREY).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
-        ("sample.png", "values; convert it"),
     ],
-    ids=["GPU", "gradient", "palette", "nullable", "dataset", "path"],
+    ids=["GPU", "gradient", "palette", "nullable", "dataset"],
 )
 def test_what_is_no_array_is_refused_in_one_sentence(given, words):
     with pytest.raises((TypeError, ValueError), match=words) as said:
         simdtex.synthesize(given, (6, 7), **OPTIONS)
     assert "\n" not in str(said.value)
+
+
+READERS = {
+    "synthesize": lambda one: simdtex.synthesize(one, (6, 7), **OPTIONS),
+    "several": lambda one: simdtex.synthesize([one, one], (6, 7), **OPTIONS),
+    "mask": lambda one: simdtex.synthesize(GREY, (6, 7), mask=one, **OPTIONS),
+    "guide": lambda one: simdtex.synthesize(GREY, (6, 7), guide=(GREY, one), **OPTIONS),
+    "tiles": lambda one: simdtex.distributed.synthesize(one, (6, 7), "no.zarr", **OPTIONS),
+    "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
+    "fill": lambda one: simdtex.fill(one, HOLE, **OPTIONS),
+    "hole": lambda one: simdtex.fill(GREY, one, **OPTIONS),
+    "extend": lambda one: simdtex.extend(one, right=3, **OPTIONS),
+    "simulate": lambda one: simdtex.simulate(one, 1, **OPTIONS),
+    "estimate": lambda one: simdtex.estimate(one, known=np.ma.masked_array(GREY, HOLE), device="reference"),
+    "classify": lambda one: simdtex.classify(one, {"a": GREY, "b": GREY}, **OPTIONS),
+    "class": lambda one: simdtex.classify(GREY, {"a": one, "b": GREY}, **OPTIONS),
+    "mix": lambda one: simdtex.mix([one, GREY], (32, 32), device="reference"),
+    "live": simdtex.Live,
+    "source map": lambda one: apply_source_map(np.zeros((2, 2, 2), int), one),
+}
+
+
+@pytest.mark.parametrize("path", ["a.png", Path("a.png")], ids=["str", "Path"])
+@pytest.mark.parametrize("name", READERS)
+def test_a_path_is_to_be_read_first(name, path):
+    with pytest.raises(
+        TypeError, match=r" is the path a\.png: read it first, by simdtex\.io\.image\.read\(path\)\.pix"
+    ):
+        READERS[name](path)
 
 
 def test_a_generator_gives_the_seed():

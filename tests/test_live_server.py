@@ -102,6 +102,19 @@ def test_a_wrong_token_is_refused(port, path):
     assert (answer.status, text) == (403, serving.REFUSED)
 
 
+@pytest.mark.parametrize("name", ["Host", "Origin", "Sec-WebSocket-Key", "Sec-WebSocket-Version"])
+def test_a_header_that_is_given_twice_is_refused(port, name, caplog):
+    headers = {
+        **{"Host": f"127.0.0.1:{port}", "Origin": f"http://127.0.0.1:{port}", "Upgrade": "websocket"},
+        **{"Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="},
+    }
+    lines = [f"GET /{SECRET}/socket HTTP/1.1", *(": ".join(one) for one in headers.items()), f"{name}: {headers[name]}"]
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as connection:
+        connection.sendall("\r\n".join([*lines, "", ""]).encode())
+        assert connection.recv(4096).startswith(b"HTTP/1.1 400 ")
+    assert not [record for record in caplog.records if record.exc_info]
+
+
 @pytest.mark.parametrize("name", ["x", "session.py", "..%2fsession.py"])
 def test_there_is_nothing_else(port, name):
     assert get(port, f"/{SECRET}/{name}")[0].status == 404

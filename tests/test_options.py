@@ -176,6 +176,10 @@ def test_a_near_miss_is_named():
         TypeError, match=r"unknown option 'coherense' of the method 'mrf' \(did you mean 'coherence'\?\); choose"
     ):
         resolve(mrf.Options, "synth", {"coherense": 1})
+    for name, meant in (("seed", "rng"), ("rgn", "rng"), ("random_state", "rng"), ("chanel_axis", "channel_axis")):
+        for method in (mrf, pyramid):
+            with pytest.raises(TypeError, match=rf"unknown option '{name}' of .* \(did you mean '{meant}'\?\); choose"):
+                resolve(method.Options, "synth", {name: 1})
     with pytest.raises(TypeError, match=r"unknown option 'zzzz' of the method 'pyramid'; choose from: preset, pyramid"):
         resolve(pyramid.Options, "synth", {"zzzz": 1})
 

@@ -2,15 +2,20 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 
+import click
+import h5netcdf
 import numpy as np
 import pytest
 import xarray
 import zarr
 
 from simdtex import distributed
+from simdtex.cli.ending import catch_signals
 from simdtex.io.grids import read_grid
 from simdtex.io.realisations import check_realisations_path, write_realisations
 from simdtex.options import DataWarning
@@ -184,6 +189,23 @@ def test_what_is_no_data_array_is_refused(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+def test_an_interrupt_waits_until_a_netcdf_file_is_closed(tmp_path, monkeypatch):
+    """A file that is half open prints a traceback when it is collected."""
+    interrupted, flush = [], h5netcdf.core.File.flush
+
+    def interrupting(file):
+        if not interrupted:
+            interrupted.append(os.kill(os.getpid(), signal.SIGINT))
+        flush(file)
+
+    monkeypatch.setattr(h5netcdf.core.File, "flush", interrupting)
+    with pytest.raises(KeyboardInterrupt) as said, catch_signals(click.Context(click.Command("simulate"))):
+        write_realisations(tmp_path / "a.nc", some())
+        time.sleep(10)
+    assert interrupted and not any("h5netcdf" in str(entry.path) for entry in said.traceback)
+    assert os.listdir(tmp_path) in ([], ["a.nc"])
+
+
 @pytest.mark.parametrize("layers", [None, 3])
 def test_a_grid_is_read_from_netcdf(tmp_path, layers):
     path, dims = tmp_path / "grid.nc", ("z", "y", "x")[layers is None :]
@@ -234,11 +256,31 @@ def _more(path):
     zarr.open_group(path).create_array("depths", data=np.arange(4))
 
 
-@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more])
+def _inside(path):
+    write_realisations(path, some())
+    (path / "rock" / "notes.txt").write_text("kept")
+
+
+def _attribute(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"].attrs["checked_by"] = "me"
+
+
+def _title(path):
+    write_realisations(path, some())
+    zarr.open_group(path).attrs["title"] = "mine"
+
+
+def _edited(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"][0, 0, 0] = 77
+
+
+@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more, _inside, _attribute, _title, _edited])
 def test_only_a_store_of_ones_own_is_replaced(tmp_path, make):
     path = tmp_path / "lab.zarr"
     make(path)
-    before = sorted(path.rglob("*"))
+    before = {one: one.is_file() and one.read_bytes() for one in path.rglob("*")}
     with pytest.raises(ValueError, match=r"lab.zarr is a folder and not a store of realisations alone: remove it, or"):
         write_realisations(path, some())
-    assert sorted(path.rglob("*")) == before
+    assert {one: one.is_file() and one.read_bytes() for one in path.rglob("*")} == before

@@ -19,11 +19,11 @@ from typing import Any, NoReturn
 
 import click
 
-from simdtex.cli.places import check_places
+from simdtex.cli.places import check_places, outputs
 from simdtex.options import DataWarning
 
-UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
-"""Modules in which an exception does harm: the search for runtimes, and callbacks of collected objects."""
+UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
+"""Beginnings of modules in which an exception does harm: see `postponed`."""
 
 RESUME, FAILURES = f"{__name__}.resume", f"{__name__}.failures"
 """Keys of a context's `meta`: the path that ``simdtex resume`` takes, and errors that wait for the end."""
@@ -37,6 +37,7 @@ class Ended(KeyboardInterrupt):
 def reporting() -> Iterator[None]:
     """Check the paths of the running command, and report errors and signals in one sentence."""
     context = click.get_current_context()
+    before = outputs(context)
     try:
         with catch_signals(context), noting():
             check_places(context)
@@ -51,14 +52,16 @@ def reporting() -> Iterator[None]:
         note("there is not enough memory; give a smaller size")
         sys.exit(2)
     except KeyboardInterrupt as signalled:
-        give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
+        give_up(context, signalled.args[0] if signalled.args else signal.SIGINT, before)
     settle()
 
 
-def give_up(context: click.Context, number: int) -> NoReturn:
-    """Say that the command was stopped, and how to go on, and exit with the code of a signal."""
+def give_up(context: click.Context, number: int, before: dict[Path, Any]) -> NoReturn:
+    """Say that the command was stopped, and how to go on or what was written, and exit with the code of a signal."""
     path: Path | None = context.meta.get(RESUME)
-    how = f"continue with: simdtex resume {path}" if path and path.exists() else "only stages may have been written"
+    written = ", ".join(str(one) for one, state in outputs(context).items() if before.get(one) != state)
+    how = f"written so far: {written}" if written else "nothing was written"
+    how = f"continue with: simdtex resume {path}" if path and path.exists() else how
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
     note(f"stopped; {how}")
     sys.exit(128 + number)
@@ -105,11 +108,12 @@ def postponed(frame: FrameType | None) -> bool:
     """Return whether an exception would do harm in a frame, and if so have SIGINT come again a little later.
 
     An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
-    but printed; the search for runtimes would leave its temporary folder.
+    but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
+    traceback when it is collected.
     """
     while frame:
-        name, path = frame.f_globals.get("__name__"), frame.f_code.co_filename
-        if name in UNINTERRUPTED or path.startswith("<frozen importlib"):
+        name, path = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
+        if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib"):
             again = threading.Timer(0.02, interrupt_main)
             again.daemon = True
             again.start()

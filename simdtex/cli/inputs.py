@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
+from simdtex.cli.places import split_pair
 from simdtex.model.pictures import check_alike
 
 if TYPE_CHECKING:
@@ -231,9 +232,11 @@ def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool
 
 def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[list[Path], Path]:
     """Return the files that ``A=OUT`` names or, of several samples, ``A0,A1=OUT``: one for each sample, and OUT."""
-    name, equals, out = text.partition("=")
+    (name, out), *others = split_pair(text)
+    if others:
+        raise ValueError(f"{option} {text} has two meanings, since {name} and {others[0][0]} exist: rename one of them")
     names = [part.strip() for part in name.split(",")] if samples.several else [name]
-    if not (equals and out and all(names)):
+    if not (out and all(names)):
         raise ValueError(f"{option} {text} must be {form}, two files")
     if len(names) != len(samples.pixels):
         raise ValueError(

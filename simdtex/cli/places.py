@@ -83,6 +83,12 @@ def check_places(context: click.Context) -> None:
                     )
 
 
+def outputs(context: click.Context) -> dict[Path, tuple[int, int]]:
+    """Return the outputs of a command that exist, each with its inode and the time of its last change."""
+    there = [one.path for one in _named(context) if one.role not in READING and os.path.exists(one.path)]
+    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in there}
+
+
 def check_input(folder: Path, path: Path) -> None:
     """Raise if a file that is read would be overwritten or removed where a folder is written."""
     _check_input(_Named(folder, "folder"), _Named(path, "read"))
@@ -110,13 +116,19 @@ def _named(context: click.Context) -> Iterator[_Named]:
             if isinstance(kind, Place):
                 yield _Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
-                left, _, right = str(one).partition("=")
-                left, right = (right, "") if kind.named else (left, right)
-                # how many files the left names depends on the samples; a file that is not there harms nothing
-                for text in {left, *(part.strip() for part in left.split(","))} - {""}:
-                    yield _Named(Path(text), "read")
-                if right:
-                    yield _Named(Path(right), kind.role)
+                pairs = [(str(one).partition("=")[2], "")] if kind.named else split_pair(str(one))
+                for left, right in pairs:
+                    # how many files the left names depends on the samples; a file that is not there harms nothing
+                    for text in {left, *(part.strip() for part in left.split(","))} - {""}:
+                        yield _Named(Path(text), "read")
+                    if right:
+                        yield _Named(Path(right), kind.role)
+
+
+def split_pair(text: str) -> list[tuple[str, str]]:
+    """Return the two sides of ``A=B`` or ``A0,A1=B``, for each = before which files are named; else at the first =."""
+    sides = [(text[:at], text[at + 1 :]) for at, letter in enumerate(text) if letter == "="] or [(text, "")]
+    return [one for one in sides if all(os.path.exists(part.strip()) for part in one[0].split(","))] or sides[:1]
 
 
 def _real(path: Path) -> Path:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, prod
 from typing import Any
@@ -99,10 +98,6 @@ class LevelLayout:
         i, j = divmod(number, self.across)
         top, left = i * self.side, j * self.side
         return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
-
-    def tiles(self) -> Iterator[Tile]:
-        """Return all tiles, row by row."""
-        return map(self.tile, range(self.count))
 
     @property
     def chunk(self) -> int:

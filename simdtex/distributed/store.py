@@ -8,16 +8,19 @@
         turn         the current turn, and the penalty of each candidate during it
         begun0       the turn that began level 0; likewise for each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
-        level0/0, 1  values, source, temperature: before a sweep and after it, in turn; of a coarser level the last one
+        level0/7     values, source, temperature after turn 7: of each level the last state, and the one being written
         tally7       a row for each task that has finished turn 7: active, sum of temperatures, use of each candidate
 
-A turn is one operation on every tile: begin a level, a sweep, write the picture. No data written in a turn are read in
-it, so its missing tasks complete an interrupted turn. The file ``turn`` changes when a turn is complete, in one write.
+A turn is one operation on every tile: begin a level, a sweep, write the picture. It reads the state that the turn
+before it wrote, and no data that it writes itself, so its missing tasks complete an interrupted turn. The file ``turn``
+changes when a turn is complete, in one write.
 
 Every chunk that is read must exist and have its checksum, and the three files have checksums, too; a chunk is on the
-disk before its task has a row. A file of an array of ``work`` ends with a checksum of its content and its place. A
-chunk of another array has the checksum of Zarr, of its content alone, and ``checksums`` has the checksum of each place.
-A level whose state is damaged restarts from the state of the level above.
+disk before its task has a row. A file of an array of ``work`` ends with a checksum of its content, its place, which
+includes the turn, and the random name of the store, so a chunk of another turn, place or store is damage. What a turn
+writes is determined by the plan and the seed. A chunk of another array has the checksum of Zarr, of its content alone;
+``checksums`` combines that with the name for each place. A level whose state is damaged restarts from the state of the
+level above.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ import secrets
 import shutil
 from collections.abc import Iterator
 from dataclasses import asdict
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -52,7 +56,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 7
+FORMAT = 8
 """Format of the store; all other formats are rejected."""
 
 TOGETHER = 2**22
@@ -68,19 +72,22 @@ class Turn(NamedTuple):
     """An operation on every tile.
 
     ``number``, from 1; ``phase``: ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or
-    ``"done"``; ``level``; ``read`` and ``write``, 0 or 1, the state before and after; the level's ``cooling`` and
-    ``free`` sweeps so far; its current ``active`` sites, and their ``temperature_sum``.
+    ``"done"``; ``level``; the level's ``cooling`` and ``free`` sweeps so far; its current ``active`` sites, and their
+    ``temperature_sum``.
     """
 
     number: int
     phase: str
     level: int
-    read: int = 0
-    write: int = 0
     cooling: int = 0
     free: int = 0
     active: int = 0
     temperature_sum: int = 0
+
+    @property
+    def reads(self) -> int:
+        """The level whose state, written by the turn before, the turn reads."""
+        return self.level + (self.phase in ("begin", "whole"))
 
 
 class Work(NamedTuple):
@@ -115,12 +122,21 @@ class Work(NamedTuple):
 class Files(zarr.storage.LocalStore):
     """The files of a store: a written file is on the disk, and a chunk that is read exists and is the right one."""
 
+    @cached_property
+    def name(self) -> str:
+        """The random name of the store, a part of each checksum."""
+        return str(read_state(self.root / "work" / "run")[0]["name"])
+
+    def placed(self, key: str, data: Any) -> bytes:
+        """Return a checksum of the content of a file, of its place, and of the store."""
+        return crc32(data, crc32(f"{self.name}/{key}".encode())).to_bytes(4, "little")
+
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
         """Return the content of a file; if it is missing or damaged, None, but Damaged for a chunk."""
         found = await super().get(key, prototype, byte_range)
         if found is not None and key.startswith("work/"):
             found, end = found[:-4], found[-4:]
-            if end.to_bytes() != placed(key, found.as_buffer_like()):
+            if end.to_bytes() != self.placed(key, found.as_buffer_like()):
                 found = None
         if found is None and key.rpartition("/")[2] not in NODES:
             raise Damaged(key)
@@ -132,7 +148,7 @@ class Files(zarr.storage.LocalStore):
             raise Damaged("zarr.json")
         data = value.as_buffer_like()
         if key.startswith("work/"):
-            data = b"".join((data, placed(key, data)))
+            data = b"".join((data, self.placed(key, data)))
         await asyncio.to_thread(write_durable, self.root / key, data)
 
     async def set_if_not_exists(self, key: str, value: Any) -> None:
@@ -142,7 +158,7 @@ class Files(zarr.storage.LocalStore):
 
 
 class Checked:
-    """An array of a store, which raises Damaged with the name of a chunk that cannot be read."""
+    """An array of a store, which raises Damaged with the name of a chunk, or of the array, that cannot be read."""
 
     def __init__(self, array: Any, name: str) -> None:
         self._array, self._name = array, name
@@ -155,19 +171,10 @@ class Checked:
         except Damaged:
             raise
         except Exception:  # each codec has errors of its own
-            raise Damaged(self._damaged()) from None
+            raise Damaged(self._name) from None
 
     def __setitem__(self, where: Any, values: Any) -> None:
         self._array[where] = values
-
-    def _damaged(self) -> str:
-        """Return the name of the first chunk that cannot be read."""
-        for place in np.ndindex(self._array.cdata_shape):
-            try:
-                self._array.get_block_selection(place)
-            except Exception:
-                return "/".join((self._name, "c", *map(str, place)))
-        return f"{self._name}/zarr.json"
 
 
 class Sources:
@@ -188,14 +195,14 @@ class Store:
     def __init__(self, where: str) -> None:
         self.where = where
         self._arrays: dict[str, Checked] = {}
-        self._work: Work | None = None
+        self._files = Files(where)
         try:
-            self.root: Any = zarr.open_group(Files(where), mode="r+")
+            self.root: Any = zarr.open_group(self._files, mode="r+")
         except Exception:  # of JSON, of its members, of the files
             if not self._file("run").exists():
                 raise Damaged("zarr.json") from None
             Path(where, "zarr.json").unlink(missing_ok=True)
-            self.root = zarr.open_group(Files(where), mode="a")
+            self.root = zarr.open_group(self._files, mode="a")
 
     @staticmethod
     def create(
@@ -214,11 +221,12 @@ class Store:
         ``channels``: whether the image has a channel axis; ``source``: whether the source map is written, too;
         ``maps``: further maps to write, one for each picture of the sample; ``command``: kept for ``ended``.
         """
-        root: Any = zarr.open_group(Files(where), mode="w")
-        root.create_group("work")
+        zarr.open_group(Files(where), mode="w-")
+        store, held, scattered = Store(where), False, {}
+        store._files.name = secrets.token_hex(8)
+        store.root.create_group("work")
         options, given = plan.options, plan.given
         conditions = Conditioning(plan)
-        store, held, scattered = Store(where), False, {}
         for level in layout.levels:
             grid = Grid.of(plan.shape, 2**level.number, options.boundary == "torus")
             if (here := conditions.at(level.number, grid)) is not None:
@@ -232,12 +240,9 @@ class Store:
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._pixels(f"work/given/{name}", layout.levels[0], array.shape[2:], array.dtype)[:] = array
-        about = {
-            **{"format": FORMAT, "version": version("simdtex"), "name": secrets.token_hex(8), "seed": seed},
-            **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
-            **{"held": held, "given": given is not None, "channels": channels, "source": source, "command": command},
-        }
-        store._keep("run", about, [described(plan), scattered, maps])
+        about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command}
+        more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
+        store._keep("run", about, [described(plan), layout.levels[0].side, *more])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
 
@@ -246,19 +251,13 @@ class Store:
         """The description of the run, as JSON types."""
         return self._state("run")[0]
 
+    @cached_property
     def work(self) -> Work:
-        """Return the plan and its data, which are read once."""
-        if self._work is not None:
-            return self._work
-        about, (tree, scattered, maps) = self._state("run")
+        """The plan and its data."""
+        about, (tree, side, confidences, held, given, scattered, *more) = self._state("run")
         plan, seed = restored(tree), about["seed"]
-        guides, own, centre, hard = about["confidences"]
-        confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
-        layout = planned(plan, seed, about["tile"])
         between = {number: Data(*data) for number, data in scattered.items()}
-        held, given, channels, source = (about[name] for name in ("held", "given", "channels", "source"))
-        self._work = Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
-        return self._work
+        return Work(plan, seed, planned(plan, seed, side), Confidences(*confidences), held, given, between, *more)
 
     @property
     def finished(self) -> bool:
@@ -273,16 +272,21 @@ class Store:
     def penalty(self, turn: Turn) -> NDArray[np.float32]:
         """Return the penalty of each candidate during the current turn."""
         present, penalty = self._state("turn")[1]
-        assert present[0] == turn.number, "a turn that is over"
+        if Turn(*present) != turn:
+            raise Damaged("work/turn")
         return np.asarray(penalty)
 
     def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> Turn:
-        """Make a turn the current one, and return it."""
+        """Make a turn the current one, and return it; what no later turn reads is removed."""
         state = [list(turn), penalty]
         if turn.phase in ("begin", "whole"):
             self._keep(f"begun{turn.level}", {}, state)
         self._keep("turn", {}, state)
-        self._remove(f"tally{turn.number - 1}/")
+        before = f"level{turn.reads}/{turn.number - 1}"
+        for pattern in (f"level{turn.reads}/[0-9]*", "tally*"):
+            for path in self._file("").glob(pattern):
+                if (name := path.relative_to(self._file("")).as_posix()) != before:
+                    self._remove(f"{name}/")
         return turn
 
     def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
@@ -298,34 +302,34 @@ class Store:
         else:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
                 before = (work.layout.channels,) if name == "values" else ()
-                self._planes(f"work/level{level.number}/{turn.write}/{name}", level, before, np.dtype(kind))
+                self._planes(f"work/level{level.number}/{turn.number}/{name}", level, before, np.dtype(kind))
         row = 2 + candidates
         self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
 
-    def forget(self, level: int, which: int) -> None:
-        """Remove a state of a level."""
-        self._remove(f"level{level}/{which}/")
-
     def picture(self, turn: Turn, work: Work) -> tuple[Any, Any]:
         """Return the picture of a written output, and its source map, even if that is not written."""
-        return self._at("image"), Sources(self._at(f"work/level0/{turn.read}/source"), work.plan.sample)
+        return self._at("image"), Sources(self._at(f"work/level0/{turn.number - 1}/source"), work.plan.sample)
 
     def samples(self) -> list[NDArray[Any]]:
         """Return the pictures of the sample, with a channel axis if the image has one."""
-        pixels = self.work().plan.sample.pictures.pixels
-        return [one if self.work().channels else one[..., 0] for one in pixels]
+        pixels = self.work.plan.sample.pictures.pixels
+        return [one if self.work.channels else one[..., 0] for one in pixels]
 
     def finish(self, work: Work) -> None:
         """Note that the output is complete, with its description."""
-        about = {"version": version("simdtex"), "seed": work.seed, "options": asdict(work.plan.options)}
-        self.root.attrs["simdtex"] = about | {"arrays": {name: self._description(name) for name in work.outputs}}
+        about = {"format": FORMAT, "version": version("simdtex"), "name": self._files.name, "seed": work.seed}
+        arrays = {name: self._description(name) for name in work.outputs}
+        self.root.attrs["simdtex"] = about | {"options": asdict(work.plan.options), "arrays": arrays}
 
     def check(self) -> None:
         """Raise Damaged if a chunk of a complete output is missing or in the wrong place; its content is not read."""
         try:
-            arrays = dict(self.root.attrs["simdtex"]["arrays"])
+            about = dict(self.root.attrs["simdtex"])
+            arrays, self._files.name = dict(about["arrays"]), str(about.get("name"))
         except (KeyError, TypeError, ValueError):
             raise Damaged("zarr.json") from None
+        if about.get("format") != FORMAT:
+            raise ValueError(f"{self.where} is of another format or damaged: read its image by zarr, or begin anew")
         every = self._at("checksums")[:]
         if len(every) != len(arrays):
             raise Damaged("checksums/zarr.json")
@@ -350,15 +354,13 @@ class Store:
         if not (level or part == "work/turn"):  # the current turn finds the missing parts
             return "it is made again"
         first = int(level[1]) if level else 0
-        for number in range(first, len(self.work().layout.levels)):
+        for number in range(first, len(self.work.layout.levels)):
             try:
                 turn = Turn(*self._state(f"begun{number}")[1][0])
             except Damaged:
                 continue
             for finer in range(number + 1):
                 self._remove(f"level{finer}/")
-            for path in Path(self.where, "work").glob("tally*"):
-                self._remove(f"{path.name}/")
             self.save(turn)
             return f"level {number} begins again"
         return None
@@ -375,7 +377,7 @@ class Store:
             self._at(f"work/tally{turn.number}")[task]
             for tile in map(level.tile, level.task(task)):
                 if turn.phase != "show":
-                    self.read(level, turn.write, tile)
+                    self.read(level, turn.number, tile)
                     continue
                 for name in work.outputs:
                     self._at(name)[spans(tile)]
@@ -394,14 +396,14 @@ class Store:
         active, temperature_sum, *counts = sum(part.sum(0) for part in rows)
         return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
 
-    def read(self, level: LevelLayout, which: int, window: Tile) -> Field:
-        """Return the state of a level's sites in a window, which may cross the seam."""
-        here = f"work/level{level.number}/{which}"
+    def read(self, level: LevelLayout, turn: int, window: Tile) -> Field:
+        """Return the state of a level's sites after the turn of a number, in a window, which may cross the seam."""
+        here = f"work/level{level.number}/{turn}"
         return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
 
-    def write(self, level: LevelLayout, which: int, tile: Tile, field: Field) -> None:
-        """Write the state of a tile's sites."""
-        here = f"work/level{level.number}/{which}"
+    def write(self, turn: Turn, tile: Tile, field: Field) -> None:
+        """Write the state of a tile's sites after a turn."""
+        here = f"work/level{turn.level}/{turn.number}"
         for name, plane in zip(PLANES, field, strict=True):
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
@@ -433,21 +435,21 @@ class Store:
         return (slice(None), rows, cols), found.reshape(len(names), rows.stop - rows.start, -1)
 
     def _checksum(self, name: str, row: int, col: int) -> int:
-        """Return the checksum of a chunk of the output, its last four bytes."""
+        """Return the checksum of a chunk of the output, its last four bytes, combined with the store's name."""
         part = self._chunk(name, row, col)
         try:
             with open(Path(self.where, part), "rb") as file:
                 file.seek(-4, os.SEEK_END)
-                return int.from_bytes(file.read(), "little")
+                return int.from_bytes(file.read(), "little") ^ crc32(self._files.name.encode())
         except OSError:
             raise Damaged(part) from None
 
     def _description(self, name: str) -> int:
-        """Return a checksum of the part of an array's description that concerns its pixels; the rest may change."""
+        """Return a checksum of an array's description without the parts that do not concern its pixels."""
         try:
             about = json.loads(Path(self.where, name, "zarr.json").read_bytes())
-            parts = [about[key] for key in ("shape", "data_type", "chunk_grid", "chunk_key_encoding")]
-        except (OSError, ValueError, KeyError, TypeError):
+            parts = {key: about[key] for key in about.keys() - {"attributes", "dimension_names"}}
+        except (OSError, ValueError, AttributeError, TypeError):
             raise Damaged(f"{name}/zarr.json") from None
         return crc32(json.dumps(parts, sort_keys=True).encode())
 
@@ -458,8 +460,8 @@ class Store:
         return Path(self.where, "work", name)
 
     def _keep(self, name: str, about: dict[str, Any], state: Any) -> None:
-        """Write a checked file of ``work``, which contains its name."""
-        write_state(self._file(name), {"file": name, **about}, state)
+        """Write a checked file of ``work``, which contains its name and that of the store."""
+        write_state(self._file(name), {"file": name, "name": self._files.name, **about}, state)
 
     def _state(self, name: str) -> tuple[dict[str, Any], Any]:
         """Return the content of a checked file of ``work``."""
@@ -467,7 +469,7 @@ class Store:
             about, state = read_state(self._file(name))
         except (Damaged, OSError):
             raise Damaged(f"work/{name}") from None
-        if about.get("file", name) != name:  # an older format has none
+        if about.get("file", name) != name or about.get("name") != self._files.name:  # an older format has none
             raise Damaged(f"work/{name}")
         return about, state
 
@@ -537,11 +539,6 @@ class Stored(Conditions):
 def phase_of(level: LevelLayout) -> str:
     """Return the phase that begins a level: a level of one tile does all its sweeps in one turn."""
     return "whole" if level.count == 1 else "begin"
-
-
-def placed(key: str, data: Any) -> bytes:
-    """Return a checksum of the content of a file and of its place."""
-    return crc32(data, crc32(key.encode())).to_bytes(4, "little")
 
 
 def spans(tile: Tile) -> tuple[slice, slice]:

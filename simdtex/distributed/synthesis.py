@@ -191,7 +191,7 @@ def resume(
                         del output.statistics[name]
                     if ended:
                         ended(opened.samples(), image, output, opened.about["command"])
-                    opened.finish(opened.work())
+                    opened.finish(opened.work)
         opened.clean()
     return _array(opened.where, channel_axis)
 

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 from threading import Lock
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from simdtex.ops.finish import around
 from simdtex.ops.neighbourhood import Field
 
 
-@dataclass(frozen=True)
-class Context:
+class Context(NamedTuple):
     """The data that a process keeps from one tile to the next."""
 
     store: Store
@@ -28,26 +27,16 @@ class Context:
     run: Run
 
 
-_contexts: dict[tuple[str, str, Any], Context] = {}
 _one = Lock()
 """A process has one device, which two tiles would share."""
 
 
+@lru_cache(1)
 def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """Return the context of a store, which is put on a device once."""
-    key = (where, name, device)
-    if key not in _contexts:
-        _contexts.clear()  # one at a time, which bounds the memory
-        store, machine = Store(where), open_machine(device)
-        work = store.work()
-        run = Run(work.plan, machine, work.seed, Stored(store, work))
-        _contexts[key] = Context(store, work, run)
-    return _contexts[key]
-
-
-def forget() -> None:
-    """Drop the kept context."""
-    _contexts.clear()
+    """Return the context of a store, which is put on a device once; only the latest is kept."""
+    store, machine = Store(where), open_machine(device)
+    run = Run(store.work.plan, machine, store.work.seed, Stored(store, store.work))
+    return Context(store, store.work, run)
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
@@ -66,23 +55,22 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: in
 
 def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
     field, tally = tiles.entered(here.run, turn.level, tile, _above(here, turn, tile))
-    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
+    here.store.write(turn, tile, field)
     return tally
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field = tiles.whole(here.run, turn.level, _above(here, turn, tile))
-    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
+    here.store.write(turn, tile, tiles.whole(here.run, turn.level, _above(here, turn, tile)))
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
-    before, penalty = here.store.read(level, turn.read, frame.window), here.store.penalty(turn)
+    before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
     done, free = turn.cooling + turn.free, not turn.active
     field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, penalty, done, free)
-    here.store.write(level, turn.write, tile, field)
+    here.store.write(turn, tile, field)
     return tally
 
 
@@ -90,7 +78,7 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     run, work, level = here.run, here.work, here.work.layout.levels[0]
     sd = run.options.finish or 0
     frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
-    state = here.store.read(level, turn.read, frame.window)
+    state = here.store.read(level, turn.number - 1, frame.window)
     known = here.store.held(level, frame.window).known if work.held else None
     field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
     shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
@@ -109,10 +97,10 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
 
 def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
     levels = here.work.layout.levels
-    if turn.level + 1 == len(levels):
+    if turn.reads == len(levels):
         return None
     (top, rows), (left, cols) = here.run.grid(turn.level).window(*tile).above
-    return here.store.read(levels[turn.level + 1], turn.read, Tile(top, left, rows, cols))
+    return here.store.read(levels[turn.reads], turn.number - 1, Tile(top, left, rows, cols))
 
 
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}

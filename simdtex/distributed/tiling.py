@@ -44,7 +44,7 @@ class Run:
     """The turns of an output; the state is the current turn, which the store keeps."""
 
     def __init__(self, tiles: Tiles, machine: Machine) -> None:
-        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work()
+        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work
         work = self.work
         self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store, work))
 
@@ -92,23 +92,19 @@ class Run:
         """Return the turn after a complete one, which becomes the current turn of the store."""
         store, lattices, levels = self.store, self.lattices, self.work.layout.levels
         if turn.phase == "show":
-            return turn._replace(number=turn.number + 1, phase="done")  # only `finish` notes it
+            return turn._replace(phase="done")  # only `finish` notes it
         counts, active, temperature_sum = store.total(turn)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
-        number, read = turn.number + 1, turn.write
+        number = turn.number + 1
         if turn.phase != "whole" and (active or free < lattices.options.free_sweeps):
             before = store.penalty(turn) if turn.phase == "sweep" else None
             rate = lattices.options.balance * lattices.usual
-            after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, temperature_sum)
-            store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
-        elif turn.level:
-            after = store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read))
-        else:
-            after = store.save(Turn(number, "show", 0, read, read))
-        if after.level < turn.level and turn.phase == "sweep":
-            store.forget(turn.level, turn.read)
-        return after
+            after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
+            return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
+        if turn.level:
+            return store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1))
+        return store.save(Turn(number, "show", 0))
 
 
 class Watch:
@@ -163,11 +159,13 @@ class Watch:
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` on a side."""
         sample, levels = self._run.lattices.sample, self._run.work.layout.levels
-        number, step = turn.level + (turn.phase in ("begin", "whole")), -(-max(level.rows, level.cols) // SHOWN)
+        number, step = turn.reads, -(-max(level.rows, level.cols) // SHOWN)
         if number == len(levels):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         found = []
         for row in range(0, levels[number].rows, step):
-            values, source, _ = self._run.store.read(levels[number], turn.read, Tile(row, 0, 1, levels[number].cols))
+            values, source, _ = self._run.store.read(
+                levels[number], turn.number - 1, Tile(row, 0, 1, levels[number].cols)
+            )
             found.append(sample.picture(values[..., ::step], source[:, ::step]))
         return np.concatenate(found)

@@ -2,7 +2,8 @@
 """The one writer: a file or folder is written completely or not at all, and a checked file carries its SHA-256.
 
 An incomplete file has a hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, and is renamed
-at the end. A killed process leaves its hidden file, which a write into the folder removes when it is a day old.
+at the end. A killed process leaves its hidden file, which a write into the folder removes when it is a day old and not
+locked: its writer holds a lock on it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import secrets
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
@@ -53,13 +54,14 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
         _remove_leftovers(target)
         # not tempfile, whose file would be readable only by its owner
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if replaced else 0o666))
-        yield temporary
-        _sync(temporary)
-        if replaced:
-            shutil.copymode(target, temporary)
-        os.replace(temporary, target)
-    except OSError as error:
-        raise _not_written(path, error) from None
+        with _locked(temporary):
+            yield temporary
+            _sync(temporary)
+            if replaced:
+                shutil.copymode(target, temporary)
+            os.replace(temporary, target)
+    except (OSError, NotWritten) as error:
+        raise _not_written(path, error, temporary) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -69,7 +71,8 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
     An existing folder `path`, which the caller has checked, is replaced as a whole at the end, and the new one has its
-    permissions. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    permissions. The block must not replace the temporary folder itself, which is locked. If the block fails, also by
+    Ctrl-C, the temporary folder is removed and `path` is left as it was.
     Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
@@ -80,11 +83,12 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
         if old.exists() and not target.exists():  # a process was killed while it replaced the folder
             old.rename(target)
         temporary.mkdir()
-        yield temporary
-        for folder, _, names in os.walk(temporary):
-            for name in names:
-                _sync(Path(folder, name))
-            _sync_folder(Path(folder))
+        with _locked(temporary):
+            yield temporary
+            for folder, _, names in os.walk(temporary):
+                for name in names:
+                    _sync(Path(folder, name))
+                _sync_folder(Path(folder))
         try:
             if target.exists():
                 shutil.copymode(target, temporary)
@@ -97,8 +101,8 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
-    except OSError as error:
-        raise _not_written(path, error) from None
+    except (OSError, NotWritten) as error:
+        raise _not_written(path, error, temporary) from None
     finally:
         for _ in range(20):  # threads of a library, such as Zarr's, may write for a while after Ctrl-C
             if not temporary.exists():
@@ -236,7 +240,9 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
     return found
 
 
-def _not_written(path: PathLike, error: OSError) -> NotWritten:
+def _not_written(path: PathLike, error: OSError | NotWritten, temporary: Path | None = None) -> NotWritten:
+    if isinstance(error, NotWritten):  # of a writer into the temporary path
+        return NotWritten(str(error).replace(str(temporary), os.fspath(path)))
     number = error.errno or errno.ENOSPC  # NumPy and others give no reason if only a part was written
     remedy = "free some space" if number in (errno.ENOSPC, errno.EDQUOT) else "choose another path"
     return NotWritten(f"{os.fspath(path)} could not be written ({os.strerror(number)}): {remedy}")
@@ -248,28 +254,54 @@ def exclusive(path: PathLike) -> Iterator[None]:
 
     The lock ends with the block or the process. It has no effect on Windows and on file systems without locks.
     """
-    try:
-        import fcntl
-    except ModuleNotFoundError:
-        yield
-        return
     hidden = Path(os.path.realpath(path))
     hidden = hidden.with_name(f".{hidden.name}.lock")
-    try:
-        file = open(hidden, "wb")  # noqa: SIM115 - an error of the block is not one of this file
-    except OSError as error:
-        raise _not_written(path, error) from None
-    with file:
+    with ExitStack() as held:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = held.enter_context(_locked(hidden, os.O_CREAT))
         except BlockingIOError:
             raise ValueError(f"another run is at work in {os.fspath(path)} now; wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
+        except OSError as error:
+            raise _not_written(path, error) from None
         try:
             yield
         finally:
-            hidden.unlink(missing_ok=True)
+            if _is_at(lock, hidden):
+                hidden.unlink(missing_ok=True)
+
+
+@contextmanager
+def _locked(path: Path, flags: int = 0) -> Iterator[int | None]:
+    """Open and lock a file or folder during the block; raise BlockingIOError if it is locked already.
+
+    Yields the descriptor; None on Windows, where this has no effect.
+    """
+    if os.name == "nt":
+        yield None
+        return
+    import fcntl
+
+    while True:
+        descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | flags, 0o666)
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if isinstance(error, BlockingIOError):  # else a file system without locks
+                    raise
+            if _is_at(descriptor, path):  # else the process that held the lock has removed the file
+                yield descriptor
+                return
+        finally:
+            os.close(descriptor)
+
+
+def _is_at(descriptor: int | None, path: Path) -> bool:
+    """Return whether an open file is the one at a path."""
+    try:
+        return descriptor is None or os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except FileNotFoundError:
+        return False
 
 
 def _hidden(target: Path) -> Path:
@@ -277,10 +309,13 @@ def _hidden(target: Path) -> Path:
 
 
 def is_leftover(path: Path) -> bool:
-    """Return whether a path is an unfinished file, started more than a day ago."""
+    """Return whether a path is an unfinished file, started more than a day ago, that no process is writing."""
     try:
-        return bool(_HIDDEN.fullmatch(path.name)) and time.time() - path.stat().st_mtime > _LEFT
-    except OSError:  # it has meanwhile been renamed
+        if not _HIDDEN.fullmatch(path.name) or time.time() - path.stat().st_mtime <= _LEFT:
+            return False
+        with _locked(path):
+            return True
+    except OSError:  # it is locked, or has meanwhile been renamed
         return False
 
 

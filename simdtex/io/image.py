@@ -210,8 +210,14 @@ def as_array(name: str, values: Any) -> Array:
     """Return an array-like as an ndarray, or a masked one as a masked array.
 
     Arrays of other libraries, such as xarray and dask, are converted as a whole, with their axes by position. Raises
-    ValueError if rows have unequal lengths, and TypeError if NumPy cannot convert the array, for example from a GPU.
+    ValueError if rows have unequal lengths, and TypeError if NumPy cannot convert the array, for example from a GPU, or
+    if it is a path.
     """
+    first = values
+    while isinstance(first, (list, tuple)) and first:
+        first = first[0]
+    if isinstance(first, (str, os.PathLike)):
+        raise TypeError(f"{name} is the path {os.fspath(first)}: read it first, by simdtex.io.image.read(path).pixels")
     if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
         values = values.compute()
     if getattr(values, "mode", None) in ("P", "PA"):  # Pillow

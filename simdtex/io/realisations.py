@@ -7,6 +7,7 @@ Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns. The extra
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import warnings
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["check_realisations_path", "write_realisations"]
 
 MARK = "simdtex_realisations"
-"""The attribute that lists the arrays of a Zarr store written here; only a store with it is replaced."""
+"""The attribute that holds the checksum of a Zarr store written here; only an unchanged store is replaced."""
 
 PathLike = str | os.PathLike[str]
 
@@ -78,8 +79,8 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
         ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
         attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and a
-        Zarr store if it was written here and nothing was added; its attribute ``simdtex_realisations`` lists its
-        arrays.
+        Zarr store if it was written here and nothing in it was added or changed, as its attribute
+        ``simdtex_realisations``, a checksum, shows.
     array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
         The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
         x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
@@ -119,18 +120,29 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
             temporary.write_bytes(data)
         return
     whole = named if source else named.to_dataset()
-    whole = whole.assign_attrs({MARK: sorted(map(str, whole.variables))})
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
-        whole.to_zarr(store, mode="w", zarr_format=3)
+        whole.to_zarr(store, mode="w-", zarr_format=3)
+        about = json.loads((store / "zarr.json").read_bytes())
+        about["attributes"][MARK] = _checksum(store, about)
+        (store / "zarr.json").write_text(json.dumps(about, indent=2))
+
+
+def _checksum(store: Path, about: dict[str, Any]) -> str:
+    """Return the SHA-256 of a Zarr store: of its description ``about``, and of the names and contents of its files."""
+    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for path in sorted(store.rglob("*")):
+        content = path.read_bytes() if path.is_file() and path != store / "zarr.json" else b""
+        found.update(repr((path.relative_to(store).parts, hashlib.sha256(content).digest())).encode())
+    return found.hexdigest()
 
 
 def _own(store: Path) -> bool:
     """Return whether a folder holds only what `write_realisations` wrote."""
     try:
-        wrote = json.loads((store / "zarr.json").read_text())["attributes"][MARK]
-        return sorted(os.listdir(store)) == sorted([*wrote, "zarr.json"])
-    except (OSError, ValueError, KeyError, TypeError):
+        about = json.loads((store / "zarr.json").read_bytes())
+        return bool(about["attributes"].pop(MARK) == _checksum(store, about))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 

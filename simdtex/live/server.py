@@ -20,6 +20,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import numpy as np
+from websockets.datastructures import MultipleValuesError
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection
@@ -173,7 +174,10 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
 
     def answer(connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a request; None opens the WebSocket."""
-        host = request.headers.get("Host", "")
+        try:
+            host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        except MultipleValuesError as error:
+            return _response(connection, 400, f"The request has several headers {error}.")
         given, slash, name = request.path.partition("?")[0].lstrip("/").partition("/")
         if not is_own_name(host, address):
             return _response(connection, 400, "This server has another name.")
@@ -184,8 +188,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
             response.headers["Location"] = f"/{token}/"
             return response
         if name == "socket":
-            own = request.headers.get("Origin") == f"http://{host}"
-            return None if own else _response(connection, 403, REFUSED)
+            return None if origin == f"http://{host}" else _response(connection, 403, REFUSED)
         if name not in FILES:
             return _response(connection, 404, "There is no such page.")
         text, kind = FILES[name]
