@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -229,6 +230,11 @@ class TextureClassifier:
     classes_ : (classes,) array
         The labels that `fit` was given, in ascending order.
 
+    Notes
+    -----
+    scikit-learn takes it as a classifier of pictures. A trained classifier can be copied, pickled, and dumped by joblib
+    of the same version of simdtex, without the open device: an open machine as `device` becomes its name.
+
     Examples
     --------
     >>> from skimage import data
@@ -241,6 +247,8 @@ class TextureClassifier:
     True
     """
 
+    _machine: Machine | None = None
+
     def __init__(
         self,
         *,
@@ -249,19 +257,42 @@ class TextureClassifier:
         device: str | Machine | None = None,
         **options: Any,
     ) -> None:
-        self.channel_axis, self.rng, self.device, self.options = channel_axis, rng, device, options
+        self.channel_axis, self.rng, self.device = channel_axis, rng, device
+        self._options: dict[str, Any] = {}
+        self.set_params(**options)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state, device = vars(self) | {"_machine": None}, self.device
+        if kind := getattr(device, "kind", None):
+            state["device"] = "reference" if kind == "reference" else getattr(device, "info", device).name
+        return state
+
+    def __sklearn_clone__(self) -> Self:
+        parameters = {name: one if name == "device" else deepcopy(one) for name, one in self.get_params().items()}
+        return type(self)(**parameters)
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import ClassifierTags, InputTags, Tags, TargetTags
+
+        shape = InputTags(two_d_array=False, three_d_array=True, allow_nan=True)
+        return Tags("classifier", TargetTags(required=True), classifier_tags=ClassifierTags(), input_tags=shape)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the arguments of the constructor; ``deep`` makes no difference."""
-        return {"channel_axis": self.channel_axis, "rng": self.rng, "device": self.device, **self.options}
+        """Return the arguments of the constructor, with all options; ``deep`` makes no difference."""
+        own = {"channel_axis": self.channel_axis, "rng": self.rng, "device": self.device}
+        return own | vars(resolve(Options, "classify", {})) | self._options
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`."""
-        for name, value in parameters.items():
-            if name in ("channel_axis", "rng", "device"):
-                setattr(self, name, value)
-            else:
-                self.options[name] = value
+        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`.
+
+        Raises ValueError, without any change, if a name is unknown.
+        """
+        valid = self.get_params()
+        if strange := [name for name in parameters if name not in valid]:
+            raise ValueError(f"TextureClassifier has no parameter {strange[0]!r}; choose from: {', '.join(valid)}")
+        own = ("channel_axis", "rng", "device")
+        vars(self).update((name, parameters.pop(name)) for name in own if name in parameters)
+        self._options |= parameters
         return self
 
     def fit(self, image: ArrayLike | Sequence[ArrayLike], labels: Any) -> Self:
@@ -290,12 +321,13 @@ class TextureClassifier:
         found = _painted([(*one, marked) for one, marked in zip(shown, painted, strict=True)])
         self.classes_ = np.array(list(found))
         self.n_features_in_ = shown[0][0].shape[-1]
-        self._like = shown[0][0][:1, :1]
-        self._chosen = resolve(Options, "classify", self.options)
-        self._seed, self._machine = as_seed(self.rng), open_machine(self.device)
+        self._like = shown[0][0][:1, :1].copy()
+        self._chosen = resolve(Options, "classify", self._options)
+        self._seed, machine = as_seed(self.rng), open_machine(self.device)
         self._names = {label: str(label) for label in found}
         names = list(self._names.values())
-        self._model: Model = learn(self._machine, list(found.values()), names, self._chosen, self._seed)
+        self._model: Model = learn(machine, list(found.values()), names, self._chosen, self._seed)
+        self._machine = machine
         return self
 
     def predict(self, image: ArrayLike) -> NDArray[Any]:
@@ -320,5 +352,6 @@ class TextureClassifier:
         pixels, unknown = check_picture(image, self.channel_axis)
         check_alike("the picture", pixels, "that of training", self._like)
         plan = Plan(completed(pixels, unknown), unknown, self._model, self._names, self._chosen)
+        self._machine = self._machine or open_machine(self.device)
         labels, output = drive(plan, self._machine, self._seed)
         return labels[..., 0], output
