@@ -65,7 +65,7 @@ def estimate(
     from simdtex.io.grids import SUFFIXES, check_grid, write_grid
     from simdtex.io.realisations import check_realisations_path, write_realisations
 
-    began, material = time.perf_counter(), read_material(training_image)
+    began, material = time.perf_counter(), read_material(training_image, categorical=options["categorical"])
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     data = read_data(material, options)

@@ -72,7 +72,7 @@ def extend(
     from simdtex.io import image
 
     folder = folder_of(picture, output)
-    whole = read_material([folder.lead if folder else picture])
+    whole = read_material([folder.lead if folder else picture], categorical=options["categorical"])
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     sides = {name: options.pop(name) for name in SIDES}
     if size is not None:

@@ -76,9 +76,9 @@ def fill(
     from simdtex import fill
     from simdtex.io import image
 
-    whole = read_material([picture])
+    whole = read_material([picture], categorical=options["categorical"])
     pixels, hole = _hole(whole.pixels[0], mask)
-    texture = read_material(samples) if samples else None
+    texture = read_material(samples, categorical=options["categorical"]) if samples else None
     if texture:
         check_profiles([picture, samples[0]], [whole.metadata, texture.metadata])
     if texture and also:

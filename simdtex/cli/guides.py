@@ -24,7 +24,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples) if file else None,
+        "known": read_known(file, samples, options.get("categorical")) if file else None,
         "guide": None,
     }
     if guide is not None:
@@ -37,14 +37,23 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
 
     The guides of several samples are parted by commas.
 
-    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them; they
-    become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
+    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, or all
+    guides have palettes; they become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
     """
+    from simdtex.io.image import coloured
     from simdtex.methods.mrf.options import few
+    from simdtex.methods.mrf.plan import LABELS
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
-    own = [read_pixels(path)[0] for path in paths]
-    wanted, lies, _ = read_pixels(out)
+    found = [read_pixels(path, palette=True) for path in (*paths, out)]
+    palettes = [metadata.palette if metadata else None for *_, metadata in found]
+    *own, wanted = [one[0] for one in found]
+    if labels is None and all(palettes) and len(set().union(*(planes(one)[..., 0].flat for one in own))) <= LABELS:
+        labels = True
+    several = len({*palettes} - {None}) > 1  # which may have the same colours in other orders
+    if all(palettes) or several or max(map(channels, (*own, wanted))) > 2:
+        *own, wanted = map(coloured, (*own, wanted), palettes)
+    lies = found[-1][1]
     wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     free = free | unknown_in(planes(wanted))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])

@@ -118,34 +118,39 @@ def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
         note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
 
 
-def read_picture(path: Path) -> Image:
+def read_picture(path: Path, palette: bool = False) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
 
-    found = image.read(path)
+    found = image.read(path, palette=palette)
     if found.metadata.more:
         note(f"{path} has several frames or pages; only the first is read")
     return found
 
 
 def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> None:
-    """Raise unless pictures that are used together have the same colour profile; without one it is sRGB."""
+    """Raise unless pictures that are used together have the same colour profile, sRGB by default, and palette."""
     from simdtex.io.decode import NOTHING
     from simdtex.io.image import profile_name
 
     # grids and arrays hold numbers alone, in whatever colours
-    told = [(path, one.profile) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
-    for path, profile in told[1:]:
+    told = [(path, one) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
+    for path, other in told[1:]:
         first, own = told[0]
-        if profile != own and (names := [profile_name(profile), profile_name(own)]) != ["sRGB", "sRGB"]:
+        if other.profile != own.profile and {*(names := [profile_name(a.profile) for a in (other, own)])} != {"sRGB"}:
             raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
+        if any(a != b for a, b in zip(other.palette or b"", own.palette or b"", strict=False)):
+            raise ValueError(f"{path} and {first} have different palettes; save both with the same palette")
 
 
-def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
+def read_pixels(
+    path: Path, deep: bool = False, palette: bool = False
+) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
     """Read a picture, or a grid as one, whose variables are channels.
 
     Also return where the cells of a grid lie, and what the file of a picture says of it. With ``deep`` a file of
-    several layers is read, too, as a volume (layers, rows, cols, variables).
+    several layers is read, too, as a volume (layers, rows, cols, variables). With ``palette`` colours of a palette are
+    read as their indices.
     """
     from simdtex.io import grids
 
@@ -157,7 +162,7 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
             if volume.is_volume(path):
                 values = volume.read(path)
                 return values if len(values) > 1 else values[0], None, None
-        found = read_picture(path)
+        found = read_picture(path, palette)
         return found.pixels, None, found.metadata
     if netcdf:
         from simdtex.io.realisations import read_netcdf
@@ -171,9 +176,12 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
     return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell), None
 
 
-def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
-    """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, lie, metadata = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+def read_material(paths: Sequence[Path], deep: bool = False, categorical: Any = False) -> Material:
+    """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it.
+
+    If they are ``categorical``, a palette is categories.
+    """
+    pictures, lie, metadata = zip(*(read_pixels(path, deep, bool(categorical)) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
@@ -306,24 +314,25 @@ def read_map(name: str, path: Path, deep: bool = False) -> HardData | NDArray[An
         return read_hard_data(path)
     if name == "region" and grids.kind_of(path) is None and not deep:
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = read_pixels(path, deep)[0]
+    pixels = read_pixels(path, deep, name == "image_map")[0]
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
     return np.moveaxis(pixels, -1, 0)
 
 
-def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, samples: Material, categorical: Any = False) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
+    If values are ``categorical`` and the samples have one channel, a palette is categories.
     """
     from simdtex.io import grids
     from simdtex.io.hard_data import read_hard_data
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    values, lies, metadata = read_pixels(path, samples.deep)
+    values, lies, metadata = read_pixels(path, samples.deep, bool(categorical) and samples.channel_axis is None)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)

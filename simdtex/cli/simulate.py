@@ -115,7 +115,7 @@ def simulate(
     from simdtex.io.realisations import check_realisations_path, write_realisations
     from simdtex.run import Output
 
-    material = read_material(training_image, deep=True)
+    material = read_material(training_image, True, options["categorical"])
     pixels = material.pixels[0]
     data = read_data(material, options)
     known = data["known"]

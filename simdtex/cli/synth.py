@@ -95,7 +95,7 @@ def synth(
     if method == "pyramid" and (source_map or also or folder):
         what = "give one picture" if folder else "leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
-    material = read_material([folder.lead] if folder else samples)
+    material = read_material([folder.lead] if folder else samples, categorical=options["categorical"])
     pixels = material.pixels[0]
     data = read_data(material, options)
     known, guide = data["known"], data["guide"]

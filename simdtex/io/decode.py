@@ -57,12 +57,15 @@ class Metadata(NamedTuple):
         and preview.
     more : bool
         Whether the file has further frames or pages, which are not read.
+    palette : bytes, optional
+        Red, green and blue of each index of a palette, if the pixels are indices.
     """
 
     profile: bytes | None = None
     dpi: tuple[float, float] | None = None
     exif: bytes | None = None
     more: bool = False
+    palette: bytes | None = None
 
 
 NOTHING = Metadata()
@@ -71,12 +74,16 @@ NOTHING = Metadata()
 Decoded = tuple[Array, Metadata]
 
 
-def decode(data: bytes, most: int) -> Decoded:
+GREYS = np.arange(256, dtype=np.uint8).repeat(3).tobytes()
+"""The palette whose colours are the indices."""
+
+
+def decode(data: bytes, most: int, palette: bool = False) -> Decoded:
     """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel; and the metadata of the file. Raise TooLarge before anything is decoded, and each decoder's
-    own errors for a damaged file.
+    opaque alpha channel; and the metadata of the file. With ``palette`` palettes become indices. Raise TooLarge before
+    anything is decoded, and each decoder's own errors for a damaged file.
     """
     with _quiet():
         if data.startswith(b"\x93NUMPY"):
@@ -84,10 +91,10 @@ def decode(data: bytes, most: int) -> Decoded:
         if header := _PNM.match(data):
             return _read_pnm(data, header, most), NOTHING
         if data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-            return _read_tiff(data, most)
+            return _read_tiff(data, most, palette)
         if data.startswith(b"\x89PNG\r\n\x1a\n") and data[24:25] == b"\x10":  # bits per sample: 16
             return _read_png16(data, most)
-        return _read_pillow(data, most)
+        return _read_pillow(data, most, palette)
 
 
 @contextmanager
@@ -136,11 +143,14 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
     return pixels.reshape(shape).astype(dtype)
 
 
-def _read_pillow(data: bytes, most: int) -> Decoded:
+def _read_pillow(data: bytes, most: int, palette: bool) -> Decoded:
     with _opened(data, most) as picture:
         picture.load()
-        transparent = picture.has_transparency_data
-        if picture.mode in ("1", "L"):
+        transparent, colours = picture.has_transparency_data, None
+        if palette and picture.mode == "P":
+            colours = bytes(picture.getpalette() or ())
+            picture.putpalette(GREYS)
+        if colours is not None or picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
         elif picture.mode in ("LA", "F", "I") or picture.mode.startswith("I;"):
             mode = picture.mode
@@ -148,7 +158,7 @@ def _read_pillow(data: bytes, most: int) -> Decoded:
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata
+    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata._replace(palette=colours)
 
 
 def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
@@ -200,7 +210,7 @@ def _read_png16(data: bytes, most: int) -> Decoded:
     return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4)), metadata
 
 
-def _read_tiff(data: bytes, most: int) -> Decoded:
+def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
     import tifffile
 
     with tifffile.TiffFile(io.BytesIO(data)) as tiff:
@@ -220,8 +230,8 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
             metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
-            pixels, found = _read_pillow(data, most)
-            return pixels, metadata._replace(profile=found.profile)  # without that of print colours
+            pixels, found = _read_pillow(data, most, palette)
+            return pixels, metadata._replace(profile=found.profile, palette=found.palette)  # without that of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()

@@ -65,7 +65,7 @@ class Image:
     metadata: Metadata = NOTHING
 
 
-def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
+def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return the picture in a file, whose format is recognised by its content and not by its name.
 
     Parameters
@@ -76,6 +76,9 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     max_pixels : int, optional
         The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
+    palette : bool
+        Whether a picture with a palette is read as the indices of its colours, (rows, cols) uint8, as categories
+        need; the palette is then in the metadata. Other pictures are read as without it.
 
     Returns
     -------
@@ -97,16 +100,16 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     """
     with reading(path, "the image", max_pixels):
         data = Path(path).read_bytes()
-    return read_bytes(os.fspath(path), data, max_pixels=max_pixels)
+    return read_bytes(os.fspath(path), data, max_pixels=max_pixels, palette=palette)
 
 
-def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:
+def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return a picture from the bytes of its file, as `read` does; messages call it ``name``."""
     most = max_pixels_or_default(max_pixels)
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     try:
-        found, metadata = decode(data, most)
+        found, metadata = decode(data, most, palette)
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
     except PIL.UnidentifiedImageError:
@@ -425,7 +428,8 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         grey and colour with alpha; WebP turns grey into equal RGB.
     metadata : Metadata, optional
         The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels;
-        PNG, JPEG and WebP the EXIF data; and all but WebP and ``.npy`` the pixels per inch.
+        PNG, JPEG and WebP the EXIF data; and all but WebP and ``.npy`` the pixels per inch. Of
+        indices, PNG and BMP keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
 
     Raises
     ------
@@ -447,7 +451,13 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
 
 def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING) -> None:
     """Write pixels in a format that holds them, over an existing file."""
-    metadata = metadata._replace(profile=fitting(metadata.profile, 1 if pixels.ndim == 2 else pixels.shape[2]))
+    palette = None
+    if pixels.ndim == 2 and pixels.dtype == np.uint8 and suffix not in (".tif", ".tiff", ".npy"):
+        palette = metadata.palette
+    if suffix not in (".png", ".bmp"):
+        pixels, palette = coloured(pixels, palette), None
+    channels = 3 if palette else 1 if pixels.ndim == 2 else pixels.shape[2]
+    metadata = metadata._replace(profile=fitting(metadata.profile, channels))
     beside = {"icc_profile": metadata.profile, "dpi": metadata.dpi, "exif": metadata.exif}
     if suffix in LOSSY and len(metadata.exif or b"") > _MARKER:
         del beside["exif"]
@@ -466,7 +476,22 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         write_tiff(path, [pixels], metadata)
     else:
         kind = PIL.Image.registered_extensions()[suffix]
-        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {}), **beside))
+        picture = PIL.Image.fromarray(pixels)
+        if palette:
+            picture.putpalette(palette.ljust(768, b"\0"))  # of 256 colours, so that indices keep 8 bits
+        path.write_bytes(pillow_bytes(picture, kind, **_OPTIONS.get(suffix, {}), **beside))
+
+
+def coloured(pixels: Array, palette: bytes | None) -> Array:
+    """Return the colours (rows, cols, 3 or 4) of indices (rows, cols) or, with alpha, (rows, cols, 2).
+
+    Without a palette return the pixels unchanged.
+    """
+    if palette is None:
+        return pixels
+    indices = pixels if pixels.ndim == 3 else pixels[..., None]
+    colours = np.frombuffer(palette.ljust(768, b"\0"), np.uint8).reshape(-1, 3)[indices[..., 0]]
+    return np.concatenate([colours, indices[..., 1:]], -1)
 
 
 def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
