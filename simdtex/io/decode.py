@@ -31,8 +31,11 @@ ORIENTATION = 0x0112
 _KEPT = (0x010E, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 """EXIF tags that are kept in addition to exposure and place: description, camera, software, date, author, rights."""
 
-_SIZE = (0xA002, 0xA003)
-"""The EXIF tags of width and height."""
+_SOFTWARE, _DESCRIPTION = 0x0131, 0x010E
+"""EXIF and TIFF tags that programs write for themselves."""
+
+_OWN = (0xA002, 0xA003, 0xA005)
+"""EXIF tags that belong to one file: width, height, and the position of a directory."""
 
 _PNM = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" + rb"\s")
 """The header of PGM and PPM: the kind, the width, the height and the largest value."""
@@ -167,17 +170,34 @@ def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
     with suppress(Exception):  # a damaged second frame does not invalidate the first
         more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
     with suppress(Exception):  # nor is damaged EXIF
-        found, kept = picture.getexif(), PIL.Image.Exif()
+        found = picture.getexif()
         orientation = int(found.get(ORIENTATION, 1))
-        for tag in _KEPT:
-            if tag in found:
-                kept[tag] = found[tag]
-        for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
-            if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _SIZE}:
-                kept[ifd] = values
-        exif = kept.tobytes() if kept else None
+        exif = _exif(found)
     dpi = _dpi(picture.info.get("dpi"), orientation)
     return orientation, Metadata(None if picture.mode in ("CMYK", "LAB") else profile, dpi, exif, more)
+
+
+def _exif(found: PIL.Image.Exif) -> bytes | None:
+    """Return the part of the EXIF data that is kept."""
+    kept = PIL.Image.Exif()
+    for tag in _KEPT:
+        if tag in found:
+            value = found[tag]
+            kept[tag] = value.encode("latin-1") if isinstance(value, str) else value  # as Pillow decodes, in any encoding
+    for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
+        if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _OWN}:
+            kept[ifd] = values
+    return kept.tobytes() if kept else None
+
+
+def _exif_of_tiff(data: bytes, tiff: Any) -> bytes | None:
+    """Return the EXIF data of a TIFF, without the description in which programs keep the axes of a stack."""
+    found = PIL.Image.Exif()
+    found.load(data)
+    if tiff.is_imagej or tiff.is_ome or tiff.is_shaped:
+        found.pop(_DESCRIPTION, None)
+    kept = {*_KEPT, PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo} & {*found}
+    return _exif(found) if kept - {_SOFTWARE} else None
 
 
 def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
@@ -228,10 +248,13 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
             told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
             dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
             metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
+        with suppress(Exception):
+            metadata = metadata._replace(exif=_exif_of_tiff(data, tiff))
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
             pixels, found = _read_pillow(data, most, palette)
-            return pixels, metadata._replace(profile=found.profile, palette=found.palette)  # without that of print colours
+            # without the profile of print colours
+            return pixels, metadata._replace(profile=found.profile, palette=found.palette)
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()

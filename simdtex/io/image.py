@@ -427,9 +427,9 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG are
         grey and colour with alpha; WebP turns grey into equal RGB.
     metadata : Metadata, optional
-        The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels;
-        PNG, JPEG and WebP the EXIF data; and all but WebP and ``.npy`` the pixels per inch. Of
-        indices, PNG and BMP keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
+        The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
+        and the EXIF data (TIFF up to 4 GB); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
+        keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
 
     Raises
     ------
@@ -508,7 +508,8 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
     pages = list(pages)
     channels = 1 if pages[0].ndim == 2 else pages[0].shape[2]
     colours = 3 if channels in (3, 4) else 1
-    with tifffile.TiffWriter(path, bigtiff=len(pages) * pages[0].nbytes > _BIG) as file:
+    big = len(pages) * pages[0].nbytes > _BIG
+    with tifffile.TiffWriter(path, bigtiff=big, byteorder="<") as file:
         for page in pages:
             file.write(
                 page,
@@ -522,6 +523,35 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
                 resolution=metadata.dpi,
                 resolutionunit="inch" if metadata.dpi else None,
             )
+    if metadata.exif and not big:
+        _add_exif(path, metadata.exif)
+
+
+def _add_exif(path: Path, exif: bytes) -> None:
+    """Add EXIF data to the first page of a little-endian TIFF, whose directory moves to the end of the file."""
+    found = PIL.Image.Exif()
+    found.load(exif)
+    found.update([(tag, value.encode("latin-1")) for tag, value in found.items() if isinstance(value, str)])
+    found.endian = "<"
+
+    def number(part: bytes) -> int:
+        return int.from_bytes(part, "little")
+
+    with path.open("r+b") as file:
+        file.seek(number(file.read(8)[4:]))
+        entries = [file.read(12) for _ in range(number(file.read(2)))]
+        following = file.read(4)
+        entries = [entry for entry in entries if number(entry[:2]) not in found]
+        end = file.seek(0, os.SEEK_END)
+        place = end + end % 2
+        added = found.tobytes(place + 12 * len(entries))[14:]  # after two headers
+        values = 2 + 12 * number(added[:2])
+        entries += [added[start : start + 12] for start in range(2, values, 12)]
+        entries.sort(key=lambda entry: number(entry[:2]))
+        file.seek(place)
+        file.write(len(entries).to_bytes(2, "little") + b"".join(entries) + following + added[values + 4 :])
+        file.seek(4)
+        file.write(place.to_bytes(4, "little"))
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:
