@@ -83,7 +83,17 @@ def test_labels_are_a_training_image(folder):
     write_labels("known.png", np.where(np.arange(40) < 20, 1, 2).astype(np.uint8) * np.ones((24, 1), np.uint8))
     with PIL.Image.open("known.png") as picture:
         picture.save("known.png", transparency=2)
-    words = ["estimate", "labels.png", "-o", "maps.npz", "--known", "known.png", "--categorical", "--device", "reference"]
+    words = [
+        "estimate",
+        "labels.png",
+        "-o",
+        "maps.npz",
+        "--known",
+        "known.png",
+        "--categorical",
+        "--device",
+        "reference",
+    ]
     assert CliRunner().invoke(main, words).exit_code == 0
     known = np.ma.masked_equal(read_labels("known.png"), 0)
     wanted = simdtex.estimate(labels, known=known, categorical=True, device="reference")

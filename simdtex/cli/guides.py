@@ -37,26 +37,23 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
 
     The guides of several samples are parted by commas.
 
-    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, or all
-    guides have palettes; they become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
+    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
+    palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
+    free: it has NaN there.
     """
     from simdtex.io.image import coloured
-    from simdtex.methods.mrf.options import few
+    from simdtex.methods.mrf.options import CATEGORIES, few
     from simdtex.methods.mrf.plan import LABELS
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
-    found = [read_pixels(path, palette=True) for path in (*paths, out)]
-    palettes = [metadata.palette if metadata else None for *_, metadata in found]
-    *own, wanted = [one[0] for one in found]
-    if labels is None and all(palettes) and len(set().union(*(planes(one)[..., 0].flat for one in own))) <= LABELS:
-        labels = True
-    several = len({*palettes} - {None}) > 1  # which may have the same colours in other orders
-    if all(palettes) or several or max(map(channels, (*own, wanted))) > 2:
-        *own, wanted = map(coloured, (*own, wanted), palettes)
-    lies = found[-1][1]
+    pictures, lie, metadata = zip(*(read_pixels(path, palette=True) for path in (*paths, out)), strict=True)
+    palettes, lies = [one and one.palette for one in metadata], lie[-1]
+    if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
+        pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
+    *own, wanted = pictures
     wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     free = free | unknown_in(planes(wanted))
-    are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
+    are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or are_few):
         known = np.unique(np.concatenate([one.reshape(-1, channels(one)) for one in own]), axis=0)

@@ -25,14 +25,11 @@ Array = NDArray[Any]
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
 """The only Pillow readers in use, since some others start programs, for example the one of PostScript."""
 
-ORIENTATION = 0x0112
-"""The EXIF and TIFF tag of the orientation."""
+ORIENTATION, DESCRIPTION = 0x0112, 0x010E
+"""The EXIF and TIFF tags of the orientation and of the description."""
 
-_KEPT = (0x010E, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+_KEPT = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 """EXIF tags that are kept in addition to exposure and place: description, camera, software, date, author, rights."""
-
-_SOFTWARE, _DESCRIPTION = 0x0131, 0x010E
-"""EXIF and TIFF tags that programs write for themselves."""
 
 _OWN = (0xA002, 0xA003, 0xA005)
 """EXIF tags that belong to one file: width, height, and the position of a directory."""
@@ -181,23 +178,12 @@ def _exif(found: PIL.Image.Exif) -> bytes | None:
     """Return the part of the EXIF data that is kept."""
     kept = PIL.Image.Exif()
     for tag in _KEPT:
-        if tag in found:
-            value = found[tag]
-            kept[tag] = value.encode("latin-1") if isinstance(value, str) else value  # as Pillow decodes, in any encoding
+        if tag in found:  # a text in any encoding, which Pillow reads as Latin-1, but writes as ASCII
+            kept[tag] = found[tag].encode("latin-1") if isinstance(found[tag], str) else found[tag]
     for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
         if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _OWN}:
             kept[ifd] = values
     return kept.tobytes() if kept else None
-
-
-def _exif_of_tiff(data: bytes, tiff: Any) -> bytes | None:
-    """Return the EXIF data of a TIFF, without the description in which programs keep the axes of a stack."""
-    found = PIL.Image.Exif()
-    found.load(data)
-    if tiff.is_imagej or tiff.is_ome or tiff.is_shaped:
-        found.pop(_DESCRIPTION, None)
-    kept = {*_KEPT, PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo} & {*found}
-    return _exif(found) if kept - {_SOFTWARE} else None
 
 
 def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
@@ -249,12 +235,15 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
             dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
             metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
         with suppress(Exception):
-            metadata = metadata._replace(exif=_exif_of_tiff(data, tiff))
+            found = PIL.Image.Exif()
+            found.load(data)
+            if tiff.is_imagej or tiff.is_ome or tiff.is_shaped:  # programs that describe the axes of a stack
+                found.pop(DESCRIPTION, None)
+            metadata = metadata._replace(exif=_exif(found))
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
-            pixels, found = _read_pillow(data, most, palette)
-            # without the profile of print colours
-            return pixels, metadata._replace(profile=found.profile, palette=found.palette)
+            pixels, read = _read_pillow(data, most, palette)
+            return pixels, metadata._replace(profile=read.profile, palette=read.palette)  # no profile of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()

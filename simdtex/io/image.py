@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import struct
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -364,6 +365,9 @@ LOSSY = (".jpg", ".jpeg")
 _MARKER = 65533
 """The most bytes of EXIF that a JPEG holds."""
 
+_ENTRY = np.dtype([("tag", "<u2"), ("value", "V10")])
+"""An entry of a directory of TIFF."""
+
 _BIG = 2**32 - 2**25
 """The size in bytes from which a TIFF must be a BigTIFF."""
 
@@ -533,25 +537,19 @@ def _add_exif(path: Path, exif: bytes) -> None:
     found.load(exif)
     found.update([(tag, value.encode("latin-1")) for tag, value in found.items() if isinstance(value, str)])
     found.endian = "<"
-
-    def number(part: bytes) -> int:
-        return int.from_bytes(part, "little")
-
     with path.open("r+b") as file:
-        file.seek(number(file.read(8)[4:]))
-        entries = [file.read(12) for _ in range(number(file.read(2)))]
-        following = file.read(4)
-        entries = [entry for entry in entries if number(entry[:2]) not in found]
-        end = file.seek(0, os.SEEK_END)
-        place = end + end % 2
-        added = found.tobytes(place + 12 * len(entries))[14:]  # after two headers
-        values = 2 + 12 * number(added[:2])
-        entries += [added[start : start + 12] for start in range(2, values, 12)]
-        entries.sort(key=lambda entry: number(entry[:2]))
+        file.seek(*struct.unpack("<4xI", file.read(8)))
+        own = np.frombuffer(file.read(12 * int.from_bytes(file.read(2), "little")), _ENTRY)
+        own, following = own[~np.isin(own["tag"], list(found))], file.read(4)
+        place = -(-file.seek(0, os.SEEK_END) // 2) * 2
+        added = found.tobytes(place + own.nbytes)[14:]  # after two headers
+        more = np.frombuffer(added, _ENTRY, int.from_bytes(added[:2], "little"), 2)
+        entries = np.concatenate([own, more])
         file.seek(place)
-        file.write(len(entries).to_bytes(2, "little") + b"".join(entries) + following + added[values + 4 :])
+        file.write(struct.pack("<H", len(entries)) + entries[entries["tag"].argsort()].tobytes())
+        file.write(following + added[2 + more.nbytes + 4 :])
         file.seek(4)
-        file.write(place.to_bytes(4, "little"))
+        file.write(struct.pack("<I", place))
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:

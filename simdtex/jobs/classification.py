@@ -20,7 +20,7 @@ from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
 from simdtex.methods.classifier.options import Options
 from simdtex.model.pictures import Mask, check_alike, completed
-from simdtex.options import real_array, resolve
+from simdtex.options import real_array, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -211,6 +211,10 @@ def _check_count(count: int, bands: int) -> None:
         raise ValueError(f"the picture has {bands} bands; give {BANDS} at most, say its principal components")
 
 
+PARAMETERS = ("channel_axis", "rng", "device", *table(Options))
+"""The arguments of `TextureClassifier`."""
+
+
 class TextureClassifier:
     """A classifier that is trained once, by the conventions of scikit-learn.
 
@@ -258,14 +262,13 @@ class TextureClassifier:
         **options: Any,
     ) -> None:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
-        self._options: dict[str, Any] = {}
-        self.set_params(**options)
+        self.set_params(**vars(resolve(Options, "classify", {})) | options)
 
     def __getstate__(self) -> dict[str, Any]:
-        state, device = vars(self) | {"_machine": None}, self.device
+        device: Any = self.device
         if kind := getattr(device, "kind", None):
-            state["device"] = "reference" if kind == "reference" else getattr(device, "info", device).name
-        return state
+            device = "reference" if kind == "reference" else getattr(device, "info", device).name
+        return vars(self) | {"device": device, "_machine": None}
 
     def __sklearn_clone__(self) -> Self:
         parameters = {name: one if name == "device" else deepcopy(one) for name, one in self.get_params().items()}
@@ -279,20 +282,17 @@ class TextureClassifier:
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Return the arguments of the constructor, with all options; ``deep`` makes no difference."""
-        own = {"channel_axis": self.channel_axis, "rng": self.rng, "device": self.device}
-        return own | vars(resolve(Options, "classify", {})) | self._options
+        return {name: vars(self)[name] for name in PARAMETERS}
 
     def set_params(self, **parameters: Any) -> Self:
         """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`.
 
         Raises ValueError, without any change, if a name is unknown.
         """
-        valid = self.get_params()
-        if strange := [name for name in parameters if name not in valid]:
-            raise ValueError(f"TextureClassifier has no parameter {strange[0]!r}; choose from: {', '.join(valid)}")
-        own = ("channel_axis", "rng", "device")
-        vars(self).update((name, parameters.pop(name)) for name in own if name in parameters)
-        self._options |= parameters
+        for name in parameters:
+            if name not in PARAMETERS:
+                raise ValueError(f"TextureClassifier has no parameter {name!r}; choose from: {', '.join(PARAMETERS)}")
+        vars(self).update(parameters)
         return self
 
     def fit(self, image: ArrayLike | Sequence[ArrayLike], labels: Any) -> Self:
@@ -322,7 +322,7 @@ class TextureClassifier:
         self.classes_ = np.array(list(found))
         self.n_features_in_ = shown[0][0].shape[-1]
         self._like = shown[0][0][:1, :1].copy()
-        self._chosen = resolve(Options, "classify", self._options)
+        self._chosen = resolve(Options, "classify", {name: vars(self)[name] for name in table(Options)})
         self._seed, machine = as_seed(self.rng), open_machine(self.device)
         self._names = {label: str(label) for label in found}
         names = list(self._names.values())
