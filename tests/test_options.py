@@ -99,7 +99,6 @@ def test_the_ends_of_every_range_work(method, given):
 
 RUNS = {
     "mrf": lambda picture: simdtex.synthesize(picture, (16, 16), order=8, rng=1, device="reference"),
-    "multires": lambda picture: simdtex.synthesize(picture, (16, 16), method="multires", rng=1, device="reference"),
     "mix": lambda picture: simdtex.mix([picture, picture[::-1]], (16, 16), rng=1, device="reference"),
     "hard data": lambda picture: simdtex.place_hard_data([[0, 0, x] for x in picture[0]], (1, 1), several="mean").data,
 }

@@ -336,17 +336,15 @@ class TextureClassifier:
 
     def predict_proba(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return the probability of each class at each pixel, (rows, cols, classes), as `Output.probability`."""
-        _, output = self._run(image)
-        assert output.probability is not None
-        return output.probability
+        probability: NDArray[np.float32] = self._run(image)[1].probability
+        return probability
 
     def predict_fit(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return how well each class fits each pixel, (rows, cols, classes), as `Output.fit`."""
-        _, output = self._run(image)
-        assert output.fit is not None
-        return output.fit
+        fit: NDArray[np.float32] = self._run(image)[1].fit
+        return fit
 
-    def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Output]:
+    def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Any]:
         if not hasattr(self, "_model"):
             raise ValueError("the classifier is not trained; call fit first")
         pixels, unknown = check_picture(image, self.channel_axis)
