@@ -360,6 +360,16 @@ def check_real(name: str, array: NDArray[Any]) -> None:
         raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
 
 
+LARGEST = 1e100
+"""The largest value for which figures are computed: sums of squares are then finite."""
+
+
+def moderate(name: str, *arrays: NDArray[Any]) -> None:
+    """Raise ValueError if arrays have values beyond `LARGEST`."""
+    if any(np.abs(array, dtype=np.float64).max() > LARGEST for array in arrays):
+        raise ValueError(f"{name} has values beyond {LARGEST:g}: give them in a larger unit")
+
+
 def real_array(name: str, value: Any) -> NDArray[Any]:
     """Return the value as an array of finite real numbers; raise if it is not one."""
     unmasked(name, value)

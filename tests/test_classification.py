@@ -1,11 +1,23 @@
 """`simdtex.classify` and `simdtex.TextureClassifier`: what goes in, what comes out, and what is refused."""
 
+import copy
+import pickle
+import subprocess
+import sys
+
+import joblib
 import numpy as np
 import pytest
 from cases import assert_same_bits, texture
+from sklearn.base import clone, is_classifier
+from sklearn.exceptions import NotFittedError, SkipTestWarning
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils import estimator_checks, get_tags
 
 import simdtex
 from simdtex import Checkpoint
+from simdtex.methods.classifier import Options
 
 LEFT, RIGHT = texture((24, 20), seed=1), texture((24, 20), seed=2)[:, ::-1] // 3
 PICTURE = np.hstack([LEFT, RIGHT])
@@ -166,15 +178,64 @@ def test_the_estimator_is_trained_once():
 
 
 def test_the_estimator_has_the_parameters_of_its_constructor():
-    """As `sklearn.base.clone` needs them."""
     found = simdtex.TextureClassifier(exemplars=50, rng=3)
-    assert found.get_params() == {"channel_axis": None, "rng": 3, "device": None, "exemplars": 50}
-    twin = type(found)(**found.get_params())
+    own = {"channel_axis": None, "rng": 3, "device": None, **vars(Options()), "exemplars": 50}
+    assert found.get_params() == own
+    twin = clone(found)
     assert twin.set_params(rng=4, weight=2.0) is twin
-    assert twin.get_params() == {"channel_axis": None, "rng": 4, "device": None, "exemplars": 50, "weight": 2.0}
-    assert found.get_params()["rng"] == 3
-    clone = pytest.importorskip("sklearn.base").clone
-    assert clone(found).get_params() == found.get_params()
+    assert twin.get_params() == own | {"rng": 4, "weight": 2.0} and found.get_params() == own
+    for unknown in (lambda: twin.set_params(rng=9, nonsense=1), lambda: type(twin)(nonsense=1)):
+        with pytest.raises(ValueError, match="no parameter 'nonsense'; choose from: channel_axis, rng, device, order"):
+            unknown()
+    assert twin.get_params()["rng"] == 4
+    generator = np.random.default_rng(1)
+    assert clone(twin.set_params(rng=generator)).rng is not generator
+
+
+def test_scikit_learn_takes_the_estimator_for_a_classifier():
+    found = simdtex.TextureClassifier(**QUICK, unknown=0.0)
+    assert is_classifier(found) and get_tags(found).target_tags.required
+    with pytest.warns(SkipTestWarning, match="requires input"):
+        assert {one["status"] for one in estimator_checks.check_estimator(found)} == {"passed"}
+    name = "TextureClassifier"
+    estimator_checks.check_valid_tag_types(name, found)
+    estimator_checks.check_estimator_repr(name, found)
+    estimator_checks.check_get_params_invariance(name, found)
+    estimator_checks.check_set_params(name, found)
+    estimator_checks.check_parameters_default_constructible(name, found)
+    pipeline = make_pipeline(FunctionTransformer(np.flipud), found)
+    with pytest.raises(NotFittedError):
+        pipeline.predict(PICTURE)
+    labels = pipeline.set_params(textureclassifier__levels=2).fit(PICTURE, STROKES[::-1]).predict(PICTURE)
+    own = simdtex.TextureClassifier(**QUICK, unknown=0.0, levels=2).fit(PICTURE[::-1], STROKES[::-1])
+    assert (labels == own.predict(PICTURE[::-1])).all()
+    assert is_classifier(pipeline) and (clone(pipeline).fit(PICTURE, STROKES).classes_ == [3, 7]).all()
+
+
+LOADED = """
+import sys
+import joblib, numpy
+picture, file, labels = sys.argv[1:]
+numpy.save(labels, joblib.load(file).predict(numpy.load(picture)))
+"""
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(machine, tmp_path, dtype):
+    picture = PICTURE.astype(dtype)
+    found = simdtex.TextureClassifier(**QUICK | {"device": machine, "levels": 1}).fit(picture, STROKES)
+    labels, size = found.predict(picture), len(pickle.dumps(found))
+    for copied in (copy.deepcopy(found), pickle.loads(pickle.dumps(found)), clone(found).fit(picture, STROKES)):
+        assert_same_bits(copied.predict(picture), labels)
+    assert isinstance(copy.deepcopy(found).device, str) and clone(found).device is found.device is machine
+    joblib.dump(found, tmp_path / "found.joblib")
+    np.save(tmp_path / "picture.npy", picture)
+    names = [tmp_path / name for name in ("picture.npy", "found.joblib", "labels.npy")]
+    subprocess.run([sys.executable, "-c", LOADED, *names], check=True, timeout=120)
+    assert_same_bits(np.load(tmp_path / "labels.npy"), labels)
+    larger = np.pad(picture, ((0, 200), (0, 200)))
+    found.fit(larger, np.pad(STROKES, ((0, 200), (0, 200))))
+    assert len(pickle.dumps(found)) == pytest.approx(size, rel=0.05), "the picture is not kept"
 
 
 BAD = {

@@ -72,7 +72,37 @@ def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
     assert (image.read("labels.tif").pixels == labels).all()
 
 
+def test_labels_are_a_training_image(folder):
+    assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
+    labels, common = read_labels("labels.png"), ["--categorical", "--order", 2, "--device", "reference"]
+    words = ["simulate", "labels.png", "-o", "many.npz", "--seed", 5, *common]
+    result = CliRunner().invoke(main, [*map(str, words)])
+    assert result.exit_code == 0, result.output
+    wanted = simdtex.simulate(labels, 1, categorical=True, order=2, rng=5, device="reference")
+    assert (np.load("many.npz")["values"] == wanted.values).all()
+    write_labels("known.png", np.where(np.arange(40) < 20, 1, 2).astype(np.uint8) * np.ones((24, 1), np.uint8))
+    with PIL.Image.open("known.png") as picture:
+        picture.save("known.png", transparency=2)
+    words = [
+        "estimate",
+        "labels.png",
+        "-o",
+        "maps.npz",
+        "--known",
+        "known.png",
+        "--categorical",
+        "--device",
+        "reference",
+    ]
+    assert CliRunner().invoke(main, words).exit_code == 0
+    known = np.ma.masked_equal(read_labels("known.png"), 0)
+    wanted = simdtex.estimate(labels, known=known, categorical=True, device="reference")
+    assert (np.load("maps.npz")["probability"] == wanted.probability.values).all()
+
+
 def test_strokes_with_a_palette(folder):
+    with PIL.Image.open("strokes.png") as picture:  # index 0 transparent, as painting programs save it
+        picture.point([7, *range(1, 256)]).save("strokes.png", transparency=7)
     result = run("picture.png", "--strokes", "strokes.png", "-o", "labels.npy")
     assert result.exit_code == 0, result.output
     assert set(np.unique(np.load("labels.npy"))) <= {0, 1}

@@ -1,6 +1,7 @@
 """``simdtex synth`` with several samples, masks, known values and guides, end to end."""
 
 import numpy as np
+import PIL.Image
 import pytest
 from click.testing import CliRunner
 
@@ -144,6 +145,59 @@ def test_categories_are_never_mixed(folder):
     facies = pixels(folder, "facies.tif")
     assert set(np.unique(out)) <= {0, 3}
     assert np.array_equal(out, simdtex.synthesize(facies, (16, 16), categorical=True, **OPTIONS))
+
+
+def indexed(path, indices, colours, **options):
+    """Write a picture with a palette."""
+    picture = PIL.Image.fromarray(indices)
+    picture.putpalette(np.array(colours, np.uint8).tobytes())
+    picture.save(path, **options)
+
+
+@pytest.mark.parametrize("command", ["synth", "extend", "fill"])
+def test_a_palette_is_categories_and_is_kept(folder, command):
+    facies = pixels(folder, "facies.tif")
+    indexed(folder / "facies.png", facies, [RED, RED, GREEN, BLUE])
+    more = {"synth": ["--size", 16], "extend": ["--right", 3], "fill": ["--mask", "hole.png"]}[command]
+    image.write(folder / "hole.png", np.pad(np.full((4, 4), 255, np.uint8), ((9, 11), (8, 8))))
+    for name in ("facies.png", "facies.tif"):
+        words = [command, name, *more, "-o", name.replace("facies", "out"), "--order", 2, "--seed", 5, "--categorical"]
+        result = run(folder, *words, "--device", "reference")
+        assert result.exit_code == 0, result.output
+    with PIL.Image.open(folder / "out.png") as made:
+        assert made.mode == "P" and np.array_equal(made, pixels(folder, "out.tif"))
+        assert made.getpalette()[:12] == [*RED, *RED, *GREEN, *BLUE]
+
+
+def test_known_categories_have_the_palette_of_the_sample(folder):
+    facies, colours = pixels(folder, "facies.tif"), [RED, RED, GREEN, BLUE]
+    known = np.where(np.arange(20) % 7, np.uint8(1), facies[:16])
+    indexed(folder / "facies.png", facies, colours)
+    indexed(folder / "known.png", known, colours[:3], transparency=1)
+    args = ["facies.png", "--known", "known.png", "--size", "20x16", "-o", "out.tif", "--categorical"]
+    hidden = np.ma.MaskedArray(known, known == 1)
+    found = simdtex.synthesize(facies, (16, 20), known=hidden, categorical=True, **OPTIONS)
+    assert np.array_equal(made(folder, *args), found)
+    indexed(folder / "known.png", known, colours[::-1], transparency=1)
+    result = synth(folder, *args)
+    assert result.exit_code == 2 and "facies.png have different palettes; save both with the same" in result.output
+
+
+def test_guides_with_palettes_are_labels_by_their_colours(folder):
+    """However many there are, and in whatever order; or by their indices, beside numbers."""
+    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "wanted.png"))
+    options = {"guide_weight": 4.0, "labels": True} | OPTIONS
+    spread = (np.arange(480).reshape(24, 20) // 8).astype(np.uint8)  # too many for other colours to be labels
+    tones = np.stack([np.arange(256), np.arange(256)[::-1], np.full(256, 7)], -1)
+    indexed(folder / "labels.png", spread, tones)
+    indexed(folder / "wanted.png", 255 - spread[:16, :18], tones[::-1])
+    args = ["sample.png", "-o", "out.tif", "--guide-weight", 4, "--guide"]
+    found = simdtex.synthesize(sample, (16, 18), guide=(spread, spread[:16, :18]), **options)
+    assert np.array_equal(made(folder, *args, "labels.png=wanted.png"), found)
+    indexed(folder / "wanted.png", numbered(wanted), [GREEN, RED])
+    image.write(folder / "labels.tif", numbered(labels))
+    found = simdtex.synthesize(sample, (16, 18), guide=(numbered(labels), numbered(wanted)), **options)
+    assert np.array_equal(made(folder, *args, "labels.tif=wanted.png"), found)
 
 
 def numbered(picture):

@@ -252,6 +252,10 @@ BAD = {
         ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical"],
         "line 8 and line 10 of the hard data are both at row 7, column 10",
     ),
+    "a mean of categories": (
+        ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical", "--several", "mean"],
+        "several is 'mean', which invents categories; give 'most'",
+    ),
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
     "an origin of one number": ([*GREY, "--origin", "1"], "origin is [1.0]; give (x, y) or (x, y, z)"),
     "no origin": ([*GREY, "--origin", ""], "must be numbers"),

@@ -7,6 +7,7 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex.io.hard_data import HardData
 
 TRAINING = (np.add.outer(np.arange(20) // 3, np.arange(24) // 5) % 3).astype(np.uint8) * 4
 SHAPE = (9, 11)
@@ -131,6 +132,14 @@ BAD = {
     "nearest": ({"nearest": 65}, "nearest is 65; give 64 or fewer"),
     "reach": ({"reach": 20}, "reach is 20; give 19 or fewer"),
     "bandwidth": ({"bandwidth": 0}, "bandwidth is 0; give"),
+    "values": (
+        {"training": TRAINING * 1e307, "categorical": False},
+        "the training image has values beyond 1e.100: give them in a larger unit",
+    ),
+    "several": (
+        {"known": HardData(np.zeros((2, 2)), np.array([[0.0], [8]]), ("facies",)), "several": "mean"},
+        "several is 'mean', which invents categories; give 'most', or 'refuse'",
+    ),
     "category": ({"known": data(TRAINING + 1)}, "known has the category [159] and the sample has 0, 4, 8"),
     "shape": ({"shape": (8, 9)}, "known is 9x11x1 and the output 8x9x1"),
 }
@@ -140,5 +149,6 @@ BAD = {
 def test_bad_input_is_refused_with_a_remedy(case):
     change, words = BAD[case]
     with pytest.raises(ValueError, match=words) as caught:
-        simdtex.estimate(TRAINING, **{"known": data(TRAINING), "categorical": True, "device": "reference"} | change)
+        call = {"training": TRAINING, "known": data(TRAINING), "categorical": True, "device": "reference"}
+        simdtex.estimate(**call | change)
     assert "\n" not in str(caught.value)

@@ -10,7 +10,7 @@ from simdtex.ops.exemplars import TOGETHER, exemplars, stacked
 
 
 def run(machine, features, classes):
-    known = stacked(machine, [np.asarray(one, np.float32) for one in classes])
+    known = stacked([np.asarray(one, np.float32) for one in classes]).on(machine)
     return machine.get(exemplars(machine, machine.put(np.asarray(features, np.float32)), known))
 
 
@@ -58,7 +58,7 @@ def test_the_widest_neighbourhoods_are_exact(machine):
 
 
 def test_classes_are_filled_up_by_their_own_last_exemplar():
-    known = stacked(REFERENCE, [np.ones((3, 2), np.float32), np.full((TOGETHER + 1, 2), 2, np.float32)])
+    known = stacked([np.ones((3, 2), np.float32), np.full((TOGETHER + 1, 2), 2, np.float32)])
     assert known.starts.tolist() == [0, TOGETHER, 3 * TOGETHER]
     assert (known.doubled[:TOGETHER] == -2).all() and (known.doubled[TOGETHER:] == -4).all()
     assert known.squares.tolist() == [2.0] * TOGETHER + [8.0] * 2 * TOGETHER

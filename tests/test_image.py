@@ -6,6 +6,7 @@ import os
 import stat
 import struct
 import zlib
+from itertools import product
 
 import imagecodecs
 import numpy as np
@@ -88,6 +89,46 @@ def test_one_bit_and_palette_and_print_colours(tmp_path):
     for suffix in ("tif", "jpg"):
         rgb.convert("CMYK").save(tmp_path / f"cmyk.{suffix}")
         assert image.read(tmp_path / f"cmyk.{suffix}").pixels.shape == (8, 9, 3)
+
+
+HALF = b"\xff\x80\x00"
+
+
+@pytest.mark.parametrize(
+    "suffix, transparent", [*product(["png", "gif", "tif", "bmp"], [None]), ("png", 2), ("gif", 2), ("png", HALF)]
+)
+def test_a_palette_is_read_as_indices_and_written_back(tmp_path, suffix, transparent):
+    indices = noise((8, 9), np.uint8) % 5
+    colours = noise((5, 3), np.uint8, seed=2)
+    colours[3] = colours[1]  # what colours could not tell apart
+    picture = PIL.Image.fromarray(indices)
+    picture.putpalette(colours.tobytes())
+    picture.save(tmp_path / f"a.{suffix}", **{} if transparent is None else {"transparency": transparent})
+    plain, found = (image.read(tmp_path / f"a.{suffix}", palette=palette) for palette in (False, True))
+    assert plain.pixels.shape[2] in (3, 4) and plain.metadata.palette is None
+    assert found.metadata.palette[:15] == colours.tobytes()
+    if transparent is None:
+        np.testing.assert_array_equal(found.pixels, indices)
+        for out in ("png", "bmp"):
+            image.write(tmp_path / f"b.{out}", found.pixels, found.metadata)
+            with PIL.Image.open(tmp_path / f"b.{out}") as back:
+                assert back.mode == "P" and np.array_equal(back, indices)
+                assert np.array_equal(back.convert("RGB"), plain.pixels)
+        for out, held in (("webp", plain.pixels), ("tif", indices), ("npy", indices)):
+            image.write(tmp_path / f"b.{out}", found.pixels, found.metadata)
+            np.testing.assert_array_equal(image.read(tmp_path / f"b.{out}").pixels, held)
+    else:
+        np.testing.assert_array_equal(found.pixels[..., 0], indices)
+        np.testing.assert_array_equal(found.pixels[..., 1], plain.pixels[..., 3])
+        np.testing.assert_array_equal(image.coloured(found.pixels, found.metadata.palette), plain.pixels)
+
+
+def test_a_picture_without_a_palette_has_no_indices(tmp_path):
+    for suffix, shape in (("png", (8, 9)), ("png", (8, 9, 4)), ("tif", (8, 9, 3)), ("jpg", (8, 9, 3))):
+        image.write(tmp_path / f"a.{suffix}", noise(shape, np.uint8))
+        plain, found = (image.read(tmp_path / f"a.{suffix}", palette=palette) for palette in (False, True))
+        np.testing.assert_array_equal(found.pixels, plain.pixels)
+        assert found.metadata == plain.metadata
 
 
 def test_first_frame_of_an_animation(tmp_path):

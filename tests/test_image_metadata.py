@@ -8,7 +8,7 @@ import PIL.Image
 import pytest
 import tifffile
 from click.testing import CliRunner
-from PIL import ExifTags, ImageCms
+from PIL import ExifTags, ImageCms, TiffImagePlugin
 from volumes import noise
 
 from simdtex.cli import main
@@ -17,14 +17,14 @@ from simdtex.io import image
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 WIDE = SRGB.replace(b"s\0R\0G\0B", b"W\0i\0d\0e")  # another name makes it another profile
 GREY = SRGB[:16] + b"GRAY" + SRGB[20:]
-DATE, WIDTH, PREVIEW = 0x9003, 0xA002, 0x0201
+DATE, WIDTH, INTEROP, PREVIEW = 0x9003, 0xA002, 0xA005, 0x0201
 
 
 def exif(orientation=1):
     """The EXIF of a photo: who took it, when and where, how it is turned, its width, and a preview."""
     found = PIL.Image.Exif()
     found[0x0112], found[0x010F] = orientation, "Camera"
-    found[0x8769] = {DATE: "2026:01:02 03:04:05", WIDTH: 20}
+    found[0x8769] = {DATE: "2026:01:02 03:04:05", WIDTH: 20, INTEROP: 7}
     found[0x8825] = {1: "N", 2: (1.0, 2.0, 3.0)}
     return found
 
@@ -58,12 +58,44 @@ def test_what_a_file_says_of_its_pixels_is_written(tmp_path, kind, out):
     assert profile == WIDE
     if out != "webp" and kind != "webp":  # which has no place for it
         assert dpi == (300, 200)
-    if kind != "tif" and out != "tif":
+    if kind != "tif":
         assert said[0x010F] == "Camera" and dated[DATE] == "2026:01:02 03:04:05" and placed[2] == (1.0, 2.0, 3.0)
-    assert WIDTH not in dated, "it may have changed"
+    assert not {WIDTH, INTEROP} & {*dated}, "which are those of another file"
     back = image.read(tmp_path / f"b.{out}")
     if out != "jpg":
         np.testing.assert_array_equal(back.pixels, pixels)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("channels", [1, 3, 5])
+def test_a_tiff_of_every_kind_keeps_exif(tmp_path, dtype, channels):
+    pixels, long = noise((240, 20, channels), np.uint8).astype(dtype), exif()
+    long[0x8769] = {DATE: "2026:01:02 03:04:05", 0x829A: TiffImagePlugin.IFDRational(1, 200)}
+    long[0x010E], long[0x8298] = "A caption of a photo", "Caf\u00e9".encode()
+    image.write(tmp_path / "a.tif", pixels, image.Metadata(exif=long.tobytes(), dpi=(300, 200)))
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        np.testing.assert_array_equal(file.asarray(), pixels[..., 0] if channels == 1 else pixels)
+        tags = file.pages.first.tags
+        assert tags.keys() == sorted(tags.keys()) and tags["ExifTag"].value["ExposureTime"] == (1, 200)
+        assert tags["GPSTag"].value["GPSLatitude"] == (1, 1, 2, 1, 3, 1) and tags["Make"].value == "Camera"
+    back = image.read(tmp_path / "a.tif").metadata
+    assert back.dpi == (300, 200)
+    image.write(tmp_path / "b.png", pixels[..., 0].astype(np.uint8), back)
+    _, _, said, dated, placed = of_file(tmp_path / "b.png")
+    assert said[0x010E] == long[0x010E] and said[0x8298].encode("latin-1") == long[0x8298], "in whatever encoding"
+    assert dated == {DATE: "2026:01:02 03:04:05", 0x829A: 0.005} and placed == {1: "N", 2: (1.0, 2.0, 3.0)}
+
+
+def test_what_a_program_notes_in_a_tiff_is_not_kept(tmp_path):
+    pixels = noise((8, 9), np.uint8)
+    for options in ({"imagej": True}, {"metadata": {"axes": "YX"}}):
+        tifffile.imwrite(tmp_path / "a.tif", pixels, **options)
+        said = image.read(tmp_path / "a.tif").metadata.exif
+        assert b"axes" not in said and b"ImageJ=" not in said
+    tifffile.imwrite(tmp_path / "a.tif", pixels, imagej=True, extratags=[(0x010F, 2, 0, "Camera", True)])
+    image.write(tmp_path / "b.tif", pixels, image.read(tmp_path / "a.tif").metadata)
+    with tifffile.TiffFile(tmp_path / "b.tif") as file:
+        assert file.pages.first.tags["Make"].value == "Camera" and not file.is_imagej
 
 
 def test_a_photo_that_was_turned_is_not_turned_again(tmp_path):

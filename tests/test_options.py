@@ -7,7 +7,7 @@ from math import inf, nan
 import click
 import numpy as np
 import pytest
-from cases import ising
+from cases import assert_same_bits, ising
 from click.testing import CliRunner
 
 import simdtex
@@ -95,6 +95,19 @@ def test_the_ends_of_every_range_work(method, given):
     order = {"order": 1} if method == "mrf" else {}
     made = simdtex.synthesize(SAMPLE, (5, 5), method=method, device="reference", rng=1, **order, **given)
     assert made.shape == (5, 5)
+
+
+RUNS = {
+    "mrf": lambda picture: simdtex.synthesize(picture, (16, 16), order=8, rng=1, device="reference"),
+    "mix": lambda picture: simdtex.mix([picture, picture[::-1]], (16, 16), rng=1, device="reference"),
+    "hard data": lambda picture: simdtex.place_hard_data([[0, 0, x] for x in picture[0]], (1, 1), several="mean").data,
+}
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_a_range_beyond_the_largest_double_does_not_overflow(run):
+    picture = np.random.default_rng(0).uniform(-1.99, 1.99, (24, 24))
+    assert_same_bits(RUNS[run](picture * 2.0**1023), RUNS[run](picture) * 2.0**1023)
 
 
 def test_numbers_of_any_length_are_said_in_one_line():

@@ -142,7 +142,7 @@ def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
     """Read the labels that are to be found; raise if they have another size."""
     from simdtex.model.labels import read_labels
 
-    true, pixels = read_labels(path), picture.array
+    true, pixels = read_labels(path, UNLABELLED), picture.array
     if true.shape != pixels.shape[:2]:
         raise ValueError(f"{path} is {size(true)} and {picture.paths[0]} {size(pixels)}; give labels of its size")
     return true

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.inputs import channels, check_source_map, note_lossy, read_also, read_material, write_arranged
+from simdtex.cli.inputs import Reading, channels, check_source_map, note_lossy, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.maps import folder_of
 from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given, option, report_option
@@ -74,7 +74,7 @@ def extend(
     from simdtex.io import image
 
     folder = folder_of([picture], output, roles)
-    whole = read_material([folder.lead if folder else picture])
+    whole = read_material([folder.lead if folder else picture], Reading(palette=bool(options["categorical"])))
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     sides = {name: options.pop(name) for name in SIDES}
     if size is not None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.inputs import (
+    Reading,
     channels,
     check_profiles,
     check_source_map,
@@ -89,10 +90,11 @@ def fill(
     from simdtex.jobs.filling import widened
 
     folder = folder_of([picture], output, roles)
-    whole = read_material([folder.lead if folder else picture])
+    how = Reading(palette=bool(options["categorical"]))
+    whole = read_material([folder.lead if folder else picture], how)
     pixels, hole = _hole(whole.pixels[0], mask, invert)
     whole = whole._replace(pixels=[pixels])
-    texture = read_material(samples) if samples else None
+    texture = read_material(samples, how) if samples else None
     if texture:
         check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
     if texture and (also or folder):

@@ -47,17 +47,24 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
 
     The guides of several samples are parted by commas.
 
-    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them; they
-    become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
+    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
+    palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
+    free: it has NaN there.
     """
-    from simdtex.methods.mrf.options import few
+    from simdtex.io.image import coloured
+    from simdtex.methods.mrf.options import CATEGORIES, few
+    from simdtex.methods.mrf.plan import LABELS
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
-    own = [read_pixels(path).pixels for path in paths]
-    wanted, _, lies, _ = read_pixels(out)
+    found = [read_pixels(path, Reading(palette=True)) for path in (*paths, out)]
+    pictures, lies = tuple(one.pixels for one in found), found[-1].lies
+    palettes = [one.metadata and one.metadata.palette for one in found]
+    if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
+        pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
+    *own, wanted = pictures
     wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     free = free | unknown_in(planes(wanted))
-    are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
+    are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or are_few):
         known = np.unique(np.concatenate([one.reshape(-1, channels(one)) for one in own]), axis=0)

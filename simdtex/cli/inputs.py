@@ -31,12 +31,14 @@ MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
 class Reading(NamedTuple):
     """How files are read.
 
-    ``deep``: grids and rasters as cells in ascending order of y, and a file of several layers as a volume;
+    ``deep``: grids and rasters as cells in ascending order of y, and a file of several layers as a volume; ``palette``:
+    colours of a palette as their indices, which are categories;
     ``variables``: the names of those of a grid to take; ``missing``: further numbers that mean an unknown value;
     ``valid``: the range of possible values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
     """
 
     deep: bool = False
+    palette: bool = False
     variables: tuple[str, ...] = ()
     missing: tuple[float, ...] = ()
     valid: tuple[float, float] | None = None
@@ -148,27 +150,29 @@ def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = Non
         note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
-def read_picture(path: Path) -> Image:
+def read_picture(path: Path, palette: bool = False) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
 
-    found = image.read(path)
+    found = image.read(path, palette=palette)
     if found.metadata.more:
         note(f"{path} has several frames or pages; only the first is read")
     return found
 
 
 def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> None:
-    """Raise unless pictures that are used together have the same colour profile; without one it is sRGB."""
+    """Raise unless pictures that are used together have the same colour profile, sRGB by default, and palette."""
     from simdtex.io.decode import NOTHING
     from simdtex.io.image import profile_name
 
     # grids and arrays hold numbers alone, in whatever colours
-    told = [(path, one.profile) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
-    for path, profile in told[1:]:
+    told = [(path, one) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
+    for path, other in told[1:]:
         first, own = told[0]
-        if profile != own and (names := [profile_name(profile), profile_name(own)]) != ["sRGB", "sRGB"]:
+        if other.profile != own.profile and {*(names := [profile_name(a.profile) for a in (other, own)])} != {"sRGB"}:
             raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
+        if any(a != b for a, b in zip(other.palette or b"", own.palette or b"", strict=False)):
+            raise ValueError(f"{path} and {first} have different palettes; save both with the same palette")
 
 
 class Read(NamedTuple):
@@ -194,7 +198,7 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
             if volume.is_volume(path):
                 values = volume.read(path)
                 return Read(values if len(values) > 1 else values[0])
-        found = read_picture(path)
+        found = read_picture(path, how.palette)
         return Read(found.pixels, found.metadata)
     grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
     if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
@@ -341,7 +345,7 @@ def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
         return read_table(path, how)
     if name == "region" and not how.deep and not grids.is_grid(path):
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = read_pixels(path, how).pixels
+    pixels = read_pixels(path, how._replace(palette=name == "image_map")).pixels
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
@@ -367,10 +371,12 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
+    If values are ``categorical`` and the samples have one channel, a palette is categories.
     """
     how = how._replace(valid=samples.limits, variables=tuple((how.columns or {}).get("value", ())))
     if is_table(path):
         return read_table(path, how)
+    how = how._replace(palette=how.palette and samples.channel_axis is None)
     values, metadata, lies, _ = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
@@ -388,6 +394,7 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     pairs = _pairs("--categories", options.pop("categories"))
     return Reading(
         deep,
+        bool(options.get("categorical")),
         options.pop("variables", ()),
         options.pop("missing"),
         columns=columns or None,

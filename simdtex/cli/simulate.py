@@ -186,7 +186,8 @@ def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:
 def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
     pictures = material.pixels
-    from simdtex.experiments.ensemble.summary import LARGEST, LEAST
+    from simdtex.experiments.ensemble.summary import LEAST
+    from simdtex.options import LARGEST
     from simdtex.report.page import check_folder
 
     if len(pictures) > 1 or material.channel_axis is not None:

@@ -26,14 +26,14 @@ Array = NDArray[Any]
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
 """The only Pillow readers in use, since some others start programs, for example the one of PostScript."""
 
-ORIENTATION = 0x0112
-"""The EXIF and TIFF tag of the orientation."""
+ORIENTATION, DESCRIPTION = 0x0112, 0x010E
+"""The EXIF and TIFF tags of the orientation and of the description."""
 
-_KEPT = (0x010E, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+_KEPT = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 """EXIF tags that are kept in addition to exposure and place: description, camera, software, date, author, rights."""
 
-_SIZE = (0xA002, 0xA003)
-"""The EXIF tags of width and height."""
+_OWN = (0xA002, 0xA003, 0xA005)
+"""EXIF tags that belong to one file: width, height, and the position of a directory."""
 
 _PNM = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" + rb"\s")
 """The header of PGM and PPM: the kind, the width, the height and the largest value."""
@@ -60,6 +60,8 @@ class Metadata(NamedTuple):
         Whether the file has further frames or pages, which are not read.
     geo : Georeference, optional
         Where the pixels of a raster lie, and its number for unknown values.
+    palette : bytes, optional
+        Red, green and blue of each index of a palette, if the pixels are indices.
     """
 
     profile: bytes | None = None
@@ -67,6 +69,7 @@ class Metadata(NamedTuple):
     exif: bytes | None = None
     more: bool = False
     geo: rasters.Georeference | None = None
+    palette: bytes | None = None
 
 
 NOTHING = Metadata()
@@ -75,12 +78,16 @@ NOTHING = Metadata()
 Decoded = tuple[Array, Metadata]
 
 
-def decode(data: bytes, most: int) -> Decoded:
+GREYS = np.arange(256, dtype=np.uint8).repeat(3).tobytes()
+"""The palette whose colours are the indices."""
+
+
+def decode(data: bytes, most: int, palette: bool = False) -> Decoded:
     """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel; and the metadata of the file. Raise TooLarge before anything is decoded, and each decoder's
-    own errors for a damaged file.
+    opaque alpha channel; and the metadata of the file. With ``palette`` palettes become indices. Raise TooLarge before
+    anything is decoded, and each decoder's own errors for a damaged file.
     """
     with _quiet():
         if data.startswith(b"\x93NUMPY"):
@@ -91,10 +98,10 @@ def decode(data: bytes, most: int) -> Decoded:
             pixels, geo, _ = rasters.read_raster(data, most)
             return pixels, Metadata(geo=geo)
         if data[:4] in rasters.TIFF:
-            return _read_tiff(data, most)
+            return _read_tiff(data, most, palette)
         if data.startswith(b"\x89PNG\r\n\x1a\n") and data[24:25] == b"\x10":  # bits per sample: 16
             return _read_png16(data, most)
-        return _read_pillow(data, most)
+        return _read_pillow(data, most, palette)
 
 
 @contextmanager
@@ -143,11 +150,14 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
     return pixels.reshape(shape).astype(dtype)
 
 
-def _read_pillow(data: bytes, most: int) -> Decoded:
+def _read_pillow(data: bytes, most: int, palette: bool) -> Decoded:
     with _opened(data, most) as picture:
         picture.load()
-        transparent = picture.has_transparency_data
-        if picture.mode in ("1", "L"):
+        transparent, colours = picture.has_transparency_data, None
+        if palette and picture.mode == "P":
+            colours = bytes(picture.getpalette() or ())
+            picture.putpalette(GREYS)
+        if colours is not None or picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
         elif picture.mode in ("LA", "F", "I") or picture.mode.startswith("I;"):
             mode = picture.mode
@@ -155,7 +165,7 @@ def _read_pillow(data: bytes, most: int) -> Decoded:
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata
+    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata._replace(palette=colours)
 
 
 def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
@@ -164,17 +174,23 @@ def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
     with suppress(Exception):  # a damaged second frame does not invalidate the first
         more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
     with suppress(Exception):  # nor is damaged EXIF
-        found, kept = picture.getexif(), PIL.Image.Exif()
+        found = picture.getexif()
         orientation = int(found.get(ORIENTATION, 1))
-        for tag in _KEPT:
-            if tag in found:
-                kept[tag] = found[tag]
-        for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
-            if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _SIZE}:
-                kept[ifd] = values
-        exif = kept.tobytes() if kept else None
+        exif = _exif(found)
     dpi = _dpi(picture.info.get("dpi"), orientation)
     return orientation, Metadata(None if picture.mode in ("CMYK", "LAB") else profile, dpi, exif, more)
+
+
+def _exif(found: PIL.Image.Exif) -> bytes | None:
+    """Return the part of the EXIF data that is kept."""
+    kept = PIL.Image.Exif()
+    for tag in _KEPT:
+        if tag in found:  # a text in any encoding, which Pillow reads as Latin-1, but writes as ASCII
+            kept[tag] = found[tag].encode("latin-1") if isinstance(found[tag], str) else found[tag]
+    for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
+        if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _OWN}:
+            kept[ifd] = values
+    return kept.tobytes() if kept else None
 
 
 def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
@@ -207,7 +223,7 @@ def _read_png16(data: bytes, most: int) -> Decoded:
     return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4)), metadata
 
 
-def _read_tiff(data: bytes, most: int) -> Decoded:
+def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
     import tifffile
 
     with tifffile.TiffFile(io.BytesIO(data)) as tiff:
@@ -225,10 +241,16 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
             told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
             dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
             metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
+        with suppress(Exception):
+            found = PIL.Image.Exif()
+            found.load(data)
+            if tiff.is_imagej or tiff.is_ome or tiff.is_shaped:  # programs that describe the axes of a stack
+                found.pop(DESCRIPTION, None)
+            metadata = metadata._replace(exif=_exif(found))
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
-            pixels, found = _read_pillow(data, most)
-            return pixels, metadata._replace(profile=found.profile)  # without that of print colours
+            pixels, read = _read_pillow(data, most, palette)
+            return pixels, metadata._replace(profile=read.profile, palette=read.palette)  # no profile of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()

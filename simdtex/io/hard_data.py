@@ -416,7 +416,7 @@ def place_hard_data(
 def _mean(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
     """Return each site once, with the mean of its values."""
     found, inverse, counts = np.unique(sites, return_inverse=True, return_counts=True)
-    means = np.bincount(inverse, values.astype(np.float64)) / counts
+    means = np.bincount(inverse, values / 2.0**64) / counts * 2.0**64  # no sum of doubles overflows
     return found, (means if values.dtype.kind == "f" else np.floor(means + 0.5)).astype(values.dtype)
 
 

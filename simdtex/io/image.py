@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import struct
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,7 +67,7 @@ class Image:
     metadata: Metadata = NOTHING
 
 
-def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
+def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return the picture in a file, whose format is recognised by its content and not by its name.
 
     Parameters
@@ -77,6 +78,9 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     max_pixels : int, optional
         The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
+    palette : bool
+        Whether a picture with a palette is read as the indices of its colours, (rows, cols) uint8, as categories
+        need; the palette is then in the metadata. Other pictures are read as without it.
 
     Returns
     -------
@@ -98,16 +102,16 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     """
     with reading(path, "the image", max_pixels):
         data = Path(path).read_bytes()
-    return read_bytes(os.fspath(path), data, max_pixels=max_pixels)
+    return read_bytes(os.fspath(path), data, max_pixels=max_pixels, palette=palette)
 
 
-def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:
+def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return a picture from the bytes of its file, as `read` does; messages call it ``name``."""
     most = max_pixels_or_default(max_pixels)
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     try:
-        found, metadata = decode(data, most)
+        found, metadata = decode(data, most, palette)
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
     except PIL.UnidentifiedImageError:
@@ -372,6 +376,9 @@ LOSSY = (".jpg", ".jpeg")
 _MARKER = 65533
 """The most bytes of EXIF that a JPEG holds."""
 
+_ENTRY = np.dtype([("tag", "<u2"), ("value", "V10")])
+"""An entry of a directory of TIFF."""
+
 _BIG = 2**32 - 2**25
 """The size in bytes from which a TIFF must be a BigTIFF."""
 
@@ -435,8 +442,9 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG are
         grey and colour with alpha; WebP turns grey into equal RGB.
     metadata : Metadata, optional
-        The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels;
-        PNG, JPEG and WebP the EXIF data; and all but WebP and ``.npy`` the pixels per inch.
+        The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
+        and the EXIF data (TIFF up to 4 GB); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
+        keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
 
     Raises
     ------
@@ -458,7 +466,13 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
 
 def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING) -> None:
     """Write pixels in a format that holds them, over an existing file."""
-    metadata = metadata._replace(profile=fitting(metadata.profile, 1 if pixels.ndim == 2 else pixels.shape[2]))
+    palette = None
+    if pixels.ndim == 2 and pixels.dtype == np.uint8 and suffix not in (".tif", ".tiff", ".npy"):
+        palette = metadata.palette
+    if suffix not in (".png", ".bmp"):
+        pixels, palette = coloured(pixels, palette), None
+    channels = 3 if palette else 1 if pixels.ndim == 2 else pixels.shape[2]
+    metadata = metadata._replace(profile=fitting(metadata.profile, channels))
     beside = {"icc_profile": metadata.profile, "dpi": metadata.dpi, "exif": metadata.exif}
     if suffix in LOSSY and len(metadata.exif or b"") > _MARKER:
         del beside["exif"]
@@ -479,7 +493,22 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         write_tiff(path, [pixels], metadata)
     else:
         kind = PIL.Image.registered_extensions()[suffix]
-        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {}), **beside))
+        picture = PIL.Image.fromarray(pixels)
+        if palette:
+            picture.putpalette(palette.ljust(768, b"\0"))  # of 256 colours, so that indices keep 8 bits
+        path.write_bytes(pillow_bytes(picture, kind, **_OPTIONS.get(suffix, {}), **beside))
+
+
+def coloured(pixels: Array, palette: bytes | None) -> Array:
+    """Return the colours (rows, cols, 3 or 4) of indices (rows, cols) or, with alpha, (rows, cols, 2).
+
+    Without a palette return the pixels unchanged.
+    """
+    if palette is None:
+        return pixels
+    indices = pixels if pixels.ndim == 3 else pixels[..., None]
+    colours = np.frombuffer(palette.ljust(768, b"\0"), np.uint8).reshape(-1, 3)[indices[..., 0]]
+    return np.concatenate([colours, indices[..., 1:]], -1)
 
 
 def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
@@ -496,7 +525,8 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
     pages = list(pages)
     channels = 1 if pages[0].ndim == 2 else pages[0].shape[2]
     colours = 3 if channels in (3, 4) else 1
-    with tifffile.TiffWriter(path, bigtiff=len(pages) * pages[0].nbytes > _BIG) as file:
+    big = len(pages) * pages[0].nbytes > _BIG
+    with tifffile.TiffWriter(path, bigtiff=big, byteorder="<") as file:
         for page in pages:
             file.write(
                 page,
@@ -510,6 +540,29 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
                 resolution=metadata.dpi,
                 resolutionunit="inch" if metadata.dpi else None,
             )
+    if metadata.exif and not big:
+        _add_exif(path, metadata.exif)
+
+
+def _add_exif(path: Path, exif: bytes) -> None:
+    """Add EXIF data to the first page of a little-endian TIFF, whose directory moves to the end of the file."""
+    found = PIL.Image.Exif()
+    found.load(exif)
+    found.update([(tag, value.encode("latin-1")) for tag, value in found.items() if isinstance(value, str)])
+    found.endian = "<"
+    with path.open("r+b") as file:
+        file.seek(*struct.unpack("<4xI", file.read(8)))
+        own = np.frombuffer(file.read(12 * int.from_bytes(file.read(2), "little")), _ENTRY)
+        own, following = own[~np.isin(own["tag"], list(found))], file.read(4)
+        place = -(-file.seek(0, os.SEEK_END) // 2) * 2
+        added = found.tobytes(place + own.nbytes)[14:]  # after two headers
+        more = np.frombuffer(added, _ENTRY, int.from_bytes(added[:2], "little"), 2)
+        entries = np.concatenate([own, more])
+        file.seek(place)
+        file.write(struct.pack("<H", len(entries)) + entries[entries["tag"].argsort()].tobytes())
+        file.write(following + added[2 + more.nbytes + 4 :])
+        file.seek(4)
+        file.write(struct.pack("<I", place))
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -19,7 +20,7 @@ from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
 from simdtex.methods.classifier.options import Options
 from simdtex.model.pictures import Mask, check_alike, completed
-from simdtex.options import real_array, resolve
+from simdtex.options import real_array, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -210,6 +211,10 @@ def _check_count(count: int, bands: int) -> None:
         raise ValueError(f"the picture has {bands} bands; give {BANDS} at most, say its principal components")
 
 
+PARAMETERS = ("channel_axis", "rng", "device", *table(Options))
+"""The arguments of `TextureClassifier`."""
+
+
 class TextureClassifier:
     """A classifier that is trained once, by the conventions of scikit-learn.
 
@@ -229,6 +234,11 @@ class TextureClassifier:
     classes_ : (classes,) array
         The labels that `fit` was given, in ascending order.
 
+    Notes
+    -----
+    scikit-learn takes it as a classifier of pictures. A trained classifier can be copied, pickled, and dumped by joblib
+    of the same version of simdtex, without the open device: an open machine as `device` becomes its name.
+
     Examples
     --------
     >>> from skimage import data
@@ -241,6 +251,8 @@ class TextureClassifier:
     True
     """
 
+    _machine: Machine | None = None
+
     def __init__(
         self,
         *,
@@ -249,19 +261,38 @@ class TextureClassifier:
         device: str | Machine | None = None,
         **options: Any,
     ) -> None:
-        self.channel_axis, self.rng, self.device, self.options = channel_axis, rng, device, options
+        self.channel_axis, self.rng, self.device = channel_axis, rng, device
+        self.set_params(**vars(resolve(Options, "classify", {})) | options)
+
+    def __getstate__(self) -> dict[str, Any]:
+        device: Any = self.device
+        if kind := getattr(device, "kind", None):
+            device = "reference" if kind == "reference" else getattr(device, "info", device).name
+        return vars(self) | {"device": device, "_machine": None}
+
+    def __sklearn_clone__(self) -> Self:
+        parameters = {name: one if name == "device" else deepcopy(one) for name, one in self.get_params().items()}
+        return type(self)(**parameters)
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import ClassifierTags, InputTags, Tags, TargetTags
+
+        shape = InputTags(two_d_array=False, three_d_array=True, allow_nan=True)
+        return Tags("classifier", TargetTags(required=True), classifier_tags=ClassifierTags(), input_tags=shape)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the arguments of the constructor; ``deep`` makes no difference."""
-        return {"channel_axis": self.channel_axis, "rng": self.rng, "device": self.device, **self.options}
+        """Return the arguments of the constructor, with all options; ``deep`` makes no difference."""
+        return {name: vars(self)[name] for name in PARAMETERS}
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`."""
-        for name, value in parameters.items():
-            if name in ("channel_axis", "rng", "device"):
-                setattr(self, name, value)
-            else:
-                self.options[name] = value
+        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`.
+
+        Raises ValueError, without any change, if a name is unknown.
+        """
+        for name in parameters:
+            if name not in PARAMETERS:
+                raise ValueError(f"TextureClassifier has no parameter {name!r}; choose from: {', '.join(PARAMETERS)}")
+        vars(self).update(parameters)
         return self
 
     def fit(self, image: ArrayLike | Sequence[ArrayLike], labels: Any) -> Self:
@@ -290,12 +321,13 @@ class TextureClassifier:
         found = _painted([(*one, marked) for one, marked in zip(shown, painted, strict=True)])
         self.classes_ = np.array(list(found))
         self.n_features_in_ = shown[0][0].shape[-1]
-        self._like = shown[0][0][:1, :1]
-        self._chosen = resolve(Options, "classify", self.options)
-        self._seed, self._machine = as_seed(self.rng), open_machine(self.device)
+        self._like = shown[0][0][:1, :1].copy()
+        self._chosen = resolve(Options, "classify", {name: vars(self)[name] for name in table(Options)})
+        self._seed, machine = as_seed(self.rng), open_machine(self.device)
         self._names = {label: str(label) for label in found}
         names = list(self._names.values())
-        self._model: Model = learn(self._machine, list(found.values()), names, self._chosen, self._seed)
+        self._model: Model = learn(machine, list(found.values()), names, self._chosen, self._seed)
+        self._machine = machine
         return self
 
     def predict(self, image: ArrayLike) -> NDArray[Any]:
@@ -304,21 +336,20 @@ class TextureClassifier:
 
     def predict_proba(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return the probability of each class at each pixel, (rows, cols, classes), as `Output.probability`."""
-        _, output = self._run(image)
-        assert output.probability is not None
-        return output.probability
+        probability: NDArray[np.float32] = self._run(image)[1].probability
+        return probability
 
     def predict_fit(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return how well each class fits each pixel, (rows, cols, classes), as `Output.fit`."""
-        _, output = self._run(image)
-        assert output.fit is not None
-        return output.fit
+        fit: NDArray[np.float32] = self._run(image)[1].fit
+        return fit
 
-    def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Output]:
+    def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Any]:
         if not hasattr(self, "_model"):
             raise ValueError("the classifier is not trained; call fit first")
         pixels, unknown = check_picture(image, self.channel_axis)
         check_alike("the picture", pixels, "that of training", self._like)
         plan = Plan(completed(pixels, unknown), unknown, self._model, self._names, self._chosen)
+        self._machine = self._machine or open_machine(self.device)
         labels, output = drive(plan, self._machine, self._seed)
         return labels[..., 0], output

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.driver import check_shape
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import as_known, check_known, check_samples
-from simdtex.jobs.simulation import digests, grid_axes
+from simdtex.jobs.simulation import check_several, digests, grid_axes
 from simdtex.machine import memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data
 from simdtex.model.sample import Sample
-from simdtex.options import real, require, whole
+from simdtex.options import moderate, real, require, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -111,8 +111,11 @@ def estimate(
     size = check_shape(known.shape if shape is None and isinstance(known, np.ndarray) and known.ndim == 2 else size)
     along, sides_of_cells = grid_axes(size, origin, cell)
     place = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)
+    check_several(several, known, pictures)
     given = check_known(known, size, None, pictures, place=place)
     mrf.check_categories(pictures, given)
+    if not categorical:
+        moderate("the training image", *pictures.pixels)
     sample, machine = Sample(pictures, pictures.channels * (nearest + 1), reach), open_machine(device)
     positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
     own = sample.own(positions)[:, 0]

@@ -89,8 +89,8 @@ def simulate(
         Hard data: a masked array of `shape`, floats with NaN for unknown values, a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
     several : {"refuse", "mean", "most"}
-        Value for different data of a table in one cell: an error, their mean, or the most frequent value, as in
-        `simdtex.place_hard_data`.
+        Value for different data of a table in one cell: an error, their mean (not of categories), or the most frequent
+        value, as in `simdtex.place_hard_data`.
     outside : {"refuse", "skip"}
         Data of a table outside the cells: an error, or left out with a warning.
     origin : (x, y) or (x, y, z), optional
@@ -206,7 +206,9 @@ def simulate(
     copies = maps.of_images(pictures, (size[-2], size[-1]))
     if copies and chosen.shares:
         raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
-    categories = chosen.of(pictures).categories(0)
+    kinds = chosen.of(pictures)
+    check_several(several, known, kinds)
+    categories = kinds.categories(0)
     soft = Soft(maps.of_categories(categories, size, place), copies.probability if copies else None)
     sample, guides = inputs.pictures, inputs.guide
     if copies:
@@ -280,6 +282,12 @@ def simulate(
     places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
     both: xarray.Dataset = xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
     return both
+
+
+def check_several(several: str, known: Any, pictures: Pictures) -> None:
+    """Raise if different data of a table in one cell would become a mean of categories."""
+    if several == "mean" and isinstance(known, HardData) and any(pictures.categorical or ()):
+        raise ValueError("several is 'mean', which invents categories; give 'most', or 'refuse'")
 
 
 def grid_axes(size: tuple[int, ...], origin: Any, cell: Any) -> tuple[dict[str, Any], dict[str, float]]:

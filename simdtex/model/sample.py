@@ -444,7 +444,7 @@ class Sample:
         if not self.direct or (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
         step = np.moveaxis(values[: self.shown].astype(np.int64) - usual, 0, -1)
-        return moved(own, step * self.unit, self.pixels)
+        return moved(own, step, self.unit, self.pixels)
 
     def own(self, source: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (..., C) at pixel indices, in the sample's own type."""
@@ -476,7 +476,7 @@ class Sample:
             exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
             return exact
         units = self.scale.units if not self.direct else self.unit
-        return moved(own, change * (units / self.fine), self.pixels)
+        return moved(own, change, units / self.fine, self.pixels)
 
     @property
     def fine(self) -> int:
@@ -494,21 +494,21 @@ def variance(*pictures: NDArray[np.integer]) -> float:
     return float(total / channels)
 
 
-def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:
-    """Return pixels of a sample plus a difference, as the closest legal ones; a difference of 0 keeps the pixel.
+def moved(own: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return pixels of a sample plus a difference in units, as the closest legal ones; no difference keeps the pixel.
 
     Legal are 0 to 255 for 8 bits, otherwise the range from the sample's smallest to its largest pixel.
     """
-    with np.errstate(over="ignore"):  # values beyond the largest double are clipped
-        values = own.astype(np.float64) + by
+    with np.errstate(over="ignore"):  # half values beyond the largest double are clipped
+        half = own.astype(np.float64) / 2 + by * (unit / 2)
     if pixels.dtype == np.bool_:
-        legal: NDArray[Any] = values > 0.5
+        legal: NDArray[Any] = half > 0.25
     elif pixels.dtype.kind == "f":
-        legal = np.clip(values, float(pixels.min()), float(pixels.max())).astype(pixels.dtype)
+        legal = (2 * np.clip(half, float(pixels.min()) / 2, float(pixels.max()) / 2)).astype(pixels.dtype)
     else:
         bounds = np.iinfo(pixels.dtype)
         most = float(bounds.max)  # may be one above the range of the type
         most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
-        legal = np.clip(np.rint(values), bounds.min, most).astype(pixels.dtype)
+        legal = np.clip(np.rint(2 * half), bounds.min, most).astype(pixels.dtype)
         legal = legal if pixels.dtype == np.uint8 else np.clip(legal, pixels.min(), pixels.max())
     return np.where(by == 0, own, legal)

@@ -48,7 +48,7 @@ class Scale:
             for weight, one in zip(weights, self._variables, strict=True):
                 one.scale = weight / most * self.top if most else 0.0
         elif not eight:
-            self._common = _Stretched(_known(pictures), self.top)
+            self._common = _Stretched(_ends(pictures), self.top)
             self.unit = self._common.unit
 
     @property
@@ -158,8 +158,10 @@ def stretch(pixels: NDArray[Any], top: int, ends: tuple[Any, Any] | None = None)
     return np.rint(half / half_unit).astype(np.int64), 2 * half_unit
 
 
-def _known(pictures: Pictures) -> NDArray[Any]:
-    if pictures.known is None:
-        return np.concatenate([picture.ravel() for picture in pictures.pixels])
-    pairs = zip(pictures.pixels, pictures.known, strict=True)
-    return np.concatenate([picture[known].ravel() for picture, known in pairs])
+def _ends(pictures: Pictures) -> NDArray[Any]:
+    """Return the least and the greatest known value, (2,) of the pictures' type."""
+    known = pictures.pixels
+    if pictures.known:
+        known = tuple(picture[there] for picture, there in zip(known, pictures.known, strict=True))
+    values = np.concatenate([one.ravel() for one in known])
+    return np.array([values.min(), values.max()])

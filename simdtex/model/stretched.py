@@ -80,5 +80,4 @@ class Stretched:
         if source is not None:
             own = self.pixels.reshape(-1, self.pixels.shape[-1])[source]
             by -= np.moveaxis(self.planes.reshape(len(self.planes), -1)[:, source], 0, -1)
-        with np.errstate(over="ignore"):
-            return moved(own, by * self.unit, self.pixels)
+        return moved(own, by, self.unit, self.pixels)

@@ -31,13 +31,17 @@ class Exemplars(NamedTuple):
     squares: Array
     starts: Array
 
+    def on(self, machine: Machine) -> Exemplars:
+        """Return a copy of NumPy arrays on a machine."""
+        return Exemplars(*map(machine.put, self))
 
-def stacked(machine: Machine, classes: list[NDArray[np.float32]]) -> Exemplars:
-    """Return the exemplars of classes, each (n, K), on a machine."""
+
+def stacked(classes: list[NDArray[np.float32]]) -> Exemplars:
+    """Return the exemplars of classes, each (n, K), in NumPy."""
     filled = [np.concatenate([one, np.repeat(one[-1:], -len(one) % TOGETHER, 0)]) for one in classes]
     y = np.concatenate(filled)
     starts = np.cumsum([0, *map(len, filled)]).astype(np.int32)
-    return Exemplars(machine.put(-2 * y), machine.put((y * y).sum(1)), machine.put(starts))
+    return Exemplars(-2 * y, (y * y).sum(1), starts)
 
 
 @Operation

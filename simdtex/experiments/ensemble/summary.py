@@ -15,14 +15,12 @@ from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, ca
 from simdtex.experiments.ensemble.connectivity import MARGIN, connectivity, dead_ends
 from simdtex.experiments.ensemble.copies import WINDOW, copied, copies
 from simdtex.experiments.ensemble.distance import Anodi, anodi
+from simdtex.options import moderate
 
 Floats = NDArray[np.float64]
 
 LEAST = 4
 """Smallest side of an image, pixels."""
-
-LARGEST = 1e100
-"""Largest absolute value of a pixel: sums of squares, and axes of plots, stay finite."""
 
 MOST_LAG = 100  # of variograms and connectivity functions, pixels; half of the shortest side is less in small images
 
@@ -118,8 +116,7 @@ def summary(
     shortest = min(*array.shape[1:], *image.shape)
     if shortest < LEAST:
         raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
-    if max(float(np.abs(one).max()) for one in (array, image)) > LARGEST:
-        raise ValueError(f"an image has values beyond {LARGEST:g}: give them in a larger unit")
+    moderate("an image", array, image)
     lag = min(shortest // 2, MOST_LAG)
     images, number = [*array, image], len(array)
     at_data = array[:, points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)]

@@ -10,13 +10,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_sample
+from simdtex.options import moderate
 
 Array = NDArray[Any]
 Planes = NDArray[np.float32]
 Indices = NDArray[np.intp]
-
-LARGEST = 1e100
-"""The largest value for which figures are computed: sums of squares are then finite."""
 
 BLOCK_ROWS = 4096  # patches looked up at once
 BLOCK_BYTES = 48 << 20  # of one block of patches, and of one block of squared distances
@@ -25,8 +23,7 @@ BLOCK_BYTES = 48 << 20  # of one block of patches, and of one block of squared d
 def as_planes(array: ArrayLike) -> Array:
     """Return a picture as (rows, cols, channels), checked."""
     planes = check_sample(array, None if np.ndim(array) == 2 else -1)
-    if np.abs(planes, dtype=np.float64).max() > LARGEST:
-        raise ValueError(f"a picture has values beyond {LARGEST:g}: give them in a larger unit")
+    moderate("a picture", planes)
     return planes
 
 

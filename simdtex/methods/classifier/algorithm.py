@@ -124,6 +124,7 @@ class Run:
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
         self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
+        self._exemplars = [known.on(machine) for known in model.exemplars]
 
     def _check_schedule(self) -> None:
         _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), schedules.Masked(self.grid))
@@ -149,10 +150,10 @@ class Run:
 
     def _compared(self, state: State) -> State:
         machine, cols = self.machine, self.grid.cols
-        each = sum(known.doubled.size for known in self.model.exemplars)
+        each = sum(known.doubled.size for known in self._exemplars)
         end = min(self.grid.rows, state.done + max(1, WORK // (each * cols)))
         sites = machine.put(np.arange(state.done * cols, end * cols, dtype=np.int32))
-        for e, (expert, known) in enumerate(zip(self.model.experts, self.model.exemplars, strict=True)):
+        for e, (expert, known) in enumerate(zip(self.model.experts, self._exemplars, strict=True)):
             offsets = machine.put(expert.offsets)
             values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
             found = machine.get(exemplars(machine, values, known))

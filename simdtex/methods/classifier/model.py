@@ -124,11 +124,11 @@ class Null:
 
 @dataclass(frozen=True)
 class Model:
-    """A trained classifier.
+    """A trained classifier, without any machine.
 
-    ``exemplars``, one for each expert, with all classes; ``offsets`` (classes,) int64, added to the evidence of each
-    class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their covariances; ``own`` (classes,
-    E), the mean logarithm of distances of a class from itself; ``counts``, the numbers of exemplars.
+    ``exemplars``, one for each expert, with all classes, in NumPy; ``offsets`` (classes,) int64, added to the evidence
+    of each class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their covariances; ``own``
+    (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the numbers of exemplars.
     """
 
     scale: Scale
@@ -180,7 +180,7 @@ def learn(
         shift = sum(expert.factor * fewer / (len(expert.offsets) * bands) for expert in experts)
         offsets.append(round(typical - shift))
     nulls, freedom = _nulls(selves)
-    pooled = [stacked(machine, [one[e] for one in drawn]) for e in range(len(experts))]
+    pooled = [stacked([one[e] for one in drawn]) for e in range(len(experts))]
     return Model(scale, experts, pooled, np.array(offsets, np.int64), nulls, freedom, own, counts)
 
 
@@ -295,7 +295,7 @@ class _Class:
                 for e, expert in enumerate(experts):
                     rest = self.draw(machine, expert, options.exemplars, seed, number, part)
                     values = machine.put(self._features(machine, self._levels[place], expert, shown))
-                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked(machine, [rest])))[0]
+                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked([rest]).on(machine)))[0]
                 judged.reshape(-1)[shown] = True
                 parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
             windows.append(windowed(machine, logs, judged, taps, judged)[0])

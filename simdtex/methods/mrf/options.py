@@ -413,13 +413,13 @@ def begins(before: Options, now: Options, levels: int) -> int:
     return levels - 1
 
 
-def few(pictures: Sequence[NDArray[Any]]) -> bool:
-    """Return whether a sample, pictures (rows, cols, C), has at most `CATEGORIES` different pixels: a map of them."""
+def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
+    """Return whether a sample, pictures (rows, cols, C), has at most ``most`` different pixels: a map of them."""
     seen = np.zeros((0, pictures[0].shape[-1]), pictures[0].dtype)
     for picture in pictures:
         flat = picture.reshape(-1, picture.shape[-1])
         for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
             seen = np.unique(np.concatenate([seen, part]), axis=0)
-            if len(seen) > CATEGORIES:
+            if len(seen) > most:
                 return False
     return True
