@@ -12,8 +12,8 @@ import click
 from simdtex.cli.command import DATA, command
 from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import output_shape, read_material
-from simdtex.cli.options import DEVICE, KNOWN, SAMPLE_MASK, given, option, places, size_option
-from simdtex.cli.places import EITHER, READ
+from simdtex.cli.options import CHANNELS, DEVICE, KNOWN, SAMPLE_MASK, given, option, places, size_option
+from simdtex.cli.places import EITHER, ENTER
 from simdtex.cli.simulate import lies_of
 
 
@@ -24,7 +24,7 @@ from simdtex.cli.simulate import lies_of
     ),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
 )
-@click.argument("training_image", nargs=-1, required=True, type=READ)
+@click.argument("training_image", nargs=-1, required=True, type=ENTER)
 @click.option(
     "-o",
     "--output",
@@ -32,6 +32,7 @@ from simdtex.cli.simulate import lies_of
     type=EITHER,
     help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib or .sgems.",
 )
+@CHANNELS
 @size_option("that of --known, else of TRAINING_IMAGE", "maps")
 @KNOWN
 @places
@@ -55,6 +56,7 @@ def estimate(
     output: Path,
     size: str | None,
     quiet: bool,
+    channels: bool,
     **options: Any,
 ) -> None:
     """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
@@ -65,7 +67,9 @@ def estimate(
     from simdtex.io.grids import SUFFIXES, check_grid, write_grid
     from simdtex.io.realisations import check_realisations_path, write_realisations
 
-    began, material = time.perf_counter(), read_material(training_image)
+    began, material = time.perf_counter(), read_material(training_image, deep=True, channels=channels)
+    if material.deep:
+        raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     data = read_data(material, options)

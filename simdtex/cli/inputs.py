@@ -141,39 +141,39 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
             raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
 
 
-def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
+def read_pixels(
+    path: Path, deep: bool = False, channels: bool = False
+) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
     """Read a picture, or a grid as one, whose variables are channels.
 
     Also return where the cells of a grid lie, and what the file of a picture says of it. With ``deep`` a file of
-    several layers is read, too, as a volume (layers, rows, cols, variables).
+    several layers is read, too, as a volume (layers, rows, cols, variables); with ``channels`` an array of three axes
+    is a picture all the same.
     """
     from simdtex.io import grids
 
-    netcdf = deep and path.suffix.lower() == ".nc"
-    if grids.kind_of(path) is None and not netcdf:
-        if deep:
-            from simdtex.io import volume  # whose libraries take long to load
-
-            if volume.is_volume(path):
-                values = volume.read(path)
-                return values if len(values) > 1 else values[0], None, None
-        found = read_picture(path)
-        return found.pixels, None, found.metadata
-    if netcdf:
+    if deep and path.suffix.lower() == ".nc":
         from simdtex.io.realisations import read_netcdf
 
         grid = read_netcdf(path)
-    else:
+    elif grids.kind_of(path):
         grid = grids.read_grid(path)
+    else:
+        if deep:
+            from simdtex.io import volume  # whose libraries take long to load
+        if not deep or not volume.is_volume(path, channels):
+            found = read_picture(path)
+            return found.pixels, None, found.metadata
+        grid = volume.read(path)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not deep:
         raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
     return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell), None
 
 
-def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
-    """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, lie, metadata = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+def read_material(paths: Sequence[Path], deep: bool = False, channels: bool = False) -> Material:
+    """Read pictures or grids, or with ``deep`` a volume, as `read_pixels`; a single channel gets no axis."""
+    pictures, lie, metadata = zip(*(read_pixels(path, deep, channels) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
