@@ -45,6 +45,7 @@ WRITERS = {
         for suffix in (".png", ".tif", ".jpg", ".webp", ".bmp", ".npy")
     },
     "deep.png": lambda path, seed: image.write(path, picture(seed, np.uint16)),
+    "a.exr": lambda path, seed: image.write(path, picture(seed, np.uint16).astype(np.float32)),
     **{
         f"v{suffix}": lambda path, seed: volume.write(path, block(seed)) for suffix in (".npz", ".npy", ".nrrd", ".tif")
     },

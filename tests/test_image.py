@@ -5,7 +5,6 @@ import logging
 import os
 import stat
 import struct
-import zlib
 from itertools import product
 
 import imagecodecs
@@ -16,7 +15,7 @@ import pytest
 import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
-from volumes import noise
+from volumes import noise, png
 
 from simdtex.io import image, volume
 from simdtex.io.atomic import atomic_path
@@ -33,6 +32,7 @@ ROUND_TRIPS = [
     (".bmp", "uint8", 3),
     (".webp", "uint8", 3),
     (".webp", "uint8", 4),
+    *[(".exr", dtype, c) for dtype in ("float16", "float32") for c in (None, 1, 3)],
     (".npy", "bool", None),
     (".npy", "float64", 7),
     (".NPY", ">i4", 1),
@@ -179,9 +179,8 @@ def test_orientation_of_a_16_bit_png(tmp_path):
     exif = PIL.Image.Exif()
     exif[0x0112] = 6
     body = b"eXIf" + exif.tobytes().removeprefix(b"Exif\0\0")
-    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-    data = imagecodecs.png_encode(pixels)
-    (tmp_path / "a.png").write_bytes(data[:33] + chunk + data[33:])
+    rows = b"".join(b"\0" + row.tobytes() for row in pixels.astype(">u2"))
+    (tmp_path / "a.png").write_bytes(png(4, 6, 16, rows=rows, eXIf=body[4:]))
     np.testing.assert_array_equal(image.read(tmp_path / "a.png").pixels, np.rot90(pixels, -1))
 
 
@@ -209,6 +208,7 @@ def netpbm(kind, pixels, largest):
 @pytest.mark.parametrize("largest", [1, 3, 255, 256, 4095, 65535])
 @pytest.mark.parametrize("channels", [None, 3])
 def test_pgm_and_ppm_have_the_values_of_the_file(tmp_path, largest, channels):
+    """A mask is white above half of the maximum in the header."""
     shape = (4, 5) if channels is None else (4, 5, channels)
     pixels = np.random.default_rng(largest).integers(0, largest, shape, endpoint=True)
     for kind in (2, 5) if channels is None else (3, 6):
@@ -216,14 +216,135 @@ def test_pgm_and_ppm_have_the_values_of_the_file(tmp_path, largest, channels):
         found = image.read(tmp_path / "a.pgm").pixels
         assert found.dtype == (np.uint8 if largest < 256 else np.uint16)
         np.testing.assert_array_equal(found, pixels)
+        white = (pixels > (largest / 2 if pixels.max() > 1 else 0)).reshape(4, 5, -1).any(2)
+        assert channels or (white.any() and not white.all())
+        np.testing.assert_array_equal(image.read_mask(tmp_path / "a.pgm", (4, 5)), white)
+
+
+@pytest.mark.parametrize("data", [b"P1 # text\n3 2\n1 0 1\n001", b"P4\n3 2\n\xa0\x20"])
+def test_pbm_is_black_and_white(tmp_path, data):
+    (tmp_path / "a.pbm").write_bytes(data)
+    assert image.read(tmp_path / "a.pbm").pixels.tolist() == [[0, 255, 0], [255, 255, 0]]
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4])
+def test_a_png_of_few_bits_is_at_full_scale(tmp_path, bits):
+    """Also the grey that is transparent, which Pillow compares with scaled pixels."""
+    top = 2**bits - 1
+    grey = np.array([[0, top, top // 2, top]] * 2)
+    rows = [int("".join(f"{value:0{bits}b}" for value in row).ljust(16, "0"), 2).to_bytes(2, "big") for row in grey]
+    rows = b"".join(b"\0" + row[: (4 * bits + 7) // 8] for row in rows)
+    for more in ({}, {"tRNS": struct.pack(">H", top)}):
+        (tmp_path / "a.png").write_bytes(png(4, 2, bits, 0, rows, **more))
+        found = image.read(tmp_path / "a.png").pixels
+        np.testing.assert_array_equal(found[..., 0] if more else found, grey * (255 // top))
+        if more:
+            np.testing.assert_array_equal(found[..., 1], np.where(grey == top, 0, 255))
+
+
+def test_a_transparent_entry_of_a_palette_is_not_scaled(tmp_path):
+    picture = PIL.Image.fromarray(noise((8, 9, 3))).quantize(4)
+    picture.save(tmp_path / "a.png", bits=2, transparency=2)
+    found = image.read(tmp_path / "a.png").pixels
+    np.testing.assert_array_equal(found[..., 3], np.where(np.asarray(picture) == 2, 0, 255))
+
+
+def test_significant_bits_of_a_png_change_nothing(tmp_path):
+    """Its values are at full scale whatever the camera had."""
+    values = np.array([[0, 16, 65535]], ">u2")
+    (tmp_path / "a.png").write_bytes(png(3, 1, 16, 0, b"\0" + values.tobytes(), sBIT=b"\x0c"))
+    assert image.read(tmp_path / "a.png").pixels.tolist() == [[0, 16, 65535]]
+
+
+@pytest.mark.parametrize("channels", [None, 3])
+@pytest.mark.parametrize("kind", ["jp2", "j2k", "avif"])
+def test_jpeg_2000_and_avif_keep_more_than_8_bits(tmp_path, kind, channels):
+    bits = 10 if kind == "avif" else 12
+    values = np.arange(32 * 32, dtype=np.uint16).reshape(32, 32) * (2**bits - 1) // 1023
+    values = values if channels is None else np.dstack([values, values[::-1], values])
+    if kind == "avif":
+        data = imagecodecs.avif_encode(values, bitspersample=bits, level=100)
+    else:
+        data = imagecodecs.jpeg2k_encode(values, bitspersample=bits, codecformat=kind, level=0, reversible=True)
+    (tmp_path / "a").write_bytes(data)
+    found = image.read(tmp_path / "a").pixels
+    assert found.dtype == np.uint16
+    found = found[..., 0] if found.ndim == 3 and channels is None else found
+    assert np.abs(found - np.rint(values * (65535 / (2**bits - 1)))).max() <= (0 if kind != "avif" else 2**9)
+
+
+@pytest.mark.parametrize(("kind", "channels"), [("TGA", 3), ("TGA", 4), ("JPEG2000", 3), ("AVIF", 3), ("HEIF", 3)])
+def test_other_formats_of_pictures(tmp_path, kind, channels):
+    pixels = np.add.outer(np.arange(32), 2 * np.arange(40))[..., None] + np.arange(channels)
+    picture = PIL.Image.fromarray(pixels.astype(np.uint8))
+    if kind == "HEIF":
+        heif = pytest.importorskip("pillow_heif")
+        heif.from_pillow(picture).save(tmp_path / "a", quality=90)
+    else:
+        picture.save(tmp_path / "a", kind)
+    found = image.read(tmp_path / "a").pixels
+    assert found.shape == pixels.shape
+    assert np.abs(found - pixels.astype(int)).max() <= (0 if kind in ("TGA", "JPEG2000") else 6)
+
+
+def test_openexr(tmp_path):
+    """Colours that were multiplied by alpha are divided; parts and channels of renderers are named."""
+    exr = pytest.importorskip("OpenEXR")
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+    values = np.abs(noise((5, 6, 4), "float32"))
+    values[..., 3] = np.repeat([[0, 0.25, 0.5, 1, 1, 1]], 5, 0)
+    values[:, 0] = 0
+    stored = np.concatenate([values[..., :3] * values[..., 3:], values[..., 3:]], -1)
+    exr.File(header, {"RGBA": stored}).write(str(tmp_path / "a.exr"))
+    np.testing.assert_allclose(image.read(tmp_path / "a.exr").pixels, values, rtol=1e-6)
+    first = np.ascontiguousarray(values[..., 0])
+    exr.File(header, {"height": first}).write(str(tmp_path / "a.exr"))
+    np.testing.assert_array_equal(image.read(tmp_path / "a.exr").pixels, first)
+    exr.File(header, {"N.X": first, "N.Y": first}).write(str(tmp_path / "a.exr"))
+    with pytest.raises(ValueError, match=r"has 1 parts and the channels N\.X, N\.Y: save R, G and B, or one"):
+        image.read(tmp_path / "a.exr")
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"P5 2 2 255 \0\0\0", "cannot be decoded"),
-        (b"P2 2 2 255 1 2 3", "cannot be decoded"),
-        (b"P2 2 2 255 1 2 x 4", "cannot be decoded"),
+        (b"8BPS\0\1" + bytes(20), r"is a Photoshop document \(PSD\): export it as PNG or TIFF"),
+        (b"DDS |" + bytes(120), r"is a texture of DirectX \(DDS\): export it"),
+        (b"\0\0\1\0\1\0\x10\x10" + bytes(30), r"is an icon \(ICO\): export it"),
+        (b"\xff\x0a" + bytes(30), "is a JPEG XL picture: save it"),
+        (b"#?RADIANCE\n", r"is a Radiance picture \(HDR\): save it as OpenEXR"),
+        (b"<?xml version='1.0'?>\n<svg xmlns='http://www.w3.org/2000/svg'/>", "is a drawing .*SVG.: export it"),
+        (b"%PDF-1.7\n", r"is a drawing \(PDF"),
+        (b"II*\0\x10\0\0\0CR\2\0" + bytes(40), "is a camera's raw file: develop it"),
+        (b"\0\0\0\x18ftypcrx " + bytes(40), "is a camera's raw file: develop it"),
+        (bytes(128) + b"DICM" + bytes(40), "is a DICOM picture: convert it to NRRD"),
+        (b"NRRD0004\n", "is a volume .*: simdtex simulate reads it"),
+        (b'<?xml version="1.0"?>\n<VTKFile type="ImageData">', "is a volume .*: simdtex simulate reads it"),
+        (b"PK\3\4" + bytes(40), "is an archive .*: unpack it"),
+        (b"hello, world", "is not an image: give a PNG, JPEG, TIFF"),
+        (bytes(range(256)) * 9, "is not an image: give a PNG, JPEG, TIFF"),
+    ],
+)
+def test_formats_that_are_not_read_are_named(tmp_path, data, words):
+    (tmp_path / "a").write_bytes(data)
+    with pytest.raises(ValueError, match=f"a {words}"):
+        image.read(tmp_path / "a")
+
+
+def test_the_preview_in_a_raw_file_is_not_the_picture(tmp_path):
+    with tifffile.TiffWriter(tmp_path / "a.dng") as file:
+        file.write(noise((8, 8, 3)), photometric="rgb", subfiletype=1, metadata=None)
+        file.write(noise((32, 32), "uint16"), photometric="cfa", metadata=None)
+    with pytest.raises(ValueError, match="is a camera's raw file: develop it to TIFF"):
+        image.read(tmp_path / "a.dng")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"P5 2 2 255 \0\0\0", "cannot be read as an image"),
+        (b"P2 2 2 255 1 2 3", "cannot be read as an image"),
+        (b"P2 2 2 255 1 2 x 4", "cannot be read as an image"),
         (b"P2 2 2 3 1 2 3 4", "value that is not 0 to 3"),
         (b"P2 2 2 3 1 2 3 -1", "value that is not 0 to 3"),
         (b"P5 2 2 3 \0\1\2\4", "value that is not 0 to 3"),
@@ -231,7 +352,7 @@ def test_pgm_and_ppm_have_the_values_of_the_file(tmp_path, largest, channels):
         (b"P5 2 2 65536 " + bytes(8), "largest value is 65536"),
         (b"P5 0 2 255 ", "shape"),
         (b"P5 999999999 999999999 255 ", "no more than"),
-        (b"P5 2 two", "is not an image"),
+        (b"P5 2 two", "cannot be read as an image"),
     ],
 )
 def test_damaged_pgm(tmp_path, data, words):
@@ -303,7 +424,7 @@ def test_damaged_tiff_says_one_sentence(tmp_path, caplog):
     data = bytearray(encoded(".tif", "uint8", tmp_path))
     data[8:60] = bytes(range(52))
     (tmp_path / "a.tif").write_bytes(data)
-    with pytest.raises(ValueError, match="cannot be decoded"):
+    with pytest.raises(ValueError, match="cannot be read as an image"):
         image.read(tmp_path / "a.tif")
     assert [r.message for r in caplog.records if r.levelno >= logging.WARNING] == []
 
@@ -320,7 +441,7 @@ def test_files_that_are_no_images(tmp_path):
     with pytest.raises(ValueError, match="is not an image"):
         image.read(tmp_path / "text.png")
     np.save(tmp_path / "o.npy", np.array([{}, {}], object), allow_pickle=True)
-    with pytest.raises(ValueError, match="cannot be decoded"):
+    with pytest.raises(ValueError, match="cannot be read as an image"):
         image.read(tmp_path / "o.npy")
     np.save(tmp_path / "line.npy", np.zeros(4))
     with pytest.raises(ValueError, match=r"line\.npy: the picture has the shape \(4,\)"):

@@ -10,6 +10,7 @@ from itertools import product
 from math import isqrt
 from pathlib import Path
 
+import nrrd
 import numpy as np
 import pytest
 import xarray
@@ -312,24 +313,66 @@ def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, s
         coords = {"z": np.arange(9) - 9.0, "y": np.arange(14) * 10.0 + 7, "x": np.arange(15) * 10.0 + 5}
         xarray.DataArray(training, coords, ("z", "y", "x"), name="facies").to_netcdf("ti.nc", engine="h5netcdf")
     else:
-        volume.write("ti.nrrd", training)
-    Path("wells.csv").write_text("x,y,z,facies\n15,27,-8,1\n" if suffix != ".nrrd" else "x,y,z,facies\n1,2,1,1\n")
+        fields = {"space dimension": 3, "space origin": [5, 7, -9], "space directions": np.diag([10, 10, 1])}
+        nrrd.write("ti.nrrd", training, fields, index_order="C")
+    Path("wells.csv").write_text("x,y,z,facies\n15,27,-8,1\n")
     words = [f"ti{suffix}", "-o", "out.nc", "-n", "2", "--categorical", "--known", "wells.csv", "--size", "12x13x8"]
     result = CliRunner().invoke(
         main, ["simulate", *words, "--order", "3", "--seed", "7", "--device", "reference", "--report", "page"]
     )
     assert result.exit_code == 0, result.output
     found = xarray.open_dataarray("out.nc")
-    place = {} if suffix == ".nrrd" else {"origin": (5, 7, -9), "cell": (10, 10, 1)}
+    place = {"origin": (5, 7, -9), "cell": (10, 10, 1)}
     given = {"known": "wells.csv", "shape": (8, 13, 12), "order": 3, "rng": 7, "device": "reference", **place}
     assert_same_bits(found.values, simdtex.simulate(training, 2, categorical=True, **given).values)
     assert (found.values[:, 1, 2, 1] == 1).all()
-    assert found.y.values[0] == (0 if suffix == ".nrrd" else 7)
+    assert found.y.values[0] == 7
     results = json.loads(Path("page/results.json").read_text())
     own = results["variograms"][0]
     assert own[1][2] == pytest.approx(np.mean(training[:, 2:] != training[:, :-2]) / 2)
     assert results["connectivity"][0] == connectivity(training, 1, len(own[0]) - 1).function.tolist()
     assert {"slices.png", "variograms.png", "connectivity.png", "index.html"} <= set(results["files"])
+
+
+def test_what_solid_writes_is_a_training_image(tmp_path, monkeypatch):
+    """A block of three axes is a volume in each format, the same to the bit; --channels makes it a picture."""
+    monkeypatch.chdir(tmp_path)
+    training, found = facies((9, 14, 15)), []
+    for name in ("ti.npy", "ti.npz", "ti.tif", "ti.nrrd", "slices"):
+        volume.write(name, training)
+        words = [
+            name,
+            "-o",
+            f"{name}-out.npz",
+            "--size",
+            "9x8x7",
+            "--order",
+            "2",
+            "--seed",
+            "7",
+            "--device",
+            "reference",
+        ]
+        result = CliRunner().invoke(main, ["simulate", *words])
+        assert result.exit_code == 0 and "9x8x7" in result.output, result.output
+        found.append(np.load(f"{name}-out.npz")["values"])
+    assert found[0].shape == (1, 7, 8, 9)
+    for other in found[1:]:
+        assert_same_bits(other, found[0])
+    words = ["ti.npy", "-o", "out.npz", "--size", "8x7", "--order", "2", "--device", "reference", "--channels"]
+    result = CliRunner().invoke(main, ["simulate", *words])
+    assert result.exit_code == 0 and np.load("out.npz")["values"].shape == (1, 7, 8, 15), result.output
+    Path("wells.csv").write_text("x,y,facies\n1,2,1\n")
+    for more, words in (([], "ti.npy is a volume, and estimates are maps"), (["--channels"], "has several channels")):
+        result = CliRunner().invoke(main, ["estimate", "ti.npy", "-o", "out.npz", "--known", "wells.csv", *more])
+        assert result.exit_code == 2 and words in result.output
+
+
+def test_an_output_in_a_folder_of_slices_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    volume.write("slices", facies((9, 14, 15)))
+    result = CliRunner().invoke(main, ["simulate", "slices", "-o", "slices/out.npz"])
+    assert result.exit_code == 2 and "would be written into slices, which is an input" in result.output
 
 
 def test_a_size_of_a_volume_has_three_sides(tmp_path, monkeypatch):

@@ -1,15 +1,22 @@
 """Solid textures go to a file and back without a value changed; what a format cannot hold is said before the work."""
 
+import bz2
+import gzip
 import os
 import re
+import struct
+import tracemalloc
+import zlib
 
 import nrrd
 import numpy as np
 import PIL.Image
 import pytest
+import tifffile
 from volumes import loaded, noise
 
-from simdtex.io import volume
+from simdtex.cli.inputs import read_pixels
+from simdtex.io import image, limits, volume
 
 WHOLE = ["uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"]
 HOLDS = {
@@ -23,16 +30,21 @@ ROUND_TRIPS = [(s, dtype, c) for s, (types, channels) in HOLDS.items() for dtype
 
 
 @pytest.mark.parametrize(("suffix", "dtype", "channels"), ROUND_TRIPS)
-def test_values_and_types_survive_a_file(tmp_path, suffix, dtype, channels):
+def test_what_is_written_is_read_as_what_it_was(tmp_path, suffix, dtype, channels):
+    """By the libraries of the formats and by `read`, also an alpha that is opaque."""
     values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
+    if channels in (2, 4):
+        values[..., -1] = np.iinfo(dtype).max if values.dtype.kind in "iu" else 1
     path = tmp_path / f"block{suffix}"
     volume.check_writable(path, values.dtype, channels or 1)
     volume.write(path, values)
-    back = loaded(path)
-    if channels == 1 and suffix not in (".npz", ".NPY"):
-        values = values[..., 0]
-    assert back.dtype.newbyteorder("=") == values.dtype.newbyteorder("=")
-    np.testing.assert_array_equal(back, values)
+    assert volume.is_volume(path)
+    grid = volume.read(path)
+    assert (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
+    for back in (loaded(path), stacked(grid)):
+        assert back.dtype.newbyteorder("=") == values.dtype.newbyteorder("=")
+        np.testing.assert_array_equal(back.reshape(4, 3, 5, -1), values.reshape(4, 3, 5, -1))
+    assert loaded(path).ndim == (3 if channels is None or (channels == 1 and suffix not in (".npz", ".NPY")) else 4)
     assert os.listdir(tmp_path) == [path.name]
 
 
@@ -139,34 +151,410 @@ def test_write_checks_its_array(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize("suffix", [".nrrd", ".tif", ".npy"])
-@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
-def test_a_volume_is_read_as_it_was_written(tmp_path, suffix, dtype):
-    path, values = tmp_path / f"block{suffix}", noise((4, 3, 5, 1), dtype)
-    volume.write(path, values)
-    assert volume.is_volume(path)
-    back = volume.read(path)
-    assert back.dtype == values.dtype
-    np.testing.assert_array_equal(back, values)
+def stacked(grid):
+    """The volume of a grid, (layers, rows, cols, variables)."""
+    return np.stack(list(grid.values.values()), -1)
+
+
+def test_what_may_be_a_picture_is_no_volume(tmp_path):
+    for shape, picture, with_channels in [((5, 6), True, True), ((3, 5, 6), False, True), ((2, 3, 5, 6), False, False)]:
+        np.save(tmp_path / "a.npy", np.ones(shape))
+        assert volume.is_volume(tmp_path / "a.npy") != picture
+        assert volume.is_volume(tmp_path / "a.npy", channels=True) != with_channels
+    volume.write(tmp_path / "a.tif", np.ones((1, 5, 6)))
+    assert not volume.is_volume(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("suffix", [".nrrd", ".tif", ".npy", ".npz", ".mha", ".vti"])
+def test_a_damaged_or_large_volume_gets_one_sentence(tmp_path, suffix):
+    path, values = tmp_path / f"block{suffix}", noise((4, 30, 50, 1), "uint16")
+    if suffix == ".mha":
+        metaimage(path, values[..., 0])
+    elif suffix == ".vti":
+        vti(path, values)
+    else:
+        volume.write(path, values)
+    with pytest.raises(ValueError, match=re.escape(str(path))) as said:
+        volume.read(path, max_pixels=100)
+    assert "no more than" in str(said.value)
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(ValueError, match=re.escape(str(path))) as said:
+        volume.read(path)
+    assert "\n" not in str(said.value)
+    with pytest.raises(ValueError, match="does not exist"):
+        volume.read(tmp_path / f"none{suffix}")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFO on this system")
+def test_only_regular_files_are_read(tmp_path):
+    """None of the readers waits for a FIFO, or reads a device; a folder is slices or nothing."""
+    (tmp_path / "empty").mkdir()
+    for suffix in (".nrrd", ".mhd", ".vti", ".vtk", ".raw", ".tif", ".npy", ".npz", ".png", ".exr", ".gslib"):
+        path = tmp_path / f"pipe{suffix}"
+        os.mkfifo(path)
+        with pytest.raises(ValueError, match="is not a regular file"):
+            read_pixels(path, deep=True)
+        path.unlink()
+        path.symlink_to("/dev/zero")
+        with pytest.raises(ValueError, match="is not a regular file"):
+            read_pixels(path, deep=True)
+    with pytest.raises(ValueError, match="is a folder: keep only slices in it"):
+        read_pixels(tmp_path / "empty", deep=True)
+    with pytest.raises(ValueError, match="is a folder: give the path of the image"):
+        read_pixels(tmp_path / "empty")
+
+
+# NRRD and MetaImage
+
+NRRD = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 3 4\nencoding: {}\n{}\n"
+BLOCK = noise((4, 3, 5))
+
+
+def metaimage(path, values, *more, data="LOCAL"):
+    """Write a MetaImage of little-endian values, (layers, rows, cols) or with channels."""
+    kind = {"uint8": "UCHAR", "uint16": "USHORT", "int16": "SHORT", "float32": "FLOAT", "int64": "LONG_LONG"}
+    sides, parts = values.shape[2::-1], values.shape[3:] or (1,)
+    lines = ["ObjectType = Image", "NDims = 3", "BinaryData = True", *more, f"DimSize = {' '.join(map(str, sides))}"]
+    lines += [f"ElementNumberOfChannels = {parts[0]}", f"ElementType = MET_{kind[values.dtype.name]}"]
+    path.write_bytes("\n".join([*lines, f"ElementDataFile = {data}\n"]).encode() + values.tobytes() * (data == "LOCAL"))
+
+
+HEADERS = {
+    "a.nrrd": lambda path, data: path.write_bytes(NRRD.format("raw", f"data file: {data}").encode()),
+    "a.nhdr": lambda path, data: path.write_bytes(NRRD.format("raw", f"datafile: {data}").encode()),
+    "a.mhd": lambda path, data: metaimage(path, BLOCK, data=data),
+}
+
+
+@pytest.mark.parametrize("name", HEADERS)
+def test_a_header_names_a_file_in_its_folder_alone(tmp_path, name):
+    (tmp_path / "own" / "sub").mkdir(parents=True)
+    path = tmp_path / "own" / name
+    for place in ("secret.raw", "own/block.raw", "own/sub/block.raw"):
+        (tmp_path / place).write_bytes(BLOCK.tobytes())
+    HEADERS[name](path, "block.raw")
+    np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], BLOCK)
+    (path.parent / "link.raw").symlink_to(tmp_path / "secret.raw")
+    os.mkfifo(path.parent / "pipe.raw")
+    for data in (f"{tmp_path}/secret.raw", "../secret.raw", "sub/block.raw", "link.raw", "LIST", "block%d.raw 1 4 1"):
+        HEADERS[name](path, data)
+        with pytest.raises(ValueError, match=r"names the data file .*: put the data into one file in the folder"):
+            volume.read(path)
+    for data, words in (("pipe.raw", "not a regular file"), ("none.raw", "does not exist"), ("sub", "is a folder")):
+        HEADERS[name](path, data)
+        with pytest.raises(ValueError, match=words):
+            volume.read(path)
+
+
+@pytest.mark.parametrize("kind", ["gzip", "bzip2", "mhd"])
+def test_data_unpack_to_what_the_header_states_and_no_further(tmp_path, kind):
+    pack = {"gzip": gzip.compress, "bzip2": bz2.compress, "mhd": zlib.compress}[kind]
+
+    def write(path, data):
+        if kind == "mhd":
+            metaimage(path, BLOCK, "CompressedData = True", data="a.zraw")
+            path.with_name("a.zraw").write_bytes(pack(data))
+        else:
+            path.write_bytes(NRRD.format(kind, "").encode() + pack(data))
+
+    path = tmp_path / ("a.mhd" if kind == "mhd" else "a.nrrd")
+    write(path, BLOCK.tobytes())
+    np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], BLOCK)
+    write(path, BLOCK.tobytes() + bytes(2**27))
+    tracemalloc.start()
+    try:
+        np.testing.assert_array_equal(stacked(volume.read(path, max_pixels=100_000))[..., 0], BLOCK)
+        assert tracemalloc.get_traced_memory()[1] < 2**23
+    finally:
+        tracemalloc.stop()
+    write(path, BLOCK.tobytes()[:-1])
+    with pytest.raises(ValueError, match="cannot be read as a volume"):
+        volume.read(path)
 
 
 @pytest.mark.parametrize(
-    ("suffix", "values"), [(".tif", np.ones((1, 5, 6))), (".npy", np.ones((3, 5, 6))), (".npy", np.ones((5, 6)))]
+    ("fields", "origin", "cell", "turned"),
+    [
+        ("spacings: 2 3 0.5\n", (0, 0, 0), (2, 3, 0.5), ()),
+        (
+            "space dimension: 3\nspace directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (1,2,3)\n",
+            (1, 2, 3),
+            (2, 3, 4),
+            (),
+        ),
+        (
+            "space: LPS\nspace directions: (-2,0,0) (0,3,0) (0,0,-4)\nspace origin: (1,2,3)\n",
+            (-7, 2, -9),
+            (2, 3, 4),
+            (0, 2),
+        ),
+        ("space: LPS\nspace directions: (0,3,4) (1,0,0) (0,-4,3)\nspace origin: (1,2,3)\n", (0, 0, 0), (5, 1, 5), ()),
+    ],
 )
-def test_what_may_be_a_picture_is_no_volume(tmp_path, suffix, values):
-    path = tmp_path / f"picture{suffix}"
-    np.save(path, values) if suffix == ".npy" else volume.write(path, values)
-    assert not volume.is_volume(path)
+def test_an_nrrd_keeps_the_place_of_its_cells(tmp_path, fields, origin, cell, turned):
+    (tmp_path / "a.nrrd").write_bytes(NRRD.format("raw", fields).encode() + BLOCK.tobytes())
+    grid = volume.read(tmp_path / "a.nrrd")
+    assert (grid.origin, grid.cell) == (origin, cell)
+    np.testing.assert_array_equal(stacked(grid)[..., 0], np.flip(BLOCK, turned))
 
 
-@pytest.mark.parametrize("suffix", [".nrrd", ".tif", ".npy"])
-def test_a_damaged_or_large_volume_gets_one_sentence(tmp_path, suffix):
-    path = tmp_path / f"block{suffix}"
-    volume.write(path, noise((4, 30, 50, 1), "uint16"))
-    with pytest.raises(ValueError, match=re.escape(str(path))):
-        volume.read(path, max_pixels=10)
-    path.write_bytes(path.read_bytes()[:-2000])
-    with pytest.raises(ValueError, match=re.escape(str(path))):
+def test_the_kinds_of_an_nrrd_say_which_axis_has_variables(tmp_path):
+    values = noise((2, 4, 3, 5))
+    head = NRRD.format("raw", "kinds: {}\n").replace("dimension: 3\nsizes: 5 3 4", "dimension: 4\nsizes: 5 3 4 2")
+    (tmp_path / "a.nrrd").write_bytes(head.format("domain domain domain list").encode() + values.tobytes())
+    np.testing.assert_array_equal(stacked(volume.read(tmp_path / "a.nrrd")), np.moveaxis(values, 0, -1))
+    for kinds in ("domain domain domain time", "domain domain domain domain", "vector domain domain list"):
+        (tmp_path / "a.nrrd").write_bytes(head.format(kinds).encode() + values.tobytes())
+        with pytest.raises(ValueError, match=r"has the axes .*: give three of space"):
+            volume.read(tmp_path / "a.nrrd")
+
+
+@pytest.mark.parametrize(("dtype", "channels"), [("uint8", None), ("int16", 3), ("float32", None), ("int64", 2)])
+def test_a_metaimage_is_read_with_its_place(tmp_path, dtype, channels):
+    values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
+    metaimage(
+        tmp_path / "a.mha", values, "ElementSpacing = 2 3 4", "Offset = 1 2 3", "TransformMatrix = 1 0 0 0 1 0 0 0 -1"
+    )
+    grid = volume.read(tmp_path / "a.mha")
+    assert (grid.origin, grid.cell) == ((1, 2, -9), (2, 3, 4))
+    np.testing.assert_array_equal(stacked(grid), values.reshape(4, 3, 5, -1)[::-1])
+    metaimage(tmp_path / "b.mha", values.astype(values.dtype.newbyteorder(">")), "BinaryDataByteOrderMSB = True")
+    np.testing.assert_array_equal(stacked(volume.read(tmp_path / "b.mha")), values.reshape(4, 3, 5, -1))
+
+
+# VTK
+
+
+def vti(path, values, cells=False, origin=(10, 20, 30)):
+    """Write an image of VTK, compressed, with values (layers, rows, cols, variables) of points or of cells."""
+    import pyvista
+
+    sides = values.shape[2::-1]
+    found = pyvista.ImageData(dimensions=[side + cells for side in sides], spacing=(2, 4, 6), origin=origin)
+    (found.cell_data if cells else found.point_data)["phase"] = values.reshape(-1, values.shape[3])
+    found.save(path)
+
+
+@pytest.mark.parametrize("suffix", [".vti", ".vtk"])
+@pytest.mark.parametrize(("dtype", "variables"), [("uint8", 1), ("int16", 3), ("float32", 2)])
+def test_points_and_cells_of_vtk(tmp_path, suffix, dtype, variables):
+    pytest.importorskip("pyvista")
+    values = noise((4, 3, 5, variables), dtype)
+    for cells, origin in ((False, (10, 20, 30)), (True, (11, 22, 33))):
+        vti(tmp_path / f"a{suffix}", values, cells)
+        grid = volume.read(tmp_path / f"a{suffix}")
+        assert (grid.origin, grid.cell) == (origin, (2, 4, 6))
+        assert list(grid.values) == (["phase"] if variables == 1 else [f"phase_{k}" for k in range(variables)])
+        np.testing.assert_array_equal(stacked(grid), values, strict=True)
+
+
+def test_what_vtk_would_take_memory_for_is_refused_before(tmp_path, capfd):
+    pyvista = pytest.importorskip("pyvista")
+    vti(tmp_path / "a.vti", noise((4, 3, 5, 1)))
+    text = (tmp_path / "a.vti").read_text()
+    legacy = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 0 0 0\n"
+    legacy += "SPACING 1 1 1\nPOINT_DATA 6\nFIELD f 1\na 1 999999999 double\n1 2 3 4 5 6\n"
+    for name, data, words in (
+        ("a.vti", text.replace('"0 4 0 2 0 3"', '"0 40000 0 20000 0 3"'), "no more than"),
+        ("a.vti", text.replace('Name="phase"', 'Name="phase" NumberOfComponents="999999999"'), "no more than"),
+        ("a.vti", text[:400], "cannot be read as a volume"),
+        ("a.vti", "hello", "cannot be read as a volume"),
+        ("a.vtk", legacy, "no more than"),
+    ):
+        (tmp_path / name).write_text(data)
+        with pytest.raises(ValueError, match=words) as said:
+            volume.read(tmp_path / name)
+        assert "\n" not in str(said.value) and not "".join(capfd.readouterr())
+    pyvista.RectilinearGrid([0.0, 1.0, 3.0]).save(tmp_path / "b.vtk")
+    with pytest.raises(ValueError, match="holds RectilinearGrid of VTK: resample it"):
+        volume.read(tmp_path / "b.vtk")
+
+
+@pytest.mark.parametrize(("name", "library"), [("a.vti", "pyvista"), ("a.exr", "OpenEXR"), ("a.heic", "pillow_heif")])
+def test_a_sentence_names_the_extra(tmp_path, monkeypatch, name, library):
+    monkeypatch.setattr(limits, "find_spec", lambda wanted: None if wanted == library else True)
+    start = {"a.exr": b"\x76\x2f\x31\x01", "a.heic": b"\0\0\0\x1cftypheic"}
+    (tmp_path / name).write_bytes(start.get(name, b"") + bytes(50))
+    with pytest.raises(ValueError, match=r"a\.\w+ is .*: pip install 'simdtex\[(volumes|pictures)\]' to read it$"):
+        read_pixels(tmp_path / name, deep=True)
+
+
+# raw values and slices
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "float32"])
+def test_a_raw_volume_says_its_shape_in_its_name(tmp_path, dtype):
+    values = noise((4, 3, 5), np.dtype(dtype).newbyteorder("<"))
+    path = tmp_path / f"bonsai_5x3x4_{dtype}.raw"
+    path.write_bytes(values.tobytes())
+    np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], values)
+    for name, words in [
+        ("bonsai.raw", "name it with columns x rows x layers and type, as"),
+        (f"bonsai_5x3x5_{dtype}.raw", r"has \d+ bytes, not \d+ as its name says"),
+        ("bonsai_99999x99999x99999_uint8.raw", "no more than"),
+    ]:
+        path = path.rename(tmp_path / name)
+        with pytest.raises(ValueError, match=words):
+            volume.read(path)
+
+
+def test_slices_are_ordered_by_their_number(tmp_path):
+    values = noise((11, 3, 5), "uint16")
+    for number, layer in enumerate(values, 95):
+        image.write(tmp_path / f"scan{number}.tif", layer)
+    np.testing.assert_array_equal(stacked(volume.read(tmp_path))[..., 0], values)
+    with pytest.raises(ValueError, match="no more than"):
+        volume.read(tmp_path, max_pixels=100)
+    (tmp_path / "scan97.tif").rename(tmp_path / "scan106.tif")
+    with pytest.raises(ValueError, match="has no slice of number 97"):
+        volume.read(tmp_path)
+    image.write(tmp_path / "scan97.tif", values[0, :2])
+    with pytest.raises(ValueError, match="size or type is not that of the first"):
+        volume.read(tmp_path)
+    (tmp_path / "other9.tif").touch()
+    with pytest.raises(ValueError, match="keep only slices in it"):
+        volume.read(tmp_path)
+
+
+# pages of a TIFF
+
+
+def stack(path, *pages, **options):
+    with tifffile.TiffWriter(path) as file:
+        for page in pages:
+            page, more = page if isinstance(page, tuple) else (page, {})
+            file.write(page, metadata=None, **{"photometric": "minisblack"} | options | more)
+    return path
+
+
+def test_a_terrain_with_a_mask_and_overviews_is_one_picture(tmp_path):
+    terrain, mask = noise((32, 48), "float32"), noise((32, 48), bool)
+    reduced = {"subfiletype": 1}
+    inner = {"subfiletype": 4, "photometric": "mask"}
+    for pages in ([(mask, inner)], [(terrain[::2, ::2], reduced)], [(terrain[::2, ::2], reduced), (mask, inner)]):
+        path = stack(tmp_path / "a.tif", terrain, *pages)
+        assert not volume.is_volume(path)
+        found = image.read(path)
+        assert not found.metadata.more
+        np.testing.assert_array_equal(found.pixels, terrain)
+    for kind in (None, "palette"):  # a preview before the picture
+        more = {"photometric": "palette", "colormap": noise((3, 256), "uint16")} if kind else {}
+        whole = noise((32, 48))
+        path = stack(tmp_path / "b.tif", (whole[::2, ::2], reduced | more), (whole, more))
+        assert image.read(path).pixels.shape[:2] == (32, 48) and not volume.is_volume(path)
+
+
+def test_an_imagej_stack_is_the_whole_stack(tmp_path):
+    path, values = tmp_path / "a.tif", noise((20, 2, 6, 7), "uint16")
+    about = {"axes": "ZYX", "spacing": 3.0, "unit": "um"}
+    tifffile.imwrite(path, values[:, 0], imagej=True, metadata=about, resolution=(2, 4))
+    data = bytearray(path.read_bytes())
+    with tifffile.TiffFile(path) as file:
+        page = file.pages.first
+        link = page.offset + 2 + 12 * len(page.tags)
+        data[link : link + 4] = bytes(4)  # one header, which all planes follow, as of ImageJ's large stacks
+    path.write_bytes(data)
+    with tifffile.TiffFile(path) as file:
+        assert len(file.pages) == 1
+    grid = volume.read(path)
+    assert (grid.origin, grid.cell) == ((0, 0, 0), (0.5, 0.25, 3))
+    np.testing.assert_array_equal(stacked(grid)[..., 0], values[:, 0])
+    assert image.read(path).metadata.more
+    tifffile.imwrite(path, values, imagej=True, metadata={"axes": "ZCYX"})
+    np.testing.assert_array_equal(stacked(volume.read(path)), np.moveaxis(values, 1, -1))
+    assert volume.read(path).cell == (1, 1, 1)
+    path.write_bytes(path.read_bytes()[:-50])
+    assert volume.is_volume(path)
+    with pytest.raises(ValueError, match="cannot be read as a volume"):
         volume.read(path)
-    with pytest.raises(ValueError, match="does not exist"):
-        volume.read(tmp_path / f"none{suffix}")
+
+
+def test_axes_of_a_tiff(tmp_path):
+    path, values = tmp_path / "a.tif", noise((2, 20, 6, 7), "uint16")
+    tifffile.imwrite(path, values, photometric="minisblack", metadata={"axes": "CZYX"})
+    np.testing.assert_array_equal(stacked(volume.read(path)), np.moveaxis(values, 0, -1))
+    tifffile.imwrite(path, values, photometric="minisblack", ome=True, metadata={"axes": "CZYX"})
+    np.testing.assert_array_equal(stacked(volume.read(path)), np.moveaxis(values, 0, -1))
+    tifffile.imwrite(path, noise((16, 32, 48)), photometric="minisblack", volumetric=True, tile=(16, 16, 16))
+    assert volume.is_volume(path) and stacked(volume.read(path)).shape == (16, 32, 48, 1)
+    tifffile.imwrite(path, values[0], photometric="minisblack", compression="jpeg2000")
+    with pytest.raises(ValueError, match="is compressed by the method 34712: save it with Deflate"):
+        volume.read(path)
+    tifffile.imwrite(path, noise((20, 6, 7, 3)), photometric="rgb", metadata={"axes": "ZYXS"})
+    assert stacked(volume.read(path)).shape == (20, 6, 7, 3)
+    for axes in ("TZYX", "ATYX"):
+        tifffile.imwrite(path, values, photometric="minisblack", metadata={"axes": axes})
+        with pytest.raises(ValueError, match=f"has the axes {axes}: save a stack of layers"):
+            volume.read(path)
+
+
+def test_the_limit_holds_for_each_page_and_for_all(tmp_path, monkeypatch):
+    """A page too large among small ones is another picture; many small ones are too many."""
+    path = stack(tmp_path / "a.tif", *noise((9, 30, 40)))
+    with pytest.raises(ValueError, match="has 10800 pixels and no more than 10000"):
+        volume.read(path, max_pixels=10_000)
+    large = 2**14
+    for number in (3, 8):  # the third is one that tifffile takes to be like the others
+        pages = list(noise((9, 30, 40)))
+        pages[number] = np.zeros((large, large), np.uint8)
+        stack(path, *pages, compression="zlib")
+        tracemalloc.start()
+        try:
+            with pytest.raises(
+                ValueError, match=r"pages of several sizes or types|page is damaged, or of another size"
+            ):
+                read_pixels(path, deep=True)
+            assert tracemalloc.get_traced_memory()[1] < 2**24
+        finally:
+            tracemalloc.stop()
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8, 10, 12, 14, 16])
+@pytest.mark.parametrize("photometric", ["minisblack", "miniswhite"])
+def test_few_bits_and_white_is_zero(tmp_path, bits, photometric):
+    """Stacks and pictures have the same values, at full scale; a mask of them has white."""
+    top = 2**bits - 1
+    full = 255 if bits <= 8 else 65535
+    values = np.stack([np.arange(32, dtype=np.uint16).reshape(4, 8) * top // 31] * 3)
+    written = values.astype(bool) if bits == 1 else values.astype(np.uint8 if bits <= 8 else np.uint16)
+    path = tmp_path / "a.tif"
+    if bits in (8, 16, 1):
+        stack(path, *written, photometric=photometric)
+    else:
+        packed = [packed_bits(page, bits) for page in values]
+        packed_tiff(path, packed, (4, 8), bits, photometric == "miniswhite")
+    expected = np.rint(values * (full / top))
+    expected = full - expected if photometric == "miniswhite" else expected
+    found = image.read(path).pixels
+    assert found.dtype == (np.uint8 if bits <= 8 else np.uint16)
+    np.testing.assert_array_equal(found, expected[0])
+    np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], expected)
+    np.testing.assert_array_equal(image.read_mask(path, (4, 8)), expected[0] > full / 2)
+
+
+def packed_bits(values, bits):
+    """The bytes of rows of values of so many bits."""
+    rows = ["".join(f"{value:0{bits}b}" for value in row) for row in values]
+    return b"".join(int(row, 2).to_bytes(len(row) // 8, "big") for row in rows)
+
+
+def packed_tiff(path, pages, shape, bits, white_is_zero):
+    """Write a TIFF of pages of packed bits, which tifffile does not write."""
+    data = b"II*\0\0\0\0\0"
+    link = 4
+    for page in pages:
+        begin, data = len(data), data + page + bytes(len(page) % 2)
+        entries = [
+            (256, 4, shape[1]),
+            (257, 4, shape[0]),
+            (258, 3, bits),
+            (259, 3, 1),
+            (262, 3, int(not white_is_zero)),
+        ]
+        entries += [(273, 4, begin), (277, 3, 1), (278, 4, shape[0]), (279, 4, len(page))]
+        data = data[:link] + struct.pack("<I", len(data)) + data[link + 4 :]
+        data += struct.pack("<H", len(entries)) + b"".join(
+            struct.pack("<HHII", tag, kind, 1, n) for tag, kind, n in entries
+        )
+        link, data = len(data), data + bytes(4)
+    path.write_bytes(data)

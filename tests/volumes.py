@@ -1,5 +1,7 @@
 """Random pictures and volumes, and volumes read back by the libraries of their formats."""
 
+import struct
+import zlib
 from pathlib import Path
 
 import imagecodecs
@@ -33,3 +35,16 @@ def loaded(path):
             return np.stack([page.asarray() for page in file.pages])
     found = np.load(path)
     return found["volume"] if suffix == ".npz" else found
+
+
+def png(width, height, bits=8, colours=2, rows=b"", **more):
+    """The bytes of a PNG with these rows, each after its filter, and more chunks by name."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, bits, colours, 0, 0, 0)
+    texts = b"".join(chunk(kind.encode(), data) for kind, data in more.items())
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + texts + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    )

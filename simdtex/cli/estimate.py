@@ -12,8 +12,8 @@ import click
 from simdtex.cli.command import DATA, command
 from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import output_shape, read_material, take_reading
-from simdtex.cli.options import DEVICE, SAMPLE_MASK, data_options, given, option, places, size_option
-from simdtex.cli.places import EITHER, READ
+from simdtex.cli.options import CHANNELS, DEVICE, SAMPLE_MASK, data_options, given, option, places, size_option
+from simdtex.cli.places import EITHER, ENTER
 from simdtex.cli.simulate import georeferenced, lies_of
 
 
@@ -24,7 +24,7 @@ from simdtex.cli.simulate import georeferenced, lies_of
     ),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
 )
-@click.argument("training_image", nargs=-1, required=True, type=READ)
+@click.argument("training_image", nargs=-1, required=True, type=ENTER)
 @click.option(
     "-o",
     "--output",
@@ -32,6 +32,7 @@ from simdtex.cli.simulate import georeferenced, lies_of
     type=EITHER,
     help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.",
 )
+@CHANNELS
 @size_option("that of --known, else of TRAINING_IMAGE", "maps")
 @data_options
 @places
@@ -67,6 +68,8 @@ def estimate(
 
     began, how = time.perf_counter(), take_reading(options, deep=True)
     material = read_material(training_image, how)
+    if material.deep:
+        raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     data = read_data(material, options, how)

@@ -32,13 +32,15 @@ class Reading(NamedTuple):
     """How files are read.
 
     ``deep``: grids and rasters as cells in ascending order of y, and a file of several layers as a volume; ``palette``:
-    colours of a palette as their indices, which are categories;
+    colours of a palette as their indices, which are categories; ``channels``: the last axis of an array of three axes
+    as channels;
     ``variables``: the names of those of a grid to take; ``missing``: further numbers that mean an unknown value;
     ``valid``: the range of possible values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
     """
 
     deep: bool = False
     palette: bool = False
+    channels: bool = False
     variables: tuple[str, ...] = ()
     missing: tuple[float, ...] = ()
     valid: tuple[float, float] | None = None
@@ -189,23 +191,20 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
 
     With ``how.deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
     """
-    from simdtex.io import grids
+    from simdtex.io import grids, volume
 
-    if not grids.is_grid(path, rasters=how.deep):
-        if how.deep:
-            from simdtex.io import volume  # whose libraries take long to load
-
-            if volume.is_volume(path):
-                values = volume.read(path)
-                return Read(values if len(values) > 1 else values[0])
+    if grids.is_grid(path, rasters=how.deep):
+        grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
+        if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
+            raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
+    elif volume.is_volume(path, how.channels or not how.deep):
+        grid = volume.read(path)
+    else:
         found = read_picture(path, how.palette)
         return Read(found.pixels, found.metadata)
-    grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
-    if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
-        raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
-        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1, or use simdtex simulate")
+        raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
     return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
 
 
@@ -395,6 +394,7 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     return Reading(
         deep,
         bool(options.get("categorical")),
+        options.pop("channels", False),
         options.pop("variables", ()),
         options.pop("missing"),
         columns=columns or None,

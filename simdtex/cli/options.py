@@ -272,6 +272,12 @@ def places(command: Command) -> Command:
     return command
 
 
+CHANNELS = option(
+    "--channels",
+    is_flag=True,
+    group=DATA,
+    help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
+)
 SOURCE_MAP = option(
     "--source-map",
     group=OUTPUTS,

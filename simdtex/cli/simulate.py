@@ -16,6 +16,7 @@ from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import (
+    CHANNELS,
     GUIDE,
     SAMPLE_MASK,
     data_options,
@@ -27,7 +28,7 @@ from simdtex.cli.options import (
     report_option,
     size_option,
 )
-from simdtex.cli.places import EITHER, READ
+from simdtex.cli.places import EITHER, ENTER
 
 
 @job(
@@ -44,7 +45,7 @@ from simdtex.cli.places import EITHER, READ
         "Read a grid, and write a grid.",
     ),
 )
-@click.argument("training_image", nargs=-1, required=True, type=READ)
+@click.argument("training_image", nargs=-1, required=True, type=ENTER)
 @click.option(
     "-o",
     "--output",
@@ -54,6 +55,7 @@ from simdtex.cli.places import EITHER, READ
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
+@CHANNELS
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations")
 @places
 @data_options

@@ -19,12 +19,30 @@ import PIL.Image
 from numpy.typing import NDArray
 
 from simdtex.io import rasters
-from simdtex.io.limits import check_array, check_size, read_npy
+from simdtex.io.limits import Refused, check_array, check_size, needs, read_npy
 
 Array = NDArray[Any]
 
-FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
+FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF", "PPM", "JPEG2000", "AVIF", "TGA")
 """The only Pillow readers in use, since some others start programs, for example the one of PostScript."""
+
+_NAMED = {
+    rb"8BPS": "a Photoshop document (PSD): export it as PNG or TIFF",
+    rb"gimp xcf": "a document of GIMP (XCF): export it as PNG or TIFF",
+    rb"\x00\x00\x01\x00.\x00": "an icon (ICO): export it as PNG",
+    rb"DDS ": "a texture of DirectX (DDS): export it as PNG or TIFF",
+    rb".{4}JXL |\xff\x0a": "a JPEG XL picture: save it as PNG or TIFF",
+    rb".{4}ftypavi": "an AVIF picture, which this Pillow lacks: save it as PNG",
+    rb"#\?R": "a Radiance picture (HDR): save it as OpenEXR or TIFF",
+    rb"%PDF|%!PS|[^\x00]*<svg": "a drawing (PDF, PostScript, SVG): export it as PNG",
+    rb".{8}CR|.{4}ftypcrx|FUJIFILMCCD-RAW|IIR[OS]|IIU\x00|FOVb": "a camera's raw file: develop it to TIFF",
+    rb".{128}DICM": "a DICOM picture: convert it to NRRD, for example with 3D Slicer",
+    rb".{344}n[+i]1": "a NIfTI volume: convert it to NRRD, for example with 3D Slicer",
+    rb"NRRD|ObjectType|# vtk|\s*(<\?xml[^>]*>\s*)?<VTKFile": "a volume (NRRD, MHA, VTK): simdtex simulate reads it",
+    rb"\x89HDF|CDF": "a NetCDF or HDF5 file: simdtex simulate reads it if its name ends in .nc",
+    rb"PK\x03\x04": "an archive (ZIP, .npz): unpack it; simdtex simulate reads volumes in .npz",
+}
+"""Patterns of the first bytes of other formats, and what the message says of them."""
 
 ORIENTATION, DESCRIPTION = 0x0112, 0x010E
 """The EXIF and TIFF tags of the orientation and of the description."""
@@ -37,6 +55,9 @@ _OWN = (0xA002, 0xA003, 0xA005)
 
 _PNM = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" + rb"\s")
 """The header of PGM and PPM: the kind, the width, the height and the largest value."""
+
+_HEIF = re.compile(rb".{4}ftyp(hei[cxms]|hev[cxms]|mif1|msf1)(?!.{4}(.{4}){0,9}avif)", re.DOTALL)
+"""The first bytes of HEIC, whose brands are not those of AVIF."""
 
 _COMPRESSIONS = frozenset((1, 2, 3, 4, 5, 8, 32773, 32946, 34925, 50000))
 """TIFF compressions whose decoders stop at the end of a page: none, CCITT, LZW, Deflate, PackBits, LZMA, Zstandard."""
@@ -62,6 +83,8 @@ class Metadata(NamedTuple):
         Where the pixels of a raster lie, and its number for unknown values.
     palette : bytes, optional
         Red, green and blue of each index of a palette, if the pixels are indices.
+    white : int, optional
+        The value of white if it is not full scale: the maximum in the header of a PGM or PPM.
     """
 
     profile: bytes | None = None
@@ -70,6 +93,7 @@ class Metadata(NamedTuple):
     more: bool = False
     geo: rasters.Georeference | None = None
     palette: bytes | None = None
+    white: int | None = None
 
 
 NOTHING = Metadata()
@@ -82,30 +106,51 @@ GREYS = np.arange(256, dtype=np.uint8).repeat(3).tobytes()
 """The palette whose colours are the indices."""
 
 
-def decode(data: bytes, most: int, palette: bool = False) -> Decoded:
+class _Found(NamedTuple):
+    """Pixels as they are stored: with the orientation of the file, and whether the last channel is alpha."""
+
+    pixels: Array
+    metadata: Metadata = NOTHING
+    orientation: int = 1
+    alpha: bool = False
+
+
+def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> Decoded:
     """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel; and the metadata of the file. With ``palette`` palettes become indices. Raise TooLarge before
-    anything is decoded, and each decoder's own errors for a damaged file.
+    opaque alpha channel unless ``opaque``; and the metadata of the file. Unknown pixels of a raster are NaN, or masked
+    if they are integers. With ``palette`` palettes become indices. Raise Refused before anything is decoded of too
+    large a file and of another format, and each decoder's own errors for a damaged file.
     """
-    with _quiet():
-        if data.startswith(b"\x93NUMPY"):
-            return read_npy(io.BytesIO(data), len(data), most), NOTHING
-        if header := _PNM.match(data):
-            return _read_pnm(data, header, most), NOTHING
-        if data[:5].lower() == b"ncols" or (data[:4] in rasters.TIFF and rasters.is_raster(io.BytesIO(data))):
-            pixels, geo, _ = rasters.read_raster(data, most)
-            return pixels, Metadata(geo=geo)
-        if data[:4] in rasters.TIFF:
-            return _read_tiff(data, most, palette)
-        if data.startswith(b"\x89PNG\r\n\x1a\n") and data[24:25] == b"\x10":  # bits per sample: 16
-            return _read_png16(data, most)
-        return _read_pillow(data, most, palette)
+    with quiet():
+        try:
+            found = _read(data, most, palette)
+        except PIL.UnidentifiedImageError:
+            named = (words for pattern, words in _NAMED.items() if re.match(pattern, data[:1024], re.DOTALL))
+            kinds = "PNG, JPEG, TIFF, BMP, WebP, GIF, TGA, JPEG 2000, AVIF, HEIC, OpenEXR, PPM or .npy"
+            raise Refused(f"is {next(named, f'not an image: give a {kinds} file')}") from None
+    return _finished(found.pixels, found.orientation, found.alpha and not opaque), found.metadata
+
+
+def _read(data: bytes, most: int, palette: bool) -> _Found:
+    if data.startswith(b"\x93NUMPY"):
+        return _Found(read_npy(io.BytesIO(data), len(data), most))
+    if header := _PNM.match(data):
+        return _read_pnm(data, header, most)
+    tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
+    if data[:5].lower() == b"ncols" or (tiff and rasters.is_raster(io.BytesIO(data))):
+        pixels, geo, names = rasters.read_raster(data, most)
+        return _Found(pixels, Metadata(geo=geo), alpha=names[-1] == "alpha")
+    if tiff:
+        return _read_tiff(data, most, palette)
+    if data.startswith(b"\x76\x2f\x31\x01"):
+        return _read_exr(data, most)
+    return _read_pillow(data, most, palette)
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Suppress warnings and the log of tifffile: a damaged file is reported in one sentence."""
     logger = logging.getLogger("tifffile")
     before, logger.disabled = logger.disabled, True
@@ -117,20 +162,28 @@ def _quiet() -> Iterator[None]:
         logger.disabled = before
 
 
-def _opened(data: bytes, most: int) -> PIL.Image.Image:
+def _opened(data: bytes, most: int, page: int = 0) -> PIL.Image.Image:
     """Return the picture, with only its header read, if it is within the limits."""
-    with _PILLOW:  # Pillow has its own limit for the whole process
-        before, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
-        try:
-            picture = PIL.Image.open(io.BytesIO(data), formats=FORMATS)
-        finally:
-            PIL.Image.MAX_IMAGE_PIXELS = before
+    if _HEIF.match(data):
+        needs("pillow_heif", "pictures", "a HEIC picture")
+        from pillow_heif import HeifImageFile
+
+        picture: PIL.Image.Image = HeifImageFile(io.BytesIO(data))  # type: ignore[no-untyped-call]
+    else:
+        with _PILLOW:  # Pillow has its own limit for the whole process
+            before, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
+            try:
+                picture = PIL.Image.open(io.BytesIO(data), formats=FORMATS)
+            finally:
+                PIL.Image.MAX_IMAGE_PIXELS = before
+    if page:
+        picture.seek(page)
     itemsize = 4 if picture.mode in ("F", "I") else 1
     check_array((picture.height, picture.width, len(picture.getbands())), itemsize, most)
     return picture
 
 
-def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
+def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Found:
     """Return decoded PGM or PPM, text or binary; Pillow changes values unless the maximum is 255 or 65535."""
     kind, width, height, largest = (int(word) for word in header.groups())
     if not 0 < largest < 65536:
@@ -147,12 +200,24 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
         raise ValueError("it ends before its last pixel")
     if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
         raise ValueError(f"it has a value that is not 0 to {largest}")
-    return pixels.reshape(shape).astype(dtype)
+    return _Found(pixels.reshape(shape).astype(dtype), Metadata(white=largest))
 
 
-def _read_pillow(data: bytes, most: int, palette: bool) -> Decoded:
-    with _opened(data, most) as picture:
+def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found:
+    with _opened(data, most, page) as picture:
+        bits = _bits(picture.format, data)
+        if bits > 8:  # of which Pillow keeps 8
+            import imagecodecs  # loaded only for pictures that need it
+
+            check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
+            decoders = {"PNG": imagecodecs.png_decode, "AVIF": imagecodecs.avif_decode}
+            pixels: Array = decoders.get(picture.format or "", imagecodecs.jpeg2k_decode)(data)
+            orientation, metadata = _metadata(picture)
+            alpha = pixels.ndim == 3 and pixels.shape[2] in (2, 4)
+            return _Found(_full_scale(pixels, bits), metadata, orientation, alpha)
         picture.load()
+        if picture.mode == "L" and bits < 8 and isinstance(grey := picture.info.get("transparency"), int):
+            picture.info["transparency"] = grey * (255 // (2**bits - 1))  # Pillow scales pixels only
         transparent, colours = picture.has_transparency_data, None
         if palette and picture.mode == "P":
             colours = bytes(picture.getpalette() or ())
@@ -165,7 +230,28 @@ def _read_pillow(data: bytes, most: int, palette: bool) -> Decoded:
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata._replace(palette=colours)
+    return _Found(pixels, metadata._replace(palette=colours), orientation, mode in ("LA", "RGBA"))
+
+
+def _bits(kind: str | None, data: bytes) -> int:
+    """Return the bits of a value of PNG, JPEG 2000 or AVIF, by its first bytes; of others 8."""
+    if kind == "PNG":
+        return data[24]
+    if kind == "JPEG2000" and (at := data.find(b"\xff\x4f\xff\x51")) >= 0:
+        return (data[at + 42] & 127) + 1
+    if kind == "AVIF" and (at := data.find(b"av1C")) >= 0:
+        return 12 if data[at + 6] & 32 else 10 if data[at + 6] & 64 else 8
+    return 8
+
+
+def _full_scale(pixels: Array, bits: int) -> Array:
+    """Return values of so many bits with the largest of them as the largest of 8, 16 or 32 bits."""
+    if pixels.dtype == bool:
+        return pixels * np.uint8(255)
+    if pixels.dtype.kind != "u" or bits >= 8 * pixels.dtype.itemsize:
+        return pixels
+    scaled: Array = np.rint(pixels * (np.iinfo(pixels.dtype).max / (2**bits - 1)))
+    return scaled.astype(pixels.dtype)
 
 
 def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
@@ -213,46 +299,63 @@ def _in_rgb(picture: PIL.Image.Image) -> PIL.Image.Image:
     return converted or picture.convert("RGB")
 
 
-def _read_png16(data: bytes, most: int) -> Decoded:
-    import imagecodecs  # here and below: loaded only for pictures that need it
+def _read_exr(data: bytes, most: int) -> _Found:
+    needs("OpenEXR", "pictures", "an OpenEXR picture")
+    import OpenEXR
 
-    with _opened(data, most) as picture:  # Pillow has no 16-bit colour, but checks the header and knows EXIF
-        check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
-        orientation, metadata = _metadata(picture)
-    pixels: Array = imagecodecs.png_decode(data)
-    return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4)), metadata
+    head = OpenEXR.File(io.BytesIO(data), header_only=True)
+    (left, top), (right, bottom) = head.header()["dataWindow"]
+    names = {channel.name for channel in head.header()["channels"]}
+    check_array((int(bottom) - top + 1, int(right) - left + 1, len(names)), 4, most)
+    order = [name for name in "RGBYA" if name in names] if len(names) > 1 else list(names)
+    if len(head.parts) > 1 or len(order) < len(names) or "".join(order) not in (*names, "RGB", "RGBA", "YA"):
+        raise Refused(
+            f"has {len(head.parts)} parts and the channels {', '.join(sorted(names))}: save R, G and B, or one"
+        )
+    channels = OpenEXR.File(io.BytesIO(data), separate_channels=True).channels()
+    pixels = np.stack([channels[name].pixels for name in order], -1)
+    if len(order) == 1:
+        return _Found(pixels[..., 0])
+    return _Found(_divided(pixels), alpha=True) if "A" in order else _Found(pixels)
 
 
-def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
+def _pictures(tiff: Any) -> list[Any]:
+    """Return the series of a TIFF that are not masks or previews; none if a page after the first is damaged."""
+    with suppress(Exception):
+        return [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
+    return []
+
+
+def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
     import tifffile
 
-    with tifffile.TiffFile(io.BytesIO(data)) as tiff:
-        page = tiff.pages.first
+    with tifffile.TiffFile(io.BytesIO(data), _multifile=False) as tiff:
+        page, more, found = tiff.pages.first, tiff.pages.is_multipage, _pictures(tiff)
+        if found:
+            page, more = found[0].keyframe, len(found) > 1 or prod(found[0].shape) > prod(found[0].keyframe.shape)
         if not isinstance(page, tifffile.TiffPage):
             raise ValueError("it has no pictures")
-        _check_page(page, most)
-        ends = zip(page.dataoffsets, page.databytecounts, strict=True)
-        if any(offset + count > len(data) for offset, count in ends):
-            raise ValueError("it ends before its last pixel")
+        _check_page(page, len(data), most)
         kind, compression = int(page.photometric), int(page.compression)
         orientation = int(page.tags.valueof(ORIENTATION, 1))
-        metadata = Metadata(page.iccprofile)
-        with suppress(Exception):  # a damaged resolution or second page does not invalidate the first
+        metadata = Metadata(page.iccprofile, more=more)
+        with suppress(Exception):  # a damaged resolution does not invalidate the picture
             told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
-            dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
-            metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
+            metadata = metadata._replace(dpi=_dpi(page.get_resolution("inch") if told else None, orientation))
         with suppress(Exception):
-            found = PIL.Image.Exif()
-            found.load(data)
+            exif = PIL.Image.Exif()
+            exif.load(data)
             if tiff.is_imagej or tiff.is_ome or tiff.is_shaped:  # programs that describe the axes of a stack
-                found.pop(DESCRIPTION, None)
-            metadata = metadata._replace(exif=_exif(found))
+                exif.pop(DESCRIPTION, None)
+            metadata = metadata._replace(exif=_exif(exif))
+        if kind in (32803, 34892):  # a colour for each pixel, or linear
+            raise Refused("is a camera's raw file: develop it to TIFF")
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
-            pixels, read = _read_pillow(data, most, palette)
-            return pixels, metadata._replace(profile=read.profile, palette=read.palette)  # no profile of print colours
-        if compression not in _COMPRESSIONS:
-            raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
+            made = _read_pillow(data, most, palette, page.index if len(page.treeindex) == 1 else 0)
+            own = made.metadata
+            return made._replace(metadata=metadata._replace(profile=own.profile, palette=own.palette))
+        _check_compression(compression)
         pixels = page.asarray()
         if pixels.size == 0:
             raise ValueError("it has no pixels")
@@ -261,13 +364,58 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> Decoded:
         elif page.axes not in ("YX", "YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
-    if kind == 0:  # white is zero
-        pixels = ~pixels
-    if pixels.dtype == bool:
-        pixels = pixels * np.uint8(255)
-    if extra == 1 and pixels.ndim == 3:
-        pixels = _divided(pixels)
-    return _finished(pixels, orientation, extra in (1, 2)), metadata
+    return _Found(_shown(page, pixels), metadata, orientation, extra in (1, 2))
+
+
+def is_stack(path: Any) -> bool:
+    """Return whether a TIFF has layers, or several variables as pages."""
+    import tifffile
+
+    with quiet(), tifffile.TiffFile(path, _multifile=False) as tiff:
+        if not (found := _pictures(tiff)):
+            return bool(tiff.pages.is_multipage)
+        return tiff.is_imagej != (found[0].kind == "imagej") or not set(found[0].axes) <= set("YXS")
+
+
+def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Return a TIFF's stack of at most ``most`` pixels, as ``"value"`` (layers, rows, cols, variables), and its place.
+
+    Pixels are shown as those of pictures are, but palettes give their indices, and alpha is kept. The place is the
+    origin, 0, and the size of a cell (x, y, z).
+    """
+    import tifffile
+
+    with tifffile.TiffFile(path, _multifile=False) as tiff:
+        if not (found := _pictures(tiff)) or tiff.is_imagej != (found[0].kind == "imagej"):
+            raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
+        series, page, axes = found[0], found[0].keyframe, found[0].axes
+        if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):
+            raise Refused("has pages of several sizes or types: save a stack of pages of one")
+        layers, variables = ("".join(axis for axis in axes if axis in kind) for kind in ("ZIQ", "CS"))
+        if len(layers) > 1 or sorted(layers + variables + "YX") != sorted(axes):
+            raise Refused(f"has the axes {axes}: save a stack of layers (Z), rows (Y), columns (X) and channels (C)")
+        for one in series.pages:
+            _check_page(one, tiff.filehandle.size, most)
+        check_size(prod(series.shape), prod(series.shape) * page.dtype.itemsize, most)
+        if int(page.photometric) > 3 or (int(page.photometric) == 3 and variables):
+            raise Refused("has print or video colours: save it as RGB")
+        _check_compression(int(page.compression))
+        values = series.asarray()
+        cell, about = (1.0, 1.0, 1.0), tiff.imagej_metadata or {}
+        if str(about.get("unit", "pixel")).rstrip("s") not in ("", "pixel") and min(page.resolution) > 0:
+            cell = (1 / page.resolution[0], 1 / page.resolution[1], abs(float(about.get("spacing", 1))) or 1.0)
+    values = values.reshape(series.shape).transpose([axes.index(axis) for axis in f"{layers}YX{variables}"])
+    values = values.reshape(*(values.shape[:3] if layers else (1, *values.shape[:2])), -1)
+    return {"value": values if int(page.photometric) == 3 else _shown(page, values)}, ((0.0,) * 3, cell)
+
+
+def _shown(page: Any, pixels: Array) -> Array:
+    """Return pixels of a TIFF at full scale, with black 0, and colours that are not multiplied by alpha."""
+    pixels = _full_scale(pixels, page.bitspersample)
+    if int(page.photometric) == 0:  # white is zero
+        pixels = 1 - pixels if pixels.dtype.kind == "f" else ~pixels
+    premultiplied = page.extrasamples and int(page.extrasamples[-1]) == 1
+    return _divided(pixels) if premultiplied and pixels.ndim > 2 else pixels
 
 
 def _divided(pixels: Array) -> Array:
@@ -280,12 +428,21 @@ def _divided(pixels: Array) -> Array:
     return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], -1)
 
 
-def _check_page(page: Any, most: int) -> None:
-    """Raise TooLarge if a TIFF page, or one of its tiles or strips, exceeds the limits."""
-    size = prod(page.shape) * (page.dtype.itemsize if page.dtype else 8)
-    check_size(page.imagewidth * page.imagelength * page.imagedepth, size, most)
-    if page.is_tiled:
-        check_size(page.tilewidth * page.tilelength, 0, most)
+def _check_page(page: Any, length: int, most: int) -> None:
+    """Raise if a TIFF page, or one of its tiles or strips, exceeds the limits or the length of the file."""
+    first = page.keyframe
+    size = prod(first.shape) * (first.dtype.itemsize if first.dtype else 8)
+    check_size(first.imagewidth * first.imagelength * first.imagedepth, size, most)
+    if first.is_tiled:
+        check_size(first.tilewidth * first.tilelength, 0, most)
+    ends = zip(page.dataoffsets, page.databytecounts, strict=True)
+    if any(offset + count > length for offset, count in ends):
+        raise ValueError("it ends before its last pixel")
+
+
+def _check_compression(method: int) -> None:
+    if method not in _COMPRESSIONS:
+        raise Refused(f"is compressed by the method {method}: save it with Deflate or uncompressed")
 
 
 def _finished(pixels: Array, orientation: int, alpha: bool) -> Array:

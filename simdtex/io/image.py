@@ -2,8 +2,8 @@
 """Reading, checking and writing of pictures, without a change of any value.
 
 A picture is an array (rows, cols) or (rows, cols, channels), row 0 at the top. 8-bit, 16-bit and float pixels keep
-their type from the file to the synthesis and back. Pillow reads and writes the 8-bit formats, tifffile every TIFF, and
-imagecodecs the 16-bit PNG, since Pillow has no 16-bit colour.
+their type from the file to the synthesis and back. Pillow reads and writes the 8-bit formats, tifffile every TIFF,
+imagecodecs what has more bits, and OpenEXR the files of that name.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io import rasters
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
-from simdtex.io.limits import TooLarge, max_pixels_or_default, reading
-from simdtex.options import check_real, unmasked
+from simdtex.io.limits import explained, max_pixels_or_default, reading
+from simdtex.options import check_real, require, unmasked
 
 __all__ = [
     "Image",
@@ -73,8 +73,9 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     Parameters
     ----------
     path : path
-        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), PGM, PPM, or a NumPy ``.npy`` of shape (rows, cols)
-        or (rows, cols, channels). No other format is tried.
+        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), TGA, JPEG 2000, AVIF, PBM, PGM, PPM, or a NumPy
+        ``.npy`` of shape (rows, cols) or (rows, cols, channels). HEIC and OpenEXR need ``simdtex[pictures]``. No other
+        format is tried.
     max_pixels : int, optional
         The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
@@ -87,14 +88,16 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     Image
         Pixels keep their 8-bit, 16-bit, integer or float values. PGM and PPM give the numbers in the file, as uint8 if
         the maximum in its header is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by their
-        colour profile if they have one; 1-bit becomes uint8 0 and 255. A fully opaque alpha channel is removed; any
-        other is kept as the last channel, and colours that were multiplied by it (TIFF) are divided by it. The
-        orientation in the EXIF data of a camera is applied.
+        colour profile if they have one. Fewer than 8 bits are scaled to 8, and 9 to 15 to 16, so that white is the
+        largest value; HEIC always has 8. A TIFF in which white is 0 is inverted. A fully opaque alpha channel is
+        removed; any other is kept as the last channel, and colours that were multiplied by it (TIFF, OpenEXR) are
+        divided by it. OpenEXR has linear values, float16 or float32, which are not changed for display. The orientation
+        in the EXIF data of a camera is applied.
 
     Raises
     ------
     ValueError
-        The file is missing, a folder, empty, truncated, not an image, or too large.
+        The file is missing, no regular file, empty, damaged, of another format, which is named, or too large.
 
     Notes
     -----
@@ -110,26 +113,11 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette
     most = max_pixels_or_default(max_pixels)
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
-    try:
-        found, metadata = decode(data, most, palette)
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except PIL.UnidentifiedImageError:
-        raise ValueError(f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file") from None
-    except MemoryError:
-        raise ValueError(f"{name} is too large for the memory: crop it first") from None
-    except Exception as error:  # every decoder has its own exceptions for a damaged file
-        text = " ".join(str(error).split()) or type(error).__name__
-        text = text if len(text) <= 100 else text[:97] + "..."
-        raise ValueError(
-            f"{name} cannot be decoded, it is truncated, damaged or of an unknown kind ({text}): save it again as PNG "
-            "or TIFF"
-        ) from None
-    try:
+    with explained(name, "the image", "an image"):
+        found, metadata = decode(data, most, palette=palette)
+    with explained(name, "the image"):
         pixels = native(pixels_of("the picture", np.ma.getdata(found)))
-        pixels = np.ma.MaskedArray(pixels, np.ma.getmaskarray(found)) if np.ma.is_masked(found) else pixels
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: {error}") from None
+    pixels = np.ma.MaskedArray(pixels, np.ma.getmaskarray(found)) if np.ma.is_masked(found) else pixels
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
 
 
@@ -176,8 +164,8 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
     Parameters
     ----------
     path : path
-        A picture as in `read`, grey or colour. Full scale is 255 in 8 bits and 65535 in 16, but 1 for bool, floats,
-        and integers that are all 0 or 1.
+        A picture as in `read`, grey or colour. Full scale is 255 in 8 bits and 65535 in 16, but the maximum in the
+        header of a PGM or PPM, and always 1 for bool, floats, and integers that are all 0 or 1.
     shape : (rows, cols)
         The required size; further axes are ignored.
     max_pixels : int, optional
@@ -193,7 +181,8 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
     ValueError
         `read` cannot read the file, or it has another size.
     """
-    pixels = read(path, max_pixels=max_pixels).pixels
+    found = read(path, max_pixels=max_pixels)
+    pixels, white = found.pixels, found.metadata.white
     rows, cols = shape[:2]
     if pixels.shape[:2] != (rows, cols):
         raise ValueError(
@@ -201,7 +190,7 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
             f"{cols} x {rows}: bring it to that size"
         )
     colours, transparent = split_alpha(pixels)
-    bright = colours > (0.5 if colours.max() <= 1 else _half(pixels.dtype))
+    bright = colours > (0.5 if colours.max() <= 1 else white / 2 if white else _half(pixels.dtype))
     return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
 
@@ -361,6 +350,7 @@ _FORMATS = {
     ".jpeg": Format(EIGHT, (1, 3)),
     ".webp": Format(EIGHT, (1, 3, 4)),
     ".bmp": Format(EIGHT, (1, 3)),
+    ".exr": Format(frozenset({"float16", "float32"}), (1, 3)),
     ".npy": Format(None, None),
 }
 
@@ -402,6 +392,8 @@ def check_writable(
     if suffix not in known:
         what = f"ends in {target.suffix}" if suffix else "has no suffix"
         raise ValueError(f"{target} {what}: end its name in one of {', '.join(sorted(known))}")
+    if suffix == ".exr" and suffixes is None:
+        require("pictures", "OpenEXR")
     if suffixes is None:
         check_holds(target, _FORMATS, dtype, channels, suitable_suffix(dtype, channels))
 
@@ -437,7 +429,7 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     ----------
     path : path
         ``.png`` (8 or 16 bits), ``.tif`` ``.tiff`` (every type), ``.jpg`` ``.jpeg`` (quality 95), ``.webp``
-        (lossless), ``.bmp``, or ``.npy``.
+        (lossless), ``.bmp``, ``.exr`` (float16 and float32, grey or RGB), or ``.npy``.
     array : array_like, (rows, cols) or (rows, cols, channels)
         The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG are
         grey and colour with alpha; WebP turns grey into equal RGB.
@@ -489,6 +481,13 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
     elif suffix in (".tif", ".tiff") and metadata.geo:
         rasters.write_raster(path, np.moveaxis(pixels if pixels.ndim == 3 else pixels[..., None], -1, 0), metadata.geo)
+    elif suffix == ".exr":
+        import OpenEXR
+
+        written = io.BytesIO()  # since OpenEXR does not notice a full disk
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"Y" if pixels.ndim == 2 else "RGB": pixels}).write(written)
+        path.write_bytes(written.getvalue())
     elif suffix in (".tif", ".tiff"):
         write_tiff(path, [pixels], metadata)
     else:

@@ -8,6 +8,7 @@ import stat
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from math import prod
 from tokenize import TokenError
 from typing import IO, Any
@@ -29,8 +30,12 @@ BYTES = 8
 """The most bytes to which a file may unpack, for each allowed pixel."""
 
 
-class TooLarge(ValueError):
-    """A file exceeds a limit; the message starts after the file's name."""
+class Unreadable(ValueError):
+    """A file is not read; the message is a sentence that names it."""
+
+
+class Refused(ValueError):
+    """A file is not read; the message starts after the file's name."""
 
 
 def max_pixels_or_default(max_pixels: int | None) -> int:
@@ -47,16 +52,22 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
 
 
 def check_size(pixels: int, unpacked: int, most: int, each: int = BYTES) -> None:
-    """Raise TooLarge if ``pixels`` exceeds ``most``, or the ``unpacked`` bytes exceed ``most`` times ``each``."""
+    """Raise Refused if ``pixels`` exceeds ``most``, or the ``unpacked`` bytes exceed ``most`` times ``each``."""
     for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", each * most)):
         if count > limit:
-            raise TooLarge(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
+            raise Refused(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
 
 
 def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
-    """Raise TooLarge if an array (rows, cols, ...) has too many pixels or bytes."""
+    """Raise Refused if an array (rows, cols, ...) has too many pixels or bytes."""
     sides = [int(side) for side in shape]
     check_size(prod(sides[:2]), prod(sides) * itemsize, most)
+
+
+def needs(library: str, extra: str, what: str) -> None:
+    """Raise Refused unless the library of an extra of the package is installed; ``what`` is the kind of the file."""
+    if find_spec(library) is None:
+        raise Refused(f"is {what}: pip install 'simdtex[{extra}]' to read it")
 
 
 def size_of_file(name: str, what: str) -> int:
@@ -64,13 +75,13 @@ def size_of_file(name: str, what: str) -> int:
     try:
         found = os.stat(name)
     except FileNotFoundError:
-        raise ValueError(f"{name} does not exist: check the path of {what}") from None
+        raise Unreadable(f"{name} does not exist: check the path of {what}") from None
     except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
+        raise Unreadable(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
     if stat.S_ISDIR(found.st_mode):
-        raise ValueError(f"{name} is a folder: give the path of {what}, which is a file in it")
+        raise Unreadable(f"{name} is a folder: give the path of {what}, which is a file in it")
     if not stat.S_ISREG(found.st_mode):
-        raise ValueError(f"{name} is not a regular file: give the path of {what}")
+        raise Unreadable(f"{name} is not a regular file: give the path of {what}")
     return found.st_size
 
 
@@ -78,25 +89,40 @@ def size_of_file(name: str, what: str) -> int:
 def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
     """Check a file and yield the most pixels to read; errors of the block name the file and a remedy.
 
-    ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. With ``kind``
-    any error comes from a library for which the file is damaged, and the message says that it is no ``kind``.
+    ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. ``kind`` is that
+    of `explained`.
     """
     name, most = os.fspath(path), max_pixels_or_default(max_pixels)
     size = size_of_file(name, what)
-    try:
+    with explained(name, what, kind):
         check_size(0, size, most, each)
         yield most
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
+
+
+@contextmanager
+def explained(name: str, what: str, kind: str = "") -> Iterator[None]:
+    """Raise errors of the block as Unreadable, whose sentence names the file and a remedy.
+
+    With ``kind`` any error comes from a library for which the file is damaged, and the message says that it is no
+    ``kind``.
+    """
+    try:
+        yield
+    except Unreadable:
+        raise
+    except Refused as error:
+        raise Unreadable(f"{name} {error}") from None
     except MemoryError:
-        raise ValueError(f"{name} is too large for the memory: crop it first") from None
+        raise Unreadable(f"{name} is too large for the memory: crop it first") from None
     except Exception as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise Unreadable(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
+        text = " ".join(str(error).split()) or type(error).__name__
         if kind:
-            raise ValueError(f"{name} cannot be read as {kind} ({error}): save it again") from None
-        if isinstance(error, OSError):
-            raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
-        if isinstance(error, (TypeError, ValueError)):
-            raise ValueError(f"{name}: {error}") from None
+            text = text if len(text) <= 100 else text[:97] + "..."
+            raise Unreadable(f"{name} cannot be read as {kind} ({text}): it may be damaged; save it again") from None
+        if isinstance(error, (OSError, TypeError, ValueError)):
+            raise Unreadable(f"{name}: {text}") from None
         raise
 
 

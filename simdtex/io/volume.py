@@ -7,24 +7,40 @@ picture with row 0 at the top. x is the column, y the row, z the depth.
 
 from __future__ import annotations
 
+import bz2
 import io
 import os
 import re
 import shutil
 import warnings
+import zipfile
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import nrrd
 import numpy as np
-import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, earlier_files
-from simdtex.io.decode import native
+from simdtex.io.decode import decode, is_stack, native, quiet, read_stack
+from simdtex.io.grids import CartesianGrid, frame
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import check_array, read_npy, reading
+from simdtex.io.limits import (
+    Refused,
+    check_size,
+    explained,
+    max_pixels_or_default,
+    needs,
+    read_npy,
+    read_npz,
+    reading,
+    size_of_file,
+)
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
@@ -41,6 +57,10 @@ _FORMATS = {
     "": Format(frozenset({"uint8", "uint16"}), (1, 2, 3, 4)),
 }
 _SLICE = re.compile(r"slice-([0-9]{3,})\.png")
+_NUMBERED = re.compile(r"(.*?)([0-9]{1,9})(\.\w+)")
+_RAW = re.compile(r".*_([0-9]{1,9})x([0-9]{1,9})x([0-9]{1,9})_(u?int(?:8|16|32)|float32|float64)\.raw", re.IGNORECASE)
+_COUNTS = re.compile(rb'NumberOfComponents="([0-9]+)|^\S+ ([0-9]+) ([0-9]+) \w+\s*$', re.MULTILINE)
+"""What headers of VTK say of the variables of a cell, and, in the older format, of the size of an array."""
 
 
 def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
@@ -65,57 +85,246 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
     check_holds(target, _FORMATS, dtype, channels, other)
 
 
-def is_volume(path: PathLike) -> bool:
-    """Return whether a file holds a volume: ``.nrrd``, a TIFF with several pages, or a ``.npy`` with four axes."""
+def is_volume(path: PathLike, channels: bool = False) -> bool:
+    """Return whether a file or folder holds a volume, by its suffix or, of TIFF and ``.npy``, by its axes.
+
+    A ``.npy`` has three axes or four; with ``channels`` one of three is a picture.
+    """
     suffix = Path(path).suffix.lower()
-    try:
-        if suffix in (".tif", ".tiff"):
-            with tifffile.TiffFile(path) as file:
-                return len(file.pages) > 1
-        if suffix == ".npy":
-            return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) == 4
-    except (OSError, ValueError, tifffile.TiffFileError):
-        return False  # the reader of pictures reports the error
-    return suffix == ".nrrd"
+    if os.path.isdir(path) or suffix not in (".tif", ".tiff", ".npy"):
+        return os.path.isdir(path) or suffix in _READERS
+    with suppress(Exception):  # the reader of pictures reports the error
+        if os.path.isfile(path) and suffix != ".npy":
+            return is_stack(path)
+        if os.path.isfile(path):
+            return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) > 2 + channels
+    return False
 
 
-def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
-    """Return the volume in a file.
+def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
+    """Return the volume in a file, or in a folder of slices.
 
     Parameters
     ----------
     path : path
-        ``.nrrd`` with three axes, x fastest, or four, with variables before x; a TIFF with a page for each of several
-        layers; or a ``.npy`` of shape (layers, rows, cols, variables).
+        What `write` writes; ``.nrrd`` ``.nhdr``, and ``.mha`` ``.mhd`` of MetaImage, with attached data or a file in
+        the same folder; a TIFF whose pages are layers, or layers and channels; ``.vti``, and ``.vtk`` of structured
+        points, with ``simdtex[volumes]``; ``.raw``, little-endian, x fastest, whose name says its size and type, as
+        ``bonsai_256x256x256_uint8.raw``; or a folder of pictures whose names differ in a number.
     max_pixels : int, optional
         The most values that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
 
     Returns
     -------
-    ndarray, (layers, rows, cols, variables)
+    CartesianGrid
+        The variables (nz, ny, nx), the centre of the first cell, and the size of a cell, in the units of the file. An
+        axis whose coordinates descend is reversed. Of rotated axes only the size of a cell is kept, and the origin is
+        0. White is the largest value, as in pictures.
 
     Raises
     ------
     ValueError
-        The file is missing, damaged, not a volume, or too large.
+        The file is missing, no regular file, damaged, not a volume, or too large, or a library is not installed.
     """
-    name, suffix = os.fspath(path), Path(path).suffix.lower()
-    with reading(path, "the volume", max_pixels, kind="a volume") as most:
-        if suffix == ".nrrd":
-            header = nrrd.read_header(name)
-            check_array(tuple(int(side) for side in header["sizes"]), 8, most)
-            values = nrrd.read(name, index_order="C")[0]
-        elif suffix == ".npy":
-            with open(name, "rb") as file:
-                values = read_npy(file, os.fstat(file.fileno()).st_size, most)
-        else:
-            with tifffile.TiffFile(name) as file:
-                check_array((len(file.pages), *file.pages.first.shape), 8, most)
-                values = np.stack([page.asarray() for page in file.pages])
-    if values.ndim not in (3, 4) or values.size == 0 or values.dtype.kind not in "buif":
-        raise ValueError(f"{name} has the shape {values.shape} and the type {values.dtype}: give numbers of three axes")
-    return native(values[..., None] if values.ndim == 3 else values)
+    name, target = os.fspath(path), Path(path)
+    if target.is_dir():
+        with explained(name, "the volume"):
+            values, lies = _slices(target, max_pixels_or_default(max_pixels))
+    else:
+        with reading(path, "the volume", max_pixels, kind="a volume") as most, quiet():
+            values, lies = _READERS[target.suffix.lower()](target, most)
+    found: dict[str, Array] = {}
+    for key, one in values.items():
+        if one.ndim not in (3, 4) or one.size == 0 or one.dtype.kind not in "buif":
+            raise ValueError(f"{name} has the shape {one.shape} and the type {one.dtype}: give numbers of three axes")
+        parts = [one] if one.ndim == 3 else np.moveaxis(one, -1, 0)
+        found |= {key if len(parts) == 1 else f"{key}_{k}": native(part) for k, part in enumerate(parts)}
+    return CartesianGrid(found, *lies)
+
+
+_Read = tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]
+"""Arrays (layers, rows, cols) or (layers, rows, cols, variables) by name, and the origin and the size of cells."""
+
+_PLAIN = ((0.0,) * 3, (1.0,) * 3)
+"""Origin and size of cells of a file that has none."""
+
+
+def _array(path: Path, most: int) -> _Read:
+    """Read ``.npy``, or the array ``"volume"`` of ``.npz``, or the only one."""
+    if path.suffix.lower() == ".npy":
+        with path.open("rb") as file:
+            return {"value": read_npy(file, os.fstat(file.fileno()).st_size, most)}, _PLAIN
+    with zipfile.ZipFile(path) as archive:
+        names = [name.removesuffix(".npy") for name in archive.namelist()]
+    if len(names) > 1 and "volume" not in names:
+        raise Refused(f"has the arrays {', '.join(names)[:100]}: name one of them volume")
+    return {"value": read_npz(path, "volume" if "volume" in names else names[0], most)}, _PLAIN
+
+
+def _slices(folder: Path, most: int) -> _Read:
+    """Return the pictures of a folder, by the number in their names, as layers."""
+    names = sorted(one.name for one in folder.iterdir() if one.name[0] != ".")
+    found = [match for name in names if (match := _NUMBERED.fullmatch(name))]
+    layers = {int(match[2]): match[0] for match in found}
+    if not names or len(layers) < len(names) or len({match.group(1, 3) for match in found}) > 1:
+        raise Refused("is a folder: keep only slices in it, whose names differ in their number, as slice-000.png")
+    if missing := set(range(min(layers), max(layers))) - set(layers):
+        raise Refused(f"has no slice of number {min(missing)}: add it")
+    pictures: list[Array] = []
+    for _, name in sorted(layers.items()):
+        with reading(folder / name, "the slice", most // len(layers), kind="an image") as each:
+            pictures.append(decode((folder / name).read_bytes(), each, opaque=True)[0])
+            if (pictures[-1].shape, pictures[-1].dtype) != (pictures[0].shape, pictures[0].dtype):
+                raise ValueError("its size or type is not that of the first slice")
+    return {"value": np.stack(pictures)}, _PLAIN
+
+
+def _raw(path: Path, most: int) -> _Read:
+    said = _RAW.fullmatch(path.name)
+    if not said:
+        raise Refused("is a .raw: name it with columns x rows x layers and type, as NAME_256x256x128_uint8.raw")
+    shape, dtype = tuple(int(side) for side in said.group(3, 2, 1)), np.dtype(said[4].lower()).newbyteorder("<")
+    check_size(prod(shape), 0, most)
+    if path.stat().st_size != prod(shape) * dtype.itemsize:
+        raise Refused(
+            f"has {path.stat().st_size} bytes, not {prod(shape) * dtype.itemsize} as its name says: rename it"
+        )
+    return {"value": np.fromfile(path, dtype).reshape(shape)}, _PLAIN
+
+
+def _beside(path: Path, name: str, most: int) -> Path:
+    """Return the data file that a header names, a file of its own folder within the limits."""
+    file = path.with_name(Path(name).name or "..")
+    if file.name != name or name == "LIST" or "%" in name or file.resolve().parent != path.resolve().parent:
+        raise Refused(f"names the data file {name[:100]!r}: put the data into one file in the folder of the header")
+    check_size(0, size_of_file(str(file), "the data file"), most)
+    return file
+
+
+def _nrrd(path: Path, most: int) -> _Read:
+    with path.open("rb") as file:
+        return _stored(path, dict(nrrd.read_header(file)), file.read(), most)
+
+
+def _metaimage(path: Path, most: int) -> _Read:
+    """Read a MetaImage by the header of an NRRD that says the same."""
+    said: dict[str, str] = {}
+    with path.open("rb") as file:
+        while "ElementDataFile" not in said:
+            key, equals, text = file.readline(2**14).decode("latin-1").partition("=")
+            said[key.strip()] = text.strip()
+            if not equals:
+                raise ValueError("its header has no ElementDataFile")
+        data = file.read()
+
+    def value(*keys: str) -> str:
+        return next((said[key] for key in keys[:-1] if key in said), keys[-1]).lower()
+
+    parts, kind = int(value("ElementNumberOfChannels", "1")), value("ElementType", "").removeprefix("met_")
+    bits = {"char": 8, "short": 16, "int": 32, "long": 32, "long_long": 64}.get(kind.lstrip("u"))
+    sizes = [parts] * (parts > 1) + [int(side) for side in said["DimSize"].split()]
+    steps = np.array(value("TransformMatrix", "Rotation", "Orientation", "1 0 0 0 1 0 0 0 1").split(), float)
+    cell = np.array(value("ElementSpacing", "ElementSize", "1 1 1").split(), float)
+    header = {
+        "type": "u" * (kind[0] == "u") + f"int{bits}" if bits else kind,
+        "sizes": np.array(sizes),
+        "dimension": len(sizes),
+        "endian": "big" if value("ElementByteOrderMSB", "BinaryDataByteOrderMSB", "") == "true" else "little",
+        "encoding": "ascii" if value("BinaryData", "") != "true" else "raw",
+        "byte skip": int(value("HeaderSize", "0")),
+        "space directions": steps.reshape(3, 3) * cell[:, None],
+        "space origin": np.array(value("Offset", "Position", "Origin", "0 0 0").split(), float),
+    }
+    if value("CompressedData", "") == "true":
+        header["encoding"] = "gzip"
+    if said["ElementDataFile"].upper() != "LOCAL":
+        header["data file"] = said["ElementDataFile"]
+    return _stored(path, header, data, most)
+
+
+def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read:
+    """Return the volume that the header of an NRRD describes; ``data`` follows it in its file."""
+    count = prod(int(side) for side in header["sizes"])
+    check_size(count, 0, most)
+    if count < 1:
+        raise ValueError("it has no values")
+    if name := header.pop("data file", None) or header.pop("datafile", None):
+        data = _beside(path, name, most).read_bytes()
+    lines, skip = (int(header.pop(f"{a} skip", 0) or header.pop(f"{a}skip", 0)) for a in ("line", "byte"))
+    packed = header["encoding"].lower() in ("gzip", "gz", "bzip2", "bz2")
+    if not (0 <= lines < 2**10 and packed - 1 <= skip <= most):
+        raise ValueError("its header skips too much")
+    data = data.split(b"\n", lines)[lines] if lines else data
+    if packed:
+        gzip = header["encoding"][0] in "gG"
+        unpack: Any = zlib.decompressobj(47) if gzip else bz2.BZ2Decompressor()  # 47: with a header of gzip or zlib
+        data, header["encoding"] = unpack.decompress(data, skip + 8 * count), "raw"
+    values = nrrd.read_data(header | {"byte skip": skip}, io.BytesIO(data), index_order="C")
+    kinds = [str(kind).lower() for kind in header.get("kinds", ["vector"] * (values.ndim - 3) + ["domain"] * 3)]
+    others = [axis for axis, kind in enumerate(kinds) if kind not in ("domain", "space", "???", "none")]
+    if len(kinds) != len(others) + 3 or len(others) > 1 or "time" in kinds:
+        raise Refused(f"has the axes {', '.join(kinds)}: give three of space, and at most one of variables")
+    for axis in others:
+        values = np.moveaxis(values, values.ndim - 1 - axis, -1)
+    steps: Any = np.diag([1.0] * 3)
+    if "space directions" in header:
+        steps = [row for row in header["space directions"] if row is not None and np.isfinite(row).all()]
+    elif "spacings" in header:
+        steps = np.diag(np.nan_to_num(np.delete(header["spacings"], others), nan=1.0))
+    return _placed({"value": values}, np.array(steps, np.float64), header.get("space origin", _PLAIN[0]))
+
+
+def _placed(values: dict[str, Any], steps: NDArray[np.float64], origin: Any) -> _Read:
+    """Return values along x, y and z, with a step from cell to cell in each row, and where the cells lie."""
+    own, at = np.diagonal(steps), np.array(origin, np.float64)
+    cell = np.linalg.norm(steps, axis=1)
+    if np.abs(steps - np.diag(own)).max() > 1e-6 * cell.max():
+        return values, frame(_PLAIN[0], cell.tolist())
+    for axis in (axis for axis in range(3) if own[axis] < 0):
+        at[axis] += own[axis] * (next(iter(values.values())).shape[2 - axis] - 1)
+        values = {key: np.flip(one, 2 - axis) for key, one in values.items()}
+    return values, frame(at.tolist(), np.abs(own).tolist())
+
+
+def _vtk(path: Path, most: int) -> _Read:
+    """Read an image that VTK reads, with the arrays of its points or of its cells."""
+    needs("pyvista", "volumes", "an image of VTK")
+    import pyvista
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+
+    sums = [[int(number or 1) for number in match] for match in _COUNTS.findall(path.read_bytes())]
+    check_size(sum(map(prod, sums)), 0, most)
+    # its own log would be on standard error
+    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+        reader: Any = pyvista.get_reader(str(path))  # type: ignore[no-untyped-call]
+        reader.reader.UpdateInformation()
+        extent = reader.reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT())
+        sides = [last - first + 1 for first, last in zip(extent[4::-2], extent[5::-2], strict=True)]
+        check_size(prod(sides) * max(1, sum(parts for parts, *_ in sums)), 0, most)
+        found = reader.read()
+    if not isinstance(found, pyvista.ImageData):
+        raise Refused(f"holds {type(found).__name__} of VTK: resample it to an image (ImageData, structured points)")
+    points, cells = (
+        {key: one for key, one in kind.items() if key[:3] != "vtk"} for kind in (found.point_data, found.cell_data)
+    )
+    if bool(points) == bool(cells):
+        raise Refused(f"has {'both point and' if points else 'no point or'} cell arrays: save one of the two kinds")
+    shape = [max(1, side - bool(cells)) for side in sides]
+    values = {str(key): np.asarray(one).reshape(*shape, *one.shape[1:]) for key, one in (points or cells).items()}
+    steps = np.asarray(found.direction_matrix).T * np.array(found.spacing)[:, None]
+    corner = [bool(cells) and side > 1 for side in sides[::-1]]  # half a cell before the centre of the first
+    return _placed(values, steps, found.GetPoint(0) + np.array(corner) / 2 @ steps)
+
+
+_READERS: dict[str, Callable[[Path, int], _Read]] = {
+    **dict.fromkeys((".npy", ".npz"), _array),
+    **dict.fromkeys((".tif", ".tiff"), read_stack),
+    **dict.fromkeys((".nrrd", ".nhdr"), _nrrd),
+    **dict.fromkeys((".mha", ".mhd"), _metaimage),
+    **dict.fromkeys((".vti", ".vtk"), _vtk),
+    ".raw": _raw,
+}
 
 
 def write(path: PathLike, volume: ArrayLike) -> None:

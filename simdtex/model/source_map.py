@@ -10,8 +10,6 @@ are -1.
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path
 from simdtex.io.image import as_array, check_writable, read, write
-from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
+from simdtex.io.limits import read_npz, reading
 from simdtex.model.use import SourceMap, checked
 from simdtex.options import unmasked
 
@@ -179,19 +177,15 @@ def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceM
         The file is missing, damaged, or holds no source map.
     """
     name = os.fspath(path)
-    if Path(path).suffix.lower() != ".npz" or not Path(path).is_file():
+    if Path(path).suffix.lower() != ".npz":
         pixels = read(path, max_pixels=max_pixels).pixels
         if pixels.dtype.kind == "u" and pixels.shape[2:] == (3,) and not pixels[..., 2].any():
             pixels = pixels[..., :2]
         elif pixels.dtype == np.uint8:
             raise ValueError(f"{name} is a picture of 8 bits and holds no source map: give one saved by simdtex")
     else:
-        try:
-            pixels = read_npz(path, "source", max_pixels_or_default(max_pixels))
-        except TooLarge as error:
-            raise ValueError(f"{name} {error}") from None
-        except (KeyError, NotImplementedError, OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
-            raise ValueError(f"{name} holds no source map: give one saved by simdtex") from None
+        with reading(path, "the source map", max_pixels, kind="a source map of simdtex") as most:
+            pixels = read_npz(path, "source", most)
     try:
         return checked(pixels)
     except ValueError as error:
