@@ -100,6 +100,16 @@ def test_labels_are_a_training_image(folder):
     assert (np.load("maps.npz")["probability"] == wanted.probability.values).all()
 
 
+def test_truth_is_unknown_where_it_is_transparent(folder):
+    write_labels("truth.png", np.where(np.arange(24) < 12, 7, 1).astype(np.uint8)[:, None] * np.ones(40, np.uint8))
+    with PIL.Image.open("truth.png") as picture:
+        picture.save("truth.png", transparency=7)
+    result = run("picture.png", *SAMPLES, "-o", "labels.png", "--truth", "truth.png")
+    assert result.exit_code == 0, result.output
+    agree = (read_labels("labels.png")[12:] == 1).mean()
+    assert f"{agree:.1%} of the pixels agree with --truth" in result.output
+
+
 def test_strokes_with_a_palette(folder):
     with PIL.Image.open("strokes.png") as picture:  # index 0 transparent, as painting programs save it
         picture.point([7, *range(1, 256)]).save("strokes.png", transparency=7)

@@ -154,14 +154,15 @@ def indexed(path, indices, colours, **options):
     picture.save(path, **options)
 
 
-@pytest.mark.parametrize("command", ["synth", "extend", "fill"])
+@pytest.mark.parametrize("command", ["synth", "extend", "fill", "fill --sample"])
 def test_a_palette_is_categories_and_is_kept(folder, command):
     facies = pixels(folder, "facies.tif")
     indexed(folder / "facies.png", facies, [RED, RED, GREEN, BLUE])
-    more = {"synth": ["--size", 16], "extend": ["--right", 3], "fill": ["--mask", "hole.png"]}[command]
+    more = {"synth": ["--size", 16], "extend": ["--right", 3]}.get(command, ["--mask", "hole.png"])
     image.write(folder / "hole.png", np.pad(np.full((4, 4), 255, np.uint8), ((9, 11), (8, 8))))
     for name in ("facies.png", "facies.tif"):
-        words = [command, name, *more, "-o", name.replace("facies", "out"), "--order", 2, "--seed", 5, "--categorical"]
+        words = [*command.split(), name, *[name][: " " in command], *more, "-o", name.replace("facies", "out")]
+        words += ["--order", 2, "--seed", 5, "--categorical"]
         result = run(folder, *words, "--device", "reference")
         assert result.exit_code == 0, result.output
     with PIL.Image.open(folder / "out.png") as made:

@@ -11,6 +11,7 @@ from simdtex.cli import main
 from simdtex.io import image
 from simdtex.io.grids import read_grid, write_grid
 from simdtex.io.hard_data import read_hard_data
+from simdtex.model.labels import write_labels
 
 xarray = pytest.importorskip("xarray")
 pytest.importorskip("zarr")
@@ -318,7 +319,9 @@ def test_maps_are_those_of_the_function(folder, maps):
     assert np.array_equal(made(folder, "facies.png", "--rotation", "angles.tif", "--scale", "sizes.npy"), expected)
     both, number = [pixels(folder, name) for name in ("grey.png", "second.png")], np.load(folder / "numbers.npy")
     expected = simdtex.simulate(both, 1, image_map=number, **OPTIONS)
-    assert np.array_equal(made(folder, "grey.png", "second.png", "--image-map", "numbers.npy"), expected)
+    write_labels(folder / "numbers.png", number)  # as indices of a palette
+    for name in ("numbers.npy", "numbers.png"):
+        assert np.array_equal(made(folder, "grey.png", "second.png", "--image-map", name), expected)
 
 
 def test_the_size_is_that_of_a_map(folder, maps):

@@ -116,7 +116,7 @@ def test_maps_with_letters_and_variants(tmp_path, names, count):
 
 
 def test_materials_of_a_folder_are_told_apart_by_their_stems(tmp_path):
-    folder_with(tmp_path, "oak_albedo.png", "Oak-Normal.png", "T_Brick_D.png", "T_Brick_N.png", "a.png", "oak_disp.exr")
+    folder_with(tmp_path, "oak_albedo.png", "Oak-Normal.png", "T_Brick_D.png", "T_Brick_N.png", "a.png", "oak_disp.hdr")
     with pytest.raises(
         ValueError, match=r"holds 2 materials: .* give a map of one, .*/T_Brick_D.png or .*/oak_albedo.png"
     ):
@@ -124,7 +124,7 @@ def test_materials_of_a_folder_are_told_apart_by_their_stems(tmp_path):
     lead = tmp_path / "T_Brick_N.png"
     assert roles_in(tmp_path, lead) == {"T_Brick_D.png": "albedo", "T_Brick_N.png": "normal"}
     assert find_maps(tmp_path, lead).unknown == ["a.png"]
-    with pytest.raises(ValueError, match=r"oak_disp.exr is of a format that is not read: save it as TIFF"):
+    with pytest.raises(ValueError, match=r"oak_disp.hdr is of a format that is not read: save it as TIFF"):
         find_maps(tmp_path, tmp_path / "oak_albedo.png")
 
 

@@ -231,7 +231,7 @@ def test_a_netcdf_that_is_no_grid_gets_one_sentence(tmp_path):
     with pytest.raises(ValueError, match="has no variable with the axes y and x, or z, y and x"):
         read_grid(path)
     path.write_bytes(path.read_bytes()[:200])
-    with pytest.raises(ValueError, match="cannot be read, it is damaged"):
+    with pytest.raises(ValueError, match="cannot be read as a grid"):
         read_grid(path)
     some().isel(realisation=0, drop=True).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match=r"grid\.nc "):

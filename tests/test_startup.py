@@ -20,6 +20,7 @@ from simdtex.io.image import write
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "rich"}
 HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas", "pyvista", "vtkmodules", "OpenEXR", "pillow_heif"}
+HEAVY |= {"rasterio", "sklearn", "joblib"}
 PUBLIC = {
     *("DeviceError", "Live", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality"),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),

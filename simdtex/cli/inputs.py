@@ -191,21 +191,28 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
 
     With ``how.deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
     """
-    from simdtex.io import grids, volume
+    from simdtex.io import grids
 
     if grids.is_grid(path, rasters=how.deep):
         grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
         if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
             raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
-    elif volume.is_volume(path, how.channels or not how.deep):
-        grid = volume.read(path)
-    else:
+    elif (grid := _volume(path, how)) is None:
         found = read_picture(path, how.palette)
         return Read(found.pixels, found.metadata)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
     return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
+
+
+def _volume(path: Path, how: Reading) -> Any:
+    """Return the volume in a file or folder; None if it is none. Unless ``how.deep``, an array of channels is none."""
+    if not how.deep and path.suffix.lower() not in (".npy", ".tif", ".tiff"):
+        return None  # the reader of pictures names other formats
+    from simdtex.io import volume  # whose libraries take long to load
+
+    return volume.read(path) if volume.is_volume(path, how.channels or not how.deep) else None
 
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
-from simdtex.io.limits import BYTES, check_size, reading
+from simdtex.io.limits import BYTES, check_size, explained, reading
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, Library, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import DataWarning, check_real, require, shown
 
@@ -241,12 +241,8 @@ def read_grid(
             values = {name: column.reshape(sides[::-1]) for name, column in columns.items()}
             grid = CartesianGrid(values, *lies)
         else:
-            try:
+            with explained(os.fspath(path), "the grid", "a grid"):
                 grid = CartesianGrid(*read(path, most))
-            except (MemoryError, ValueError):
-                raise
-            except Exception as error:  # each library has its own for a damaged file
-                raise ValueError(f"it cannot be read, it is damaged or of an unknown kind ({error})") from None
         names = list(grid.values) if variables is None else list(variables)
         if strange := [name for name in names if name not in grid.values]:
             raise ValueError(f"it has no variable {strange[0]!r}: give one of {', '.join(grid.values)}")

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.limits import check_array
+from simdtex.io.limits import Refused, check_array, needs
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]
@@ -116,7 +116,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
     Pixels are (rows, cols) or (rows, cols, bands) in the file's type. Unknown ones are NaN in floats, and masked in
     integers; a band of alpha is a band. The first row is that of the file, most often the northern one.
     """
-    require("rasters", "rasterio")
+    needs("rasterio", "rasters", "a raster with georeference or no-data")
     import rasterio
     from rasterio.enums import ColorInterp
     from rasterio.io import DatasetReader, MemoryFile
@@ -150,7 +150,9 @@ def read_cells(path: PathLike, most: int) -> Library:
     pixels, geo, names = read_raster(path, most)
     a, b, c, d, e, f = geo.transform
     if b or d:
-        raise ValueError("its rows are not parallel to the x axis: warp it to north up first, for example by gdalwarp")
+        raise Refused(
+            "has rows that are not parallel to the x axis: warp it to north up first, for example by gdalwarp"
+        )
     planes: Any = pixels.reshape(*pixels.shape[:2], -1)
     if np.ma.isMaskedArray(planes):
         planes = np.ma.filled(planes.astype(np.float64), np.nan)
@@ -202,7 +204,8 @@ def read_netcdf(path: PathLike, most: int) -> Library:
     are (z, y, x) by position. A variable with further axes, for example time, gives one variable ``NAME[k]`` for each
     of their steps.
     """
-    require("simulate", "xarray", "cf_xarray", "h5netcdf", "h5py")
+    for library in ("xarray", "cf_xarray", "h5netcdf", "h5py"):
+        needs(library, "simulate", "a NetCDF or HDF5 file")
     import cf_xarray  # noqa: F401 - the accessor cf
     import xarray
 
@@ -225,7 +228,7 @@ def read_netcdf(path: PathLike, most: int) -> Library:
             if {"x", "y"} <= set(one.dims):
                 found |= _steps(str(name), one)
         if not found:
-            raise ValueError("it has no variable with the axes y and x, or z, y and x: rename its dimensions")
+            raise Refused("has no variable with the axes y and x, or z, y and x: rename its dimensions")
         first = next(iter(found.values()))
         found = {name: one for name, one in found.items() if one.sizes == first.sizes}
         for one in found.values():

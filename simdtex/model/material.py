@@ -38,8 +38,10 @@ LETTERS |= {"bc": "albedo", "d": "albedo"}
 
 NORMALS = ("normal", "normal-dx")
 
-READABLE = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".ppm", ".pgm", ".npy")
-UNREADABLE = (".exr", ".hdr", ".tga", ".dds", ".psd")
+READABLE = tuple(
+    [".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".ppm", ".pgm", ".pbm", ".npy", ".exr", ".tga", ".avif", ".heic", ".heif", ".jp2", ".j2k"]
+)
+UNREADABLE = (".hdr", ".dds", ".psd", ".xcf", ".jxl")
 """Suffixes of picture formats that are not read; files with other unknown suffixes are no pictures."""
 
 _WORDS = {word: role for role, words in ROLES.items() for word in words.split()} | LETTERS
