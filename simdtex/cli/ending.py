@@ -20,7 +20,6 @@ from typing import Any, NoReturn
 import click
 
 from simdtex.cli.places import check_places, outputs
-from simdtex.options import DataWarning
 
 UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
 """Beginnings of modules in which an exception does harm: see `postponed`."""
@@ -139,6 +138,8 @@ def note(sentence: str) -> None:
 @contextmanager
 def noting() -> Iterator[None]:
     """Print warnings about the data as notes."""
+    from simdtex.options import DataWarning  # which loads NumPy
+
     with warnings.catch_warnings():
         warnings.simplefilter("always", DataWarning)
         other = warnings.showwarning

@@ -197,7 +197,7 @@ TABLES = (
         metavar="NAME=NUMBER,...",
         group=DATA,
         method="mrf",
-        help="Read these texts of the table of --known as these numbers, as sand=1,shale=0.",
+        help="Take these numbers for the texts in the table of --known, as sand=1,shale=0.",
     ),
     option(
         "--missing",

@@ -38,8 +38,9 @@ LETTERS |= {"bc": "albedo", "d": "albedo"}
 
 NORMALS = ("normal", "normal-dx")
 
-READABLE = tuple(
-    [".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".ppm", ".pgm", ".pbm", ".npy", ".exr", ".tga", ".avif", ".heic", ".heif", ".jp2", ".j2k"]
+READABLE = (
+    *(".png", ".tif", ".tiff", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".ppm", ".pgm", ".pbm", ".npy"),
+    *(".exr", ".tga", ".avif", ".heic", ".heif", ".jp2", ".j2k"),
 )
 UNREADABLE = (".hdr", ".dds", ".psd", ".xcf", ".jxl")
 """Suffixes of picture formats that are not read; files with other unknown suffixes are no pictures."""
