@@ -18,7 +18,7 @@ TEXTS = {
     # options and arguments of text that name no file; those of `mix` repeat the name of a SAMPLE
     *("host", "device", "size", "method", "preset", "relaxation", "pixel", "search", "edges", "boundary", "weights"),
     *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
-    *("origin", "cell", "several"),
+    *("origin", "cell", "several", "outside", "columns", "categories", "variables"),
     *("names", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")

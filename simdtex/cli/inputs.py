@@ -199,6 +199,8 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
             raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
     elif (grid := _volume(path, how)) is None:
         found = read_picture(path, how.palette)
+        if path.suffix.lower() == ".npy" and not how.channels and (count := channels(found.pixels)) > 4:
+            note(f"{path} is read as a picture of {count} channels; for a volume use simdtex simulate, with --known")
         return Read(found.pixels, found.metadata)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
@@ -351,7 +353,7 @@ def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
         return read_table(path, how)
     if name == "region" and not how.deep and not grids.is_grid(path):
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = read_pixels(path, how._replace(palette=name == "image_map")).pixels
+    pixels = read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
@@ -379,7 +381,8 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     If values are ``categorical`` and the samples have one channel, a palette is categories.
     """
-    how = how._replace(valid=samples.limits, variables=tuple((how.columns or {}).get("value", ())))
+    variables = tuple((how.columns or {}).get("value", ()))
+    how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     if is_table(path):
         return read_table(path, how)
     how = how._replace(palette=how.palette and samples.channel_axis is None)

@@ -124,6 +124,7 @@ def simulate(
     data = read_data(material, options, how)
     known = data["known"]
     files = {name: options.pop(name) for name in MAPS}
+    how = how._replace(channels=not material.deep)
     maps = {name: read_map(name, path, how) for name, path in files.items() if path}
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)

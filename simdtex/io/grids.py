@@ -546,14 +546,6 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     """Raise unless the format can hold the values of ``array``."""
     check_real("the grid", array)
     known = array.compressed()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)
-        wrong = np.isnan(known_numbers("", known)) & ~np.isnan(known)
-    if wrong.any():
-        raise ValueError(
-            f"{target} cannot hold {known[wrong][0]}, which is a code for an unknown value there: give NaN for unknown "
-            "values, or another number"
-        )
     if target.suffix.lower() == ".sgems":
         with np.errstate(over="ignore"):
             kept = known.astype(np.float32)
@@ -562,6 +554,14 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
             raise ValueError(
                 f"{target} cannot hold {known[wrong][0]}, since SGeMS has 32-bit floats: end its name in .gslib"
             )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        wrong = np.isnan(known_numbers("", known)) & ~np.isnan(known)
+    if wrong.any():
+        raise ValueError(
+            f"{target} cannot hold {known[wrong][0]}, which is a code for an unknown value there: give NaN for unknown "
+            "values, or another number"
+        )
 
 
 def _suffix(path: PathLike) -> str:
