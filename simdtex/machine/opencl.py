@@ -52,6 +52,18 @@ def kernel_folder() -> Path:
     return inside if inside.is_dir() else package.parent / "kernels"
 
 
+def kernel_source(name: str) -> str:
+    """Return the text of a file of that folder, with the text of each header in place of its ``#include``.
+
+    The compiler needs no path, which may contain a space, and its messages count the lines of each file.
+    """
+    lines = [f'#line 1 "{name}"', *(kernel_folder() / name).read_text(encoding="utf-8").splitlines()]
+    for number, line in enumerate(lines):
+        if line.startswith("#include"):
+            lines[number] = f'{kernel_source(line.split(chr(34))[1])}\n#line {number + 1} "{name}"'
+    return "\n".join(lines) + "\n"
+
+
 class DeviceArray:
     """A contiguous array on a device: a buffer, a shape and a type.
 
@@ -282,9 +294,8 @@ class OpenCL:
         key = (files, function, options)
         if key not in self._kernels:
             if (files, options) not in self._programs:
-                source = "\n".join((kernel_folder() / f"{name}.cl").read_text(encoding="utf-8") for name in files)
-                include = ["-I", str(kernel_folder())]
-                self._programs[files, options] = runtimes.build(self.context, source, [*options.split(), *include])
+                source = "".join(kernel_source(f"{name}.cl") for name in files)
+                self._programs[files, options] = runtimes.build(self.context, source, options.split())
             self._kernels[key] = cl.Kernel(self._programs[files, options], function)
         return self._kernels[key]
 
