@@ -37,7 +37,8 @@ def reporting() -> Iterator[None]:
     """Check the paths of the running command, and report errors and signals in one sentence."""
     context = click.get_current_context()
     try:
-        with catch_signals(context):
+        with catch_signals(context), warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_, **__: note(str(message))
             check_places(context)
             yield
     except BrokenPipeError as error:

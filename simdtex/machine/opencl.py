@@ -149,8 +149,7 @@ class OpenCL:
         self._counters: DeviceArray | None = None
         self._spared = 0
         self._constants: dict[tuple[str, bytes], DeviceArray] = {}
-        self._programs: dict[tuple[tuple[str, ...], str], Any] = {}
-        self._kernels: dict[tuple[tuple[str, ...], str, str], Any] = {}
+        self._kernels: dict[tuple[tuple[str, ...], str], dict[str, Any]] = {}
 
     @contextmanager
     def running(self) -> Iterator[OpenCL]:
@@ -291,13 +290,10 @@ class OpenCL:
         """Return a kernel, compiled once for these -D constants; its file is the first word of its name."""
         file, options = function.partition("_")[0], " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = TOGETHER if file in TOGETHER and not defines else (file,)
-        key = (files, function, options)
-        if key not in self._kernels:
-            if (files, options) not in self._programs:
-                source = "".join(kernel_source(f"{name}.cl") for name in files)
-                self._programs[files, options] = runtimes.build(self.context, source, options.split())
-            self._kernels[key] = cl.Kernel(self._programs[files, options], function)
-        return self._kernels[key]
+        if (files, options) not in self._kernels:
+            source = "".join(kernel_source(f"{name}.cl") for name in files)
+            self._kernels[files, options] = runtimes.build(self.context, source, options.split())
+        return self._kernels[files, options][function]
 
     def launch(
         self,
