@@ -9,13 +9,12 @@ from cases import assert_same_bits
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.machine.opencl import kernel_folder
+from simdtex.machine import runtimes
+from simdtex.machine.opencl import kernel_source
 from simdtex.ops.arithmetic import exp32, fma32, log32
 
 SOURCE = """
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/exp.h"
-#include "common/log.h"
 __kernel void fmas(__global const float *a, __global const float *b, __global const float *c, __global float *out)
 {
     const int i = get_global_id(0);
@@ -137,8 +136,8 @@ def build(machine):
     """The program above on a machine, as it builds its own."""
     import pyopencl as cl
 
-    options = ["-I", str(kernel_folder())]
-    program = cl.Program(machine.context, SOURCE).build(options)
+    headers = kernel_source("common/exp.h") + kernel_source("common/log.h")
+    program = runtimes.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):
         out = machine.empty(arrays[0].shape, np.float32)

@@ -65,12 +65,12 @@ def test_choose_prefers_the_whole_name():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("nonesuch", '"nonesuch"; choose one of: 0 = Turbo 4090 (Acme OpenCL), 1 = Slow 10'),
-        ("99", 'No device matches "99"; choose one of: 0 = '),
+        ("nonesuch", '"nonesuch"; choose one of: 1 = Slow 10 (Acme OpenCL), 2 = '),
+        ("99", 'No device matches "99"; choose one of: 1 = '),
         ("-1", "choose one of"),
         ("", "choose one of"),
-        ("turbo", "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of"),
-        ("0", "it does not build"),
+        ("turbo", "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of: 1 = Slow 10"),
+        ("0", "it does not build); choose one of: 1 = Slow 10"),
         ("e", "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 ="),
     ],
 )
@@ -81,6 +81,13 @@ def test_a_failed_choice_lists_the_devices(text, words):
     assert str(caught.value).endswith(".")
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ValueError)
+
+
+def test_a_device_that_is_refused_is_not_offered():
+    """The listing is not probed, and only the devices that match are."""
+    listing = [replace(info, usable=False, reason="not probed") for info in LISTING[:3]]
+    with pytest.raises(DeviceError, match=r"choose one of: 1 = [^=]*, 2 = [^=]*$"):
+        device.choose("turbo", listing, lambda info: replace(info, reason="it does not build"))
 
 
 def test_choose_probes_no_further_than_needed():

@@ -234,6 +234,16 @@ def test_many_holes_are_in_one_window():
     assert windows(mask, 1, None) == [(slice(0, 93), slice(8, 93), 1)]
 
 
+@pytest.mark.parametrize(("side", "count"), [(300, 16), (900, 1), (3000, 16)])
+def test_spots_are_in_one_window_if_that_is_cheaper(side, count):
+    """It has several levels where a picture is large, but its preparation takes longer the larger it is."""
+    mask = np.zeros((side, side), bool)
+    for row in range(side // 8, side, side // 4):
+        for col in range(side // 8, side, side // 4):
+            mask[row : row + 5, col : col + 5] = True
+    assert len(windows(mask, 7, None)) == count
+
+
 @given(
     st.lists(
         st.tuples(st.integers(0, 59), st.integers(0, 59), st.integers(1, 12), st.integers(1, 12)),

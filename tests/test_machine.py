@@ -3,9 +3,13 @@
 
 import dataclasses
 import os
+import shutil
+import signal
 import subprocess
 import sys
 import uuid
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.machine import runtimes
+from simdtex.machine import memory, opencl, runtimes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
@@ -59,6 +63,74 @@ def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environm
     environment = {key: value.replace("FILE", str(tmp_path / "FILE")) for key, value in environment.items()}
     assert python(OPEN, str(cl_device.index), TMPDIR=str(tmp_path), **environment) == ["(4,", "4)"]
     assert os.listdir(tmp_path) == ["FILE"], "the temporary cache is removed"
+
+
+def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(runtimes, "_report", None)
+    short = nullcontext(SimpleNamespace(write=lambda data: len(data) // 4))
+    monkeypatch.setattr(runtimes.tempfile, "TemporaryFile", lambda **_: short)
+    runtimes._prepare_caches()
+    assert os.environ["XDG_CACHE_HOME"] != str(tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
+@pytest.mark.parametrize("damaged", ["*.so", "*.bc", "binary", "info", "*.sqlite"])
+def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
+    """The first process may crash; the next one warns of the folder, and has the device."""
+
+    def start():
+        code = "import sys; from simdtex.machine import devices; assert devices.find(sys.argv[1]).usable"
+        environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONFAULTHANDLER", "POCL_CACHE_DIR")}
+        return subprocess.run(
+            [sys.executable, "-c", code, str(cl_device.index)],
+            env=environment | {"XDG_CACHE_HOME": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            timeout=200,
+        )
+
+    assert (start().returncode, start().stderr) == (0, "")
+    files = [path for path in tmp_path.rglob(damaged) if path.is_file()]
+    if not files:
+        pytest.skip("the runtime keeps no such file")
+    for path in files:
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    first = start()
+    if first.returncode:
+        assert -first.returncode in (signal.SIGABRT, signal.SIGBUS, signal.SIGSEGV), first.stderr
+        first = start()
+    assert first.returncode == 0, first.stderr
+    assert first.stderr.count(f"delete the folders pocl, pyopencl, pytools and simdtex in {tmp_path}") == 1
+    again = start()
+    assert again.returncode == 0, again.stderr
+    assert damaged == "*.sqlite" or not again.stderr, "the user was warned once"
+
+
+def test_kernels_are_compiled_from_a_folder_of_any_name(cl_device, monkeypatch, tmp_path):
+    folder = tmp_path / "a space" / "\u00fc"
+    shutil.copytree(opencl.kernel_folder(), folder)
+    monkeypatch.setattr(opencl, "kernel_folder", lambda: folder)
+    assert OpenCL(cl_device).kernel("start").function_name == "start"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit has effect on Linux")
+def test_a_limit_on_the_address_space_is_said(any_device):
+    """The runtimes would abort, or not be found; a run that does not fit is refused before it begins."""
+    code = """
+import resource, sys
+import numpy as np
+import simdtex
+resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]) << 20,) * 2)
+try:
+    simdtex.synthesize(np.eye(8), (6000, 6000), order=1, device=sys.argv[2])
+except ValueError as error:
+    print(error)
+"""
+    words = python(code, "700", str(any_device.index))
+    assert " ".join(words).startswith("the address space of this process is limited to 700 MiB, and OpenCL needs")
+    assert "is available" in " ".join(python(code, "3000", "reference"))
+    assert memory.available() < runtimes.address_space()
 
 
 # Threads and forks, in processes of their own: a race may crash, and a forked process may hang

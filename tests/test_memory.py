@@ -26,7 +26,7 @@ def limits(monkeypatch, tmp_path):
 
     def set_to(free, used, *texts):
         monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=free))
-        process = SimpleNamespace(memory_info=lambda: SimpleNamespace(rss=used))
+        process = SimpleNamespace(memory_info=lambda: SimpleNamespace(rss=used, vms=used))
         monkeypatch.setattr(psutil, "Process", lambda: process)
         for path, text in zip(files, texts, strict=False):
             if text is not None:

@@ -79,7 +79,7 @@ LARGEST = {
     "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64},
 }
 SMALLEST = {
-    "mrf": {"bandwidth": 1e-320, "coherence": 5e-324, "balance": 1e-320, "finish": 0.01, "xi": -0.1},
+    "mrf": {"bandwidth": 1e-320, "coherence": 5e-324, "balance": 1e-320, "finish": 0.01, "xi": np.float64(-5e-324)},
     "multires": {"alpha": 1e-320, "beta": 1e-320},
 }
 EXTREME = [

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from plain_numbers import philox
 
 from simdtex import random
-from simdtex.machine.opencl import kernel_folder
+from simdtex.machine import runtimes
+from simdtex.machine.opencl import kernel_folder, kernel_source
 
 # kat_vectors of Random123 (Salmon et al., SC 2011): counter, key, answer.
 KNOWN = [
@@ -19,7 +20,6 @@ KNOWN = [
 words = st.integers(0, 2**32 - 1)
 
 SOURCE = """
-#include "common/philox.h"
 __kernel void raw(__global const uint4 *counter, const uint2 key, __global uint4 *out)
 {
     out[get_global_id(0)] = philox(counter[get_global_id(0)], key);
@@ -133,9 +133,7 @@ def test_another_type_of_seed_is_an_error_that_says_the_types(seed):
 
 @pytest.fixture(scope="module")
 def program(machine):
-    import pyopencl as cl
-
-    return cl.Program(machine.context, SOURCE).build(["-I", str(kernel_folder())])
+    return runtimes.build(machine.context, kernel_source("common/philox.h") + SOURCE, [])
 
 
 def test_known_answers_on_a_device(machine, program):

@@ -18,6 +18,7 @@ from PIL import Image
 from skimage import data
 
 from simdtex.machine import runtimes
+from simdtex.machine.devices import devices
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
@@ -33,6 +34,17 @@ def run(*command, cwd):
     done = subprocess.run([str(part) for part in command], cwd=cwd, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def environment(folder):
+    """Make an empty environment; return the folder of its commands."""
+    run(sys.executable, "-m", "venv", folder, cwd=folder.parent)
+    return folder / ("Scripts" if os.name == "nt" else "bin")
+
+
+def extra():
+    """Return the extra of the CPU runtime if the tests use the one of the package index."""
+    return "[cpu]" if runtimes.intel_library() else ""
 
 
 @pytest.fixture(scope="module")
@@ -112,16 +124,13 @@ def test_the_package_index_would_take_both(wheel, sdist):
 def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):
     """The wheel in an empty environment, then the source distribution in its place: they make the same bytes."""
     venv = tmp_path / "venv"
-    run(sys.executable, "-m", "venv", venv, cwd=tmp_path)
-    scripts = venv / ("Scripts" if os.name == "nt" else "bin")
-    # Where the tests themselves stand on the CPU runtime of the package index, so must this.
-    extra = "[cpu]" if runtimes.intel_library() else ""
+    scripts = environment(venv)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     Image.fromarray(data.brick()[:48, :56]).save(elsewhere / "sample.png")
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     for name, file, words in (
-        ("wheel", f"{wheel}{extra}", ()),
+        ("wheel", f"{wheel}{extra()}", ()),
         ("sdist", sdist, ("--force-reinstall", "--no-deps")),
     ):
         run(scripts / "python", "-m", "pip", "install", *QUIET, *words, file, cwd=tmp_path)
@@ -146,3 +155,19 @@ def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):
         cwd=elsewhere,
     )
     assert "breaks (14)" in (elsewhere / "report" / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["a space", "\u00fc"])
+def test_it_runs_from_a_folder_of_any_name(wheel, tmp_path, name, any_device):
+    """The package, its kernels and pyopencl are all in the folder; each runtime gives the bytes of the reference."""
+    (tmp_path / name).mkdir()
+    scripts = environment(tmp_path / name / "venv")
+    run(scripts / "python", "-m", "pip", "install", *QUIET, f"{wheel}{extra()}", cwd=tmp_path)
+    Image.fromarray(data.brick()[:24, :28]).save(tmp_path / "sample.png")
+    words = ("synth", "sample.png", "--size", "16x12", "--order", "2", "--seed", 1, "--levels", "1")
+    found = [info for info in devices(probe=False) if info.name and not info.simulated]
+    assert any_device.index in [info.index for info in found]
+    for info in found:
+        run(scripts / "simdtex", *words, "-o", f"{info.index}.png", "--device", info.index, cwd=tmp_path)
+    run(scripts / "simdtex", *words, "-o", "reference.png", "--device", "reference", cwd=tmp_path)
+    assert len({path.read_bytes() for path in tmp_path.glob("[0-9r]*.png")}) == 1

@@ -137,20 +137,12 @@ def note(sentence: str) -> None:
 
 @contextmanager
 def noting() -> Iterator[None]:
-    """Print warnings about the data as notes."""
+    """Print warnings as notes, those about the data each time."""
     from simdtex.options import DataWarning  # which loads NumPy
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", DataWarning)
-        other = warnings.showwarning
-
-        def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
-            if issubclass(category, DataWarning):
-                note(str(message))
-            else:
-                other(message, category, *rest, **more)
-
-        warnings.showwarning = show
+        warnings.showwarning = lambda message, *_, **__: note(str(message))
         yield
 
 

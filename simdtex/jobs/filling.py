@@ -47,6 +47,9 @@ MANY = 2**17
 FEW = 16
 """The most windows that are filled one by one; holes in more places are in a single window."""
 
+EACH = 2**18
+"""Pixels of a window with all holes that take about as long as the window of a small hole, which has one level."""
+
 
 class Window(NamedTuple):
     """A part of a picture with a separate lattice: its rows and columns, and its number of levels."""
@@ -73,9 +76,12 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
         for box in found:
             near[box] = True  # the bend of a hole may contain another hole
     area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
-    if len(found) > FEW or area > near.size // 2:
-        rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
-        found = [(slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1))]
+    ends = [np.flatnonzero(near.any(axis))[[0, -1]].tolist() for axis in (1, 0)]
+    rows, cols = (slice(first, last + 1) for first, last in ends)
+    all_of_it = (rows.stop - rows.start) * (cols.stop - cols.start)
+    cheaper = wanted == 1 and MANY < all_of_it < len(found) * EACH
+    if len(found) > FEW or area > near.size // 2 or cheaper:
+        found = [(rows, cols)]
     return [Window(r, c, wanted) for r, c in found]
 
 

@@ -111,10 +111,13 @@ def devices(probe: bool = True) -> list[DeviceInfo]:
 
 
 def probe(info: DeviceInfo) -> DeviceInfo:
-    """Build and run a tiny program on a device, in this process, and return its line with `usable` and `reason`."""
+    """Build and run a tiny program on a device, and return its line with `usable` and `reason`.
+
+    It runs in this process, unless a process crashed at this point before.
+    """
     if info.handle is None:
         return info
-    reason = runtimes.failure(info.handle)
+    reason = runtimes.failures([info.index])[0] if runtimes.apart else runtimes.failure(info.handle)
     return replace(info, usable=not reason, reason=reason)
 
 
@@ -183,7 +186,8 @@ def choose(
     if not matches:
         raise DeviceError(f'No device matches "{text}"; choose one of: {_indexed(listing)}.')
     reasons = "; ".join(f"{info}: {info.reason}" for info in matches)
-    raise DeviceError(f'The device "{text}" cannot be used ({reasons}); choose one of: {_indexed(listing)}.')
+    others = [info for info in listing if info.index not in {match.index for match in matches}]
+    raise DeviceError(f'The device "{text}" cannot be used ({reasons}); choose one of: {_indexed(others)}.')
 
 
 def _matching(text: str, listing: Sequence[DeviceInfo]) -> list[DeviceInfo]:
@@ -197,7 +201,7 @@ def _matching(text: str, listing: Sequence[DeviceInfo]) -> list[DeviceInfo]:
 
 
 def _indexed(listing: Sequence[DeviceInfo]) -> str:
-    return ", ".join(f"{info.index} = {info}" for info in listing if info.name)
+    return ", ".join(f"{info.index} = {info}" for info in listing if info.name and info.reason in ("", _NOT_PROBED))
 
 
 def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
@@ -223,6 +227,7 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
                 found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
         except Exception as error:  # a broken platform must not stop the others
             found.append(DeviceInfo(0, title, "", "other", reason=runtimes.one_line(error)))
+    runtimes.report_crashes()
     found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
     found.sort(key=_preference)
     return tuple(replace(info, index=index) for index, info in enumerate(found))

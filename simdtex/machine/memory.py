@@ -10,6 +10,7 @@ from pathlib import Path
 
 import psutil
 
+from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Machine
 from simdtex.options import SMALLER
@@ -51,11 +52,12 @@ def require_host(wanted: int, remedy: str = SMALLER) -> None:
 
 
 def available() -> int:
-    """Return the bytes that are available to this process, within the limit of its control group."""
-    found: int = psutil.virtual_memory().available
+    """Return the bytes that are available to this process, within its limit and that of its control group."""
+    taken = psutil.Process().memory_info()
+    found: int = min(psutil.virtual_memory().available, runtimes.address_space() - taken.vms)
     for path in LIMITS:
         try:
-            found = min(found, int(path.read_text()) - psutil.Process().memory_info().rss)
+            found = min(found, int(path.read_text()) - taken.rss)
         except (OSError, ValueError):  # no such version; or "max", which is no limit
             continue
     return max(0, found)

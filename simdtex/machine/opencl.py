@@ -52,6 +52,18 @@ def kernel_folder() -> Path:
     return inside if inside.is_dir() else package.parent / "kernels"
 
 
+def kernel_source(name: str) -> str:
+    """Return the text of a file of that folder, with the text of each header in place of its ``#include``.
+
+    The compiler needs no path, which may contain a space, and its messages count the lines of each file.
+    """
+    lines = [f'#line 1 "{name}"', *(kernel_folder() / name).read_text(encoding="utf-8").splitlines()]
+    for number, line in enumerate(lines):
+        if line.startswith("#include"):
+            lines[number] = f'{kernel_source(line.split(chr(34))[1])}\n#line {number + 1} "{name}"'
+    return "\n".join(lines) + "\n"
+
+
 class DeviceArray:
     """A contiguous array on a device: a buffer, a shape and a type.
 
@@ -137,8 +149,7 @@ class OpenCL:
         self._counters: DeviceArray | None = None
         self._spared = 0
         self._constants: dict[tuple[str, bytes], DeviceArray] = {}
-        self._programs: dict[tuple[tuple[str, ...], str], Any] = {}
-        self._kernels: dict[tuple[tuple[str, ...], str, str], Any] = {}
+        self._kernels: dict[tuple[tuple[str, ...], str], dict[str, Any]] = {}
 
     @contextmanager
     def running(self) -> Iterator[OpenCL]:
@@ -279,14 +290,10 @@ class OpenCL:
         """Return a kernel, compiled once for these -D constants; its file is the first word of its name."""
         file, options = function.partition("_")[0], " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = TOGETHER if file in TOGETHER and not defines else (file,)
-        key = (files, function, options)
-        if key not in self._kernels:
-            if (files, options) not in self._programs:
-                source = "\n".join((kernel_folder() / f"{name}.cl").read_text(encoding="utf-8") for name in files)
-                include = ["-I", str(kernel_folder())]
-                self._programs[files, options] = runtimes.build(self.context, source, [*options.split(), *include])
-            self._kernels[key] = cl.Kernel(self._programs[files, options], function)
-        return self._kernels[key]
+        if (files, options) not in self._kernels:
+            source = "".join(kernel_source(f"{name}.cl") for name in files)
+            self._kernels[files, options] = runtimes.build(self.context, source, options.split())
+        return self._kernels[files, options][function]
 
     def launch(
         self,

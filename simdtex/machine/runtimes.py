@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import atexit
+import faulthandler
 import functools
 import os
 import shutil
@@ -16,13 +17,17 @@ import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock, RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+try:
+    import resource
+except ImportError:  # on Windows
+    resource = None  # type: ignore[assignment]
 if TYPE_CHECKING:
     import pyopencl as cl
 
@@ -30,6 +35,7 @@ _INTEL = "libintelocl.so"
 _ICD_VARIABLES = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # each names a folder of .icd files to the loader
 _MARK = "simdtex-probe:"
 _SECONDS = 60.0  # a first build takes a second or two, on a busy computer several times that
+_SAID = "The user was warned.\n"  # the end of each report
 
 # a*a - (1 + 2^-11) is 2^-24 for a = 1 + 2^-12 if fma rounds once, and 0 if it rounds twice.
 _SOURCE = """
@@ -48,6 +54,13 @@ forked = False
 """Whether this process was forked from one that had used OpenCL."""
 _in_use = False
 _building = RLock()
+_report: Path | None = None
+"""The file that gets a report of each crash of a process that uses OpenCL, and of each failed reading of a cache."""
+_reported = 0
+"""The length of the reports, an option of every program: none that was compiled before the last is read from a cache.
+"""
+apart = False
+"""Whether devices are probed in separate processes, since a probe has crashed before."""
 _listing = Lock()
 """For the environment variable that names the loader's folder."""
 
@@ -82,8 +95,14 @@ def platforms() -> list[cl.Platform]:
 
     global _in_use
     check_fork()
+    needed, limit = 2**30 + 2**26 * (os.cpu_count() or 1), address_space()
+    if limit < needed:  # runtimes are not found, or abort
+        raise DeviceError(
+            f"the address space of this process is limited to {limit >> 20} MiB, and OpenCL needs {needed >> 20}; "
+            'raise the limit (ulimit -v), or use device="reference", which is slow'
+        )
     _in_use = True
-    _ensure_cache_folder()
+    _prepare_caches()
     try:
         with _listing, _icd_folder():
             found = pyopencl.get_platforms()
@@ -92,22 +111,57 @@ def platforms() -> list[cl.Platform]:
     return list(dict.fromkeys(found))
 
 
-def _ensure_cache_folder() -> None:
-    """Set XDG_CACHE_HOME to a temporary folder if the user's cache folder is not writable.
+def address_space() -> int:
+    """Return the limit on this process's virtual memory in bytes, as ``ulimit -v`` sets it."""
+    if resource is None or (limit := resource.getrlimit(resource.RLIMIT_AS)[0]) == resource.RLIM_INFINITY:
+        return sys.maxsize
+    return limit
 
-    PoCL does not start, and pyopencl raises, without a writable cache.
+
+def _prepare_caches() -> None:
+    """Set XDG_CACHE_HOME to a temporary folder if the user's cache folder is not writable, else read the report there.
+
+    PoCL does not start, and pyopencl raises, without a writable cache; and a damaged cache may crash every process.
     """
-    if sys.platform == "win32":
+    global _report, _reported, apart
+    if sys.platform == "win32" or _report:
         return
     try:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        folder.mkdir(parents=True, exist_ok=True)
+        report = folder / "simdtex" / "crashes.txt"
+        report.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-            file.write(bytes(2**16))
+            if file.write(bytes(2**16)) < 2**16:
+                raise OSError("the disk is full")
+        text = report.read_text(errors="replace") if report.exists() else ""
     except (OSError, RuntimeError):  # the latter if there is no home folder
         temporary = tempfile.mkdtemp(prefix="simdtex-cache-")
         atexit.register(shutil.rmtree, temporary, ignore_errors=True)
         os.environ["XDG_CACHE_HOME"] = temporary
+        return
+    _report, _reported, apart = report, len(text), " in failure\n" in text
+    if text and not text.endswith(_SAID):
+        _compile_anew("", "the OpenCL runtime crashed in an earlier run")
+
+
+def report_crashes() -> None:
+    """Let a crash of this process leave a report; called when PoCL, with its devices, has set its own handlers."""
+    if _report and not faulthandler.is_enabled():
+        faulthandler.enable(os.open(_report, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666))
+
+
+def _compile_anew(report: str, why: str) -> None:
+    """Warn that all kernels are compiled anew, and add to the reports, so that later processes do not read them."""
+    global _reported
+    _reported += len(report + _SAID)
+    if _report:
+        with suppress(OSError), _report.open("a") as file:
+            file.write(report + _SAID)
+    warnings.warn(
+        f"{why}, perhaps because a cache is damaged, and kernels are compiled anew; delete the folders pocl, pyopencl, "
+        f"pytools and simdtex in {_report.parent.parent if _report else 'the cache folder'}",
+        stacklevel=3,
+    )
 
 
 def intel_library() -> Path | None:
@@ -154,13 +208,36 @@ def _copy_icd_files(folder: Path) -> None:
                 (folder / f"{number}-{entry.name}").write_text(f"{beside if beside.is_file() else library}\n")
 
 
-def build(context: cl.Context, source: str, options: Sequence[str]) -> Any:
-    """Compile a program; one thread at a time, and without pyopencl's warning about the compiler's log."""
+def build(context: cl.Context, source: str, options: Sequence[str]) -> dict[str, Any]:
+    """Compile a program, and return its kernels by name; if that fails, try once more without the caches.
+
+    One thread at a time compiles. The compiler's warnings, which pyopencl would repeat, are not shown.
+    """
     import pyopencl
 
+    def built() -> dict[str, Any]:
+        anew = [f"-DREPORTED={_reported}"] * bool(_reported)
+        program = pyopencl.Program(context, source).build(["-w", "-cl-std=CL1.2", *anew, *options])
+        kernels = {kernel.function_name: kernel for kernel in program.all_kernels()}
+        if not kernels:  # of a damaged file, PoCL makes an empty program
+            raise DeviceError("the program is empty")
+        return kernels
+
+    global _reported
     with _building, warnings.catch_warnings():
         warnings.simplefilter("ignore", pyopencl.CompilerWarning)
-        return pyopencl.Program(context, source).build(["-w", *options])
+        try:
+            return built()
+        except Exception as error:
+            before, why = (_reported, pyopencl._PYOPENCL_NO_CACHE), one_line(error)
+            _reported, pyopencl._PYOPENCL_NO_CACHE = _reported + 1, True
+            try:
+                kernels = built()
+            except Exception:
+                _reported, pyopencl._PYOPENCL_NO_CACHE = before
+                raise error from None
+    _compile_anew(f"{why}\n", f"a compiled kernel could not be read ({why})")
+    return kernels
 
 
 @functools.cache
@@ -171,13 +248,13 @@ def failure(handle: cl.Device) -> str:
     try:
         check_fork()
         context = pyopencl.Context([handle])
-        program = build(context, _SOURCE, ["-cl-std=CL1.2"])
+        kernels = build(context, _SOURCE, [])
         queue = pyopencl.CommandQueue(context)
         host = np.full(64, 1 + 2.0**-12, np.float32)
         flags = pyopencl.mem_flags
         source = pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=host)
         target = pyopencl.Buffer(context, flags.WRITE_ONLY, host.nbytes)
-        pyopencl.Kernel(program, "probe")(queue, host.shape, None, source, target)
+        kernels["probe"](queue, host.shape, None, source, target)
         result = np.zeros_like(host)
         pyopencl.enqueue_copy(queue, result, target)
     except Exception as error:  # the device is not usable, whatever the reason
@@ -195,10 +272,11 @@ def _failure_apart(index: int) -> str:
     if forked:
         return FORKED
     code = (
-        f"import sys; sys.path[:] = {sys.path!r}\n"
-        "from simdtex.machine import devices\n"
-        f"info = devices.probe(devices.devices(probe=False)[{index}])\n"
-        f"print('\\n{_MARK}' + info.reason, flush=True)"
+        f"import faulthandler, sys; sys.path[:] = {sys.path!r}\n"
+        "faulthandler.enable()  # a crash of this process is not reported\n"
+        "from simdtex.machine import devices, runtimes\n"
+        f"reason = runtimes.failure(devices.devices(probe=False)[{index}].handle)\n"
+        f"print('\\n{_MARK}' + reason, flush=True)"
     )
     try:
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=_SECONDS, check=False)

@@ -216,7 +216,7 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
     for number in range(run.levels):
         grid, options = run.grid(number), run.options
         coarsest = number == run.levels - 1
-        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
+        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
         candidates = run.places(number).positions.size
         if not run.exhaustive(number):
             candidates = min(candidates, most_listed(len(run.offsets), options.chance_at(number)))
