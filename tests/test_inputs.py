@@ -249,7 +249,7 @@ BAD = {
     "masks turned round": (TWO | {"mask": [MASK[:5, :4], MASK]}, ValueError, "mask is 5x4 and the picture 9x10"),
     # known values
     "data of another number": ({"known": HardData(np.ones((1, 2)), np.ones((1, 2)), ("a", "b"))}, ValueError,
-                               "a datum has 2 values, a, b, and a pixel of the sample 1; give as many, or choose columns"),
+                               "a datum has 2 values, a, b, and a pixel of the sample 1; .* choose columns"),
     "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* convert it to integers or real floats"),
     "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
     "known in colour": ({"known": np.dstack([SOME] * 3)}, ValueError, r"known is 3-dimensional; give \(rows, cols\)"),
