@@ -134,14 +134,12 @@ def test_exp32_of_0_is_1_and_it_never_exceeds_1():
 @pytest.fixture(scope="module")
 def build(machine):
     """The program above on a machine, as it builds its own."""
-    import pyopencl as cl
-
     headers = kernel_source("common/exp.h") + kernel_source("common/log.h")
-    program = runtimes.build(machine.context, headers + SOURCE, [])
+    kernels = runtimes.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):
         out = machine.empty(arrays[0].shape, np.float32)
-        machine.enqueue(cl.Kernel(program, name), out.shape, *map(machine.put, arrays), out, local=(1,))
+        machine.enqueue(kernels[name], out.shape, *map(machine.put, arrays), out, local=(1,))
         return machine.get(out)
 
     return run
