@@ -453,7 +453,7 @@ TABLES = {
     "outside": ("x,y,value\n3,4,20\n14,2,9\n", "line 3 .* outside of a picture of 14 x 12"),
     "disagree": ("x,y,value\n3,4,20\n3.2,4.1,9\n", "line 3 and line 2 .* keep one|line 2 and line 3 .* keep one"),
     "beyond the type": ("x,y,value\n3,4,300\n", "which uint8 cannot hold"),
-    "of two variables": ("x,y,a,b\n3,4,1,2\n", "2 values and a pixel of the sample 1"),
+    "of two variables": ("x,y,a,b\n3,4,1,2\n", "2 values, a, b, and a pixel of the sample 1"),
     "empty": ("", "the table is empty"),
     "words": ("x,y,value\n3,4,high\n", "'high' in column 3"),
 }
