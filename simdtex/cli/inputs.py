@@ -347,12 +347,8 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
 
 def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
-    from simdtex.io import grids, image
-
     if name == "probabilities" and is_table(path):
         return read_table(path, how)
-    if name == "region" and not how.deep and not grids.is_grid(path):
-        return image.read_mask(path, image.read(path).pixels.shape)
     pixels = read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
