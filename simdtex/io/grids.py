@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
+from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, check_size, explained, reading
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import DataWarning, check_real, require, shown
@@ -274,12 +275,10 @@ Read = tuple[list[str], Array, tuple[int, ...], Frame]
 
 def _typed(column: Array) -> Array:
     """Return a column as integers if all its values are known integers of a small type."""
-    if np.isnan(column).any():
-        return column
-    low, high = column.min(), column.max()
     for kind in _WHOLE:
-        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max and (column == np.floor(column)).all():
-            return column.astype(kind)
+        found, wrong = cast(column, kind)
+        if not wrong.any():
+            return found
     return column
 
 
@@ -525,9 +524,9 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     check_real("the grid", array)
     known = array.compressed()
     if target.suffix.lower() == ".sgems":
-        with np.errstate(over="ignore"):
-            kept = known.astype(np.float32)
-        wrong = (kept.astype(np.float64) != known) if known.dtype.kind in "iu" else np.isinf(kept) & np.isfinite(known)
+        kept, wrong = cast(known, np.float32)
+        if known.dtype.kind in "iu":
+            wrong = kept.astype(np.float64) != known
         if wrong.any():
             raise ValueError(
                 f"{target} cannot hold {known[wrong][0]}, since SGeMS has 32-bit floats: end its name in .gslib"
