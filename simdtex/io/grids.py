@@ -290,6 +290,8 @@ def _gslib(file: BufferedReader, most: int) -> Read:
     if about:
         found = [about.get(f"{key}{axis}", least) for key, least in zip("NSO", "110", strict=True) for axis in "XYZ"]
         names, line = _text(file.readline(_LINE)).split(), len(about) + 2
+        if not names:
+            raise ValueError(f"line {line - 1} has no names of variables: it is cut short, or write them there")
     else:
         title, second = (_text(file.readline(_LINE)) for _ in range(2))
         words, names = second.split(), []

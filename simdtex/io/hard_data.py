@@ -12,7 +12,7 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import prod
+from math import isnan, prod
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -198,17 +198,29 @@ def _of_columns(
     if names and (not names[0] or names[0].startswith("Unnamed: 0")):  # the index of pandas
         del listed[0]
     points, values = _roles(listed, bool(names), columns or {})
-    if not columns or "value" not in columns:  # without names of wells
-        left = [k for k in values if not categories and all(map(_is_text, cells[k]))]
+    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
+    codes |= dict.fromkeys(_UNKNOWN, np.nan)
+    found = {k: [number_of(cell) for cell in cells[k]] for k in points}
+    found |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
+    if not categories and not (columns and "value" in columns):  # without names of wells
+        left = [k for k in values if all(one is None or isnan(one) for one in found[k])]
         if 0 < len(left) < len(values):
             values = [k for k in values if k not in left]
             shown = ", ".join(listed[k] for k in left)
             warnings.warn(f"left out, because they hold text: the columns {shown}", DataWarning, stacklevel=2)
-    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
-    found = np.array([_numbers(cells[k], k, lines, codes if k in values else None) for k in (*points, *values)]).T
     labels = tuple((names and names[k]) or name for k, name in zip(values, _plain(len(values)), strict=True))
-    axes = len(points)
-    return HardData(found[:, :axes].copy(), found[:, axes:].copy(), labels, lines)
+    at, numbers = (np.array([found[k] for k in some], np.float64).T.copy() for some in (points, values))
+    data = HardData(at, numbers, labels, lines)
+    for k in (*points, *values):
+        if None in found[k]:
+            row = found[k].index(None)
+            remedy = "write numbers with a decimal point"
+            if k in values:
+                remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
+            raise ValueError(
+                f"{data.where(row)} has {cells[k][row][:40]!r} in column {k + 1}, which is no number: {remedy}"
+            )
+    return data
 
 
 def _plain(count: int) -> tuple[str, ...]:
@@ -255,26 +267,6 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
 def _example(listed: Mapping[str, int], axis: str) -> str:
     name = next(iter(listed))
     return f"as {{{axis!r}: {name!r}, ...}} in Python or --columns {axis}={name},... on the command line"
-
-
-def _is_text(cell: str) -> bool:
-    return cell.lower() in _UNKNOWN or number_of(cell) is None
-
-
-def _numbers(cells: Sequence[str], column: int, lines: Sequence[int] | None, codes: dict[str, float] | None) -> Floats:
-    """Return the numbers of a column; ``codes`` are those of texts, or None for a column of coordinates."""
-    found = np.empty(len(cells))
-    for row, cell in enumerate(cells):
-        unknown = codes is not None and cell.lower() in _UNKNOWN
-        value = np.nan if unknown else (codes or {}).get(cell.lower(), number_of(cell))
-        if value is None:
-            where = f"row {row}" if lines is None else f"line {lines[row]}"
-            remedy = "write numbers with a decimal point"
-            if codes is not None:
-                remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
-            raise ValueError(f"{where} has {cell[:40]!r} in column {column + 1}, which is no number: {remedy}")
-        found[row] = value
-    return found
 
 
 def _table(array: Any) -> HardData:
