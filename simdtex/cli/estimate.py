@@ -14,7 +14,7 @@ from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import output_shape, read_material, take_reading
 from simdtex.cli.options import CHANNELS, DEVICE, SAMPLE_MASK, data_options, given, option, places, size_option
 from simdtex.cli.places import EITHER, ENTER
-from simdtex.cli.simulate import georeferenced, lies_of
+from simdtex.cli.simulate import georeferenced, read_place
 
 
 @command(
@@ -63,8 +63,7 @@ def estimate(
     It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex import estimate
-    from simdtex.io.grids import SUFFIXES, check_grid, write_grid
-    from simdtex.io.realisations import check_realisations_path, write_realisations
+    from simdtex.io.realisations import write_realisations
 
     began, how = time.perf_counter(), take_reading(options, deep=True)
     material = read_material(training_image, how)
@@ -72,25 +71,14 @@ def estimate(
         raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    data = read_data(material, options, how)
-    known, mask = data["known"], data["mask"]
-    shape = output_shape(size, material.pixels[0], known, material.pixels[0])
-    if known is None:
+    if options["known"] is None:
         raise ValueError("an estimate requires data; give --known")
-    lies = lies_of(material, options.pop("origin"), options.pop("cell"))
-    if grid := check_realisations_path(output) in SUFFIXES:
-        check_grid(output, material.pixels, **lies)
-    inputs = given(options) | lies
-    made = estimate(material.array, known=known, shape=(shape[0], shape[1]), mask=mask, **inputs)
-    made = georeferenced(made, material.crs)
-    if grid:
-        variables = {str(name): one.values for name, one in made.data_vars.items() if name != "probability"}
-        if "probability" in made:
-            names = made.category.values.tolist()
-            variables |= {f"probability_{name}": made.probability.values[k] for k, name in enumerate(names)}
-        write_grid(output, variables, crs=material.crs, **lies)
-    else:
-        write_realisations(output, made)
+    lies = read_place(material, output, options)
+    data = read_data(material, options, how)
+    height, width = output_shape(size, material.pixels[0], data["known"], material.pixels[0])
+    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | lies
+    made = georeferenced(estimate(material.array, shape=(height, width), **inputs), material.crs)
+    write_realisations(output, made)
     if not quiet:
         seconds = time.perf_counter() - began
-        click.echo(f"{output}: maps of {shape[1]}x{shape[0]} in {seconds:.1f} s on {made.attrs['device']}")
+        click.echo(f"{output}: maps of {width}x{height} in {seconds:.1f} s on {made.attrs['device']}")

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -106,6 +105,12 @@ class Also(NamedTuple):
 
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
+    def write(self, made: Any, run: Any) -> None:
+        """Write the map, arranged as the output of a run."""
+        from simdtex.io import image
+
+        image.write(self.out, self.carried(run.source), self.maps.metadata)
+
 
 def planes(pixels: NDArray[Any]) -> NDArray[Any]:
     """Return a picture (rows, cols) or (rows, cols, channels) as the latter."""
@@ -193,11 +198,16 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
     """
     from simdtex.io import grids
 
+    grid = None
     if grids.is_grid(path, rasters=how.deep):
         grid = grids.read_grid(path, variables=how.variables or None, missing=how.missing, valid=how.valid)
         if stepped := [name for name in grid.values if name.endswith("]") and not how.variables]:
             raise ValueError(f"{path} has steps of time or another axis: choose one, as --variables '{stepped[0]}'")
-    elif (grid := _volume(path, how)) is None:
+    elif how.deep or path.suffix.lower() in (".npy", ".tif", ".tiff"):  # the reader of pictures names other formats
+        from simdtex.io import volume  # whose libraries take long to load
+
+        grid = volume.read(path) if volume.is_volume(path, how.channels or not how.deep) else None
+    if grid is None:
         found = read_picture(path, how.palette)
         if path.suffix.lower() == ".npy" and not how.channels and (count := channels(found.pixels)) > 4:
             note(f"{path} is read as a picture of {count} channels; for a volume use simdtex simulate, with --known")
@@ -206,15 +216,6 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
     if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
     return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
-
-
-def _volume(path: Path, how: Reading) -> Any:
-    """Return the volume in a file or folder; None if it is none. Unless ``how.deep``, an array of channels is none."""
-    if not how.deep and path.suffix.lower() not in (".npy", ".tif", ".tiff"):
-        return None  # the reader of pictures names other formats
-    from simdtex.io import volume  # whose libraries take long to load
-
-    return volume.read(path) if volume.is_volume(path, how.channels or not how.deep) else None
 
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
@@ -294,16 +295,10 @@ def write_arranged(
         else:
             output(made, run, metadata)
 
-    writers: list[Callable[[Any, Any], object]] = [write, *(partial(_write_map, one) for one in others)]
+    writers: list[Callable[[Any, Any], object]] = [write, *(one.write for one in others)]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     return writers
-
-
-def _write_map(other: Also, made: NDArray[Any], run: Any) -> None:
-    from simdtex.io import image
-
-    image.write(other.out, other.carried(run.source), other.maps.metadata)
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
@@ -315,10 +310,8 @@ def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tu
 
     if size is not None:
         return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT")[::-1]
-    for picture in like:
-        if hasattr(picture, "shape"):  # a table has none
-            return tuple(picture.shape[:axes])
-    return tuple(2 * side for side in pixels.shape[:axes])
+    doubled = tuple(2 * side for side in pixels.shape[:axes])
+    return next((picture.shape[:axes] for picture in like if hasattr(picture, "shape")), doubled)  # a table has none
 
 
 def last_iteration(statistics: dict[str, Any]) -> str:
@@ -347,31 +340,22 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
 
 def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
-    from simdtex.io import grids, image
-
-    if name == "probabilities" and is_table(path):
-        return read_table(path, how)
-    if name == "region" and not how.deep and not grids.is_grid(path):
-        return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels
-    if pixels.ndim == 2 or pixels.shape[-1] == 1:
-        pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
-        return pixels > 0 if name == "region" else pixels
-    return np.moveaxis(pixels, -1, 0)
+    if name == "probabilities" and (table := read_table(path, how)) is not None:
+        return table
+    pixels = planes(read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels)
+    if pixels.shape[-1] > 1:
+        return np.moveaxis(pixels, -1, 0)
+    return pixels[..., 0] > 0 if name == "region" else pixels[..., 0]
 
 
-def is_table(path: Path) -> bool:
-    """Return whether a file is a table of data, by its content if that is a grid or a point set, else by its name."""
+def read_table(path: Path, how: Reading) -> HardData | None:
+    """Read a table of data; None if a file is none, by its content if that is a grid or a point set, else its name."""
     from simdtex.io import grids
-
-    kind = grids.kind_of(path)
-    return kind == "points" or (kind is None and path.suffix.lower() in TABLES)
-
-
-def read_table(path: Path, how: Reading) -> HardData:
-    """Read a table of data."""
     from simdtex.io.hard_data import read_hard_data
 
+    kind = grids.kind_of(path)
+    if kind != "points" and (kind is not None or path.suffix.lower() not in TABLES):
+        return None
     return read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=how.valid)
 
 
@@ -383,8 +367,8 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
     """
     variables = tuple((how.columns or {}).get("value", ()))
     how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
-    if is_table(path):
-        return read_table(path, how)
+    if (table := read_table(path, how)) is not None:
+        return table
     how = how._replace(palette=how.palette and samples.channel_axis is None)
     values, metadata, lies, _ = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -102,10 +101,6 @@ def simulate(
     number: int,
     size: str | None,
     report: Path | None,
-    origin: str | None,
-    cell: str | None,
-    several: str | None,
-    outside: str | None,
     source: bool,
     **options: Any,
 ) -> Task:
@@ -114,32 +109,26 @@ def simulate(
     A realisation depends only on the seed and on its number.
     """
     from simdtex import simulate
-    from simdtex.io.grids import SUFFIXES, check_grid
-    from simdtex.io.realisations import check_realisations_path, write_realisations
+    from simdtex.io.realisations import write_realisations
     from simdtex.run import Output
 
     how = take_reading(options, deep=True)
     material = read_material(training_image, how)
-    pixels = material.pixels[0]
+    lies = read_place(material, output, options, source)
     data = read_data(material, options, how)
-    known = data["known"]
+    known, pixels = data["known"], material.pixels[0]
     files = {name: options.pop(name) for name in MAPS}
     how = how._replace(channels=not material.deep)
     maps = {name: read_map(name, path, how) for name, path in files.items() if path}
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
-    lies = lies_of(material, origin, cell)
-    place = lies | given({"several": several, "outside": outside})
-    if check_realisations_path(output, source=source) in SUFFIXES:
-        check_grid(output, material.pixels, **lies)
+    place = lies | given({name: options.pop(name) for name in ("several", "outside")})
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
         if source or "region" in maps:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(report, material, shape, getattr(known, "values", known))
-        rows = partial(_rows, known, shape, place)
-        flat = known is not None and not material.deep
-        writers.append(lambda made, run: _report(report, pixels, made, rows() if flat else None))
+        writers.append(lambda made, run: _report(report, material, made, known, place))
     inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -154,14 +143,22 @@ def simulate(
     )
 
 
-def lies_of(material: Material, origin: str | None, cell: str | None) -> dict[str, Any]:
-    """Return the origin and the size of cells: as given, else of a training image that is a grid, else None."""
-    options = (("--origin", origin), ("--cell", cell))
-    found: list[Any] = [None if text is None else numbers(name, text) for name, text in options]
+def read_place(material: Material, output: Path, options: dict[str, Any], source: bool = False) -> dict[str, Any]:
+    """Return the origin and the size of cells; raise if the output cannot be written.
+
+    As given by options, which are taken out; else of a training image that is a grid; else None.
+    """
+    from simdtex.io.grids import SUFFIXES, check_grid
+    from simdtex.io.realisations import check_realisations_path
+
+    told = {name: options.pop(name) for name in ("origin", "cell")}
+    lies: dict[str, Any] = {name: None if text is None else numbers(f"--{name}", text) for name, text in told.items()}
     if material.lies:  # whose z is left out if that of the other option is
-        axes = min((len(one) for one in found if one), default=3)
-        found = [one or own[:axes] for one, own in zip(found, material.lies, strict=True)]
-    return dict(zip(("origin", "cell"), found, strict=True))
+        axes = min((len(one) for one in lies.values() if one), default=3)
+        lies = {name: one or getattr(material.lies, name)[:axes] for name, one in lies.items()}
+    if check_realisations_path(output, source=source) in SUFFIXES:
+        check_grid(output, material.pixels, **lies)
+    return lies
 
 
 def georeferenced(made: Any, crs: str) -> Any:
@@ -174,41 +171,38 @@ def georeferenced(made: Any, crs: str) -> Any:
     return found
 
 
-def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:
+def _report(folder: Path, material: Material, made: Any, known: Any, place: dict[str, Any]) -> None:
+    from simdtex.io.hard_data import HardData, place_hard_data
     from simdtex.report.ensemble import write_ensemble
     from simdtex.report.volumes import write_volumes
 
-    categorical = bool(json.loads(made.attrs["options"])["categorical"])
-    if pixels.ndim > 2:
+    pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
+    if material.deep:
         write_volumes(folder, pixels, made.values, categorical, command_line())
         return
+    data = None
+    if known is not None:
+        table = isinstance(known, HardData)
+        known = place_hard_data(known, made.shape[1:], **place) if table else np.ma.masked_invalid(known)
+        row, col = np.nonzero(~np.ma.getmaskarray(known))
+        data = np.stack([col, row, known.data[row, col].astype(np.float64)], -1)
     categories: list[Any] | None = None if categorical else []
     write_ensemble(folder, pixels, made.values, data=data, categories=categories, command=command_line())
 
 
 def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
-    pictures = material.pixels
     from simdtex.experiments.ensemble.summary import LEAST
     from simdtex.options import LARGEST
     from simdtex.report.page import check_folder
 
-    if len(pictures) > 1 or material.channel_axis is not None:
+    if material.several or material.channel_axis is not None:
         raise ValueError("--report requires one training image of one variable; leave it out")
-    if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
+    if not material.known:
         raise ValueError("--report requires a training image without unknown cells; leave it out")
-    given = [pictures[0]] if known is None else [pictures[0], known]
-    if not material.deep and min(*shape, *pictures[0].shape) < LEAST:
+    given = material.pixels if known is None else [*material.pixels, known]
+    if not material.deep and min(*shape, *material.pixels[0].shape) < LEAST:
         raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
     check_folder(folder)
-
-
-def _rows(known: Any, shape: tuple[int, ...], place: dict[str, Any]) -> Any:
-    """Return hard data as rows of column, row and value."""
-    from simdtex.io.hard_data import HardData, place_hard_data
-
-    known = place_hard_data(known, shape, **place) if isinstance(known, HardData) else np.ma.masked_invalid(known)
-    row, col = np.nonzero(~np.ma.getmaskarray(known))
-    return np.stack([col, row, known.data[row, col].astype(np.float64)], -1)

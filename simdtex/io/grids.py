@@ -11,19 +11,21 @@ import os
 import re
 import struct
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from io import BufferedReader
 from math import isfinite, prod
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
+from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, check_size, explained, reading
-from simdtex.io.rasters import NETCDF, RASTERS, TIFF, Library, is_raster, read_cells, read_netcdf, write_cells
+from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import DataWarning, check_real, require, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
@@ -140,26 +142,34 @@ def known_numbers(
 
 
 def kind_of(path: PathLike) -> str | None:
-    """Return the kind of a file by its first lines: ``"grid"``, ``"points"`` for a point set of Geo-EAS, or None."""
+    """Return the kind of a file by its first bytes or, of some rasters, by its suffix.
+
+    ``"grid"`` of GSLIB, geone or SGeMS, ``"points"`` for a point set of Geo-EAS, ``"netcdf"`` also for HDF5,
+    ``"raster"``, or None.
+    """
     if not os.path.isfile(path):
         return None
     try:
         with open(path, "rb") as file:
-            title, second, third = (_text(file.readline(_LINE)) for _ in range(3))
-            if title.startswith("#"):
-                file.seek(0)
-                return "grid" if "NX" in _geone_header(file) else None
-            file.seek(0)
-            if file.read(len(MAGIC)) == MAGIC:
+            head = file.peek(5)[:5]
+            if head.startswith(MAGIC) or "NX" in _geone_header(file):
                 return "grid"
+            if head.startswith(NETCDF):
+                return "netcdf"
+            if head.startswith(TIFF) and is_raster(file):
+                return "raster"
+            file.seek(0)
+            title, second, third = (_text(file.readline(_LINE)) for _ in range(3))
     except OSError:
         return None
-    if (count := count_of(second, third)) is not None:
-        return "grid" if count == 1 or _of_title(title) else "points"
-    words = second.split()
-    if len(words) not in (4, 10, 11) or not (words[0].isdigit() and _all_numbers(words)):
-        return None
-    return None if len(third.split()) == len(words) and _all_numbers(third.split()) else "grid"
+    if not title.startswith("#"):
+        if (count := count_of(second, third)) is not None:
+            return "grid" if count == 1 or _of_title(title) else "points"
+        words, after = second.split(), third.split()
+        table = len(after) == len(words) and _all_numbers(after)
+        if len(words) in (4, 10, 11) and words[0].isdigit() and _all_numbers(words) and not table:
+            return "grid"
+    return "raster" if head.lower() == b"ncols" or _suffix(path) in RASTERS else None
 
 
 def count_of(line: str, after: str = "") -> int | None:
@@ -168,10 +178,14 @@ def count_of(line: str, after: str = "") -> int | None:
     ``after`` is the third line: in a table it has as many words.
     """
     words = line.split()
-    if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
+    if not words or not _is_count(words[0]):
         return None
     table = len(words) > 1 and (number_of(words[1]) is not None or len(after.split()) == len(words))
     return None if table else int(words[0])
+
+
+def _is_count(word: str) -> bool:
+    return bool(re.fullmatch("[0-9]{1,9}", word)) and int(word) > 0
 
 
 def read_grid(
@@ -187,9 +201,8 @@ def read_grid(
     Parameters
     ----------
     path : path
-        A text: a title, the number of variables, their names, each in a line, and a value of each variable for each
-        cell, x fastest, then y, then z; the notes describe the headers. Or a Cartesian grid saved by SGeMS; a raster,
-        such as a GeoTIFF or ESRI ASCII; or a NetCDF or HDF5 file.
+        A text, see the notes; a Cartesian grid saved by SGeMS; a raster, such as a GeoTIFF or ESRI ASCII; or a NetCDF
+        or HDF5 file.
     variables : iterable of str, optional
         The names of the variables to return; None: all.
     missing : iterable of float
@@ -218,7 +231,8 @@ def read_grid(
 
     Notes
     -----
-    A text gives the number of cells in one of four ways:
+    A text has a title, the number of variables, their names, each in a line, and a value of each variable for each
+    cell, x fastest. It gives the number of cells in one of four ways:
 
     * its first line is ``nx ny nz``, as in MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as in DeeSse: sizes of a cell,
       and the corner of the grid, half a cell before the first centre;
@@ -234,138 +248,102 @@ def read_grid(
     first row is the northern one.
     """
     with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
-        head = file.read(len(MAGIC))
-        read = None if kind_of(path) else _library(path)
-        if read is None:
-            columns, sides, lies = (_sgems if head.startswith(MAGIC) else _gslib)(file, most)
-            values = {name: column.reshape(sides[::-1]) for name, column in columns.items()}
-            grid = CartesianGrid(values, *lies)
-        else:
+        if library := _LIBRARIES.get(kind_of(path) or ""):
             with explained(os.fspath(path), "the grid", "a grid"):
-                grid = CartesianGrid(*read(path, most))
+                grid = CartesianGrid(*library(path, most))
+        else:
+            found, columns, sides, lies = (_sgems if file.peek().startswith(MAGIC) else _gslib)(file, most)
+            grid = CartesianGrid(dict(zip(_apart(found), columns.reshape(-1, *sides[::-1]), strict=True)), *lies)
         names = list(grid.values) if variables is None else list(variables)
         if strange := [name for name in names if name not in grid.values]:
             raise ValueError(f"it has no variable {strange[0]!r}: give one of {', '.join(grid.values)}")
     values = {name: known_numbers(f"{path}, {name}", grid.values[name], missing, valid) for name in names}
-    return replace(grid, values={name: one if read else _typed(one) for name, one in values.items()})
+    return replace(grid, values={name: one if library else _typed(one) for name, one in values.items()})
 
 
 def is_grid(path: PathLike, rasters: bool = True) -> bool:
     """Return whether a file is a grid that `read_grid` reads; without ``rasters``, whether it is one but a raster."""
-    return kind_of(path) == "grid" or (os.path.isfile(path) and _library(path, rasters) is not None)
+    return kind_of(path) in ("grid", "netcdf", *["raster"] * rasters)
 
 
-def _library(path: PathLike, rasters: bool = True) -> Callable[[PathLike, int], Library] | None:
-    """Return the reader of a NetCDF or HDF5 file or, with ``rasters``, of a raster; None if a file is neither."""
-    with open(path, "rb") as file:
-        head = file.read(5)
-        if head.startswith(NETCDF):
-            return read_netcdf
-        tiff = head.startswith(TIFF) and is_raster(file)
-    raster = tiff or head.lower() == b"ncols" or Path(path).suffix.lower() in RASTERS
-    return read_cells if rasters and raster else None
+_LIBRARIES = {"netcdf": read_netcdf, "raster": read_cells}
+"""The readers of the kinds of grids that a library reads."""
 
-
-Read = tuple[dict[str, Array], tuple[int, ...], Frame]
-"""Columns of values by name, nx ny nz, and the position of the cells."""
+Read = tuple[list[str], Array, tuple[int, ...], Frame]
+"""The names of the variables, their values, nx ny nz, and the position of the cells."""
 
 
 def _typed(column: Array) -> Array:
     """Return a column as integers if all its values are known integers of a small type."""
-    if np.isnan(column).any():
-        return column
-    low, high = column.min(), column.max()
     for kind in _WHOLE:
-        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max and (column == np.floor(column)).all():
-            return column.astype(kind)
+        found, wrong = cast(column, kind)
+        if not wrong.any():
+            return found
     return column
 
 
-def _gslib(file: BinaryIO, most: int) -> Read:
-    """Return the columns of a grid's text."""
-    file.seek(0)
-    title = _text(file.readline(_LINE))
-    if title.startswith("#"):
-        file.seek(0)
-        header = _geone_header(file)
-        if header.get("SORTING", "+X+Y+Z") != "+X+Y+Z":
-            raise ValueError(f"its cells are sorted as {header['SORTING']}: save it with SORTING +X+Y+Z")
-        words = [
-            header.get(f"{key}{axis}", default) for key, default in zip("NSO", "110", strict=True) for axis in "XYZ"
-        ]
-        names, line = _text(file.readline(_LINE)).split(), len(header) + 2
-        sides, lies, realisations = _geometry(" ".join(words), [])
+def _gslib(file: BufferedReader, most: int) -> Read:
+    """Return the variables of a grid's text."""
+    about, own = _geone_header(file), []
+    if about.get("SORTING", "+X+Y+Z") != "+X+Y+Z":
+        raise ValueError(f"its cells are sorted as {about['SORTING']}: save it with SORTING +X+Y+Z")
+    if about:
+        found = [about.get(f"{key}{axis}", least) for key, least in zip("NSO", "110", strict=True) for axis in "XYZ"]
+        names, line = _text(file.readline(_LINE)).split(), len(about) + 2
+        if not names:
+            raise ValueError(f"line {line - 1} has no names of variables: it is cut short, or write them there")
     else:
-        second = _text(file.readline(_LINE))
-        words = second.split()
-        if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
+        title, second = (_text(file.readline(_LINE)) for _ in range(2))
+        words, names = second.split(), []
+        if not words or not _is_count(words[0]):
             raise ValueError(
                 f"line 2 is {second.strip()[:40]!r} and not the number of variables: give a grid of GSLIB or SGeMS"
             )
-        count, names = int(words[0]), []
-        for line in range(3, 3 + count):
+        own = [] if count_of(second) else words[1:]
+        found, line = own or _of_title(title), 3 + int(words[0])
+        for number in range(3, line):
             names.append(_text(file.readline(_LINE)).strip())
             if not names[-1]:
-                raise ValueError(f"line {line} has no name of a variable: it is cut short, or line 2 is wrong")
-        line = 3 + count
-        sides, lies, realisations = _geometry(title, words[:1] if count_of(second) else words)
-    variables = len(names)
-    if realisations > 1:
-        names = [f"{name}__real{k}" for k in range(realisations) for name in names]
-    names = _apart(names)
-    count = prod(sides) * len(names)
-    check_size(count, BYTES * count, most)
-    what = f"{' x '.join(map(str, sides))} cells of {len(names)} variable{'s' * (len(names) != 1)}, {count} values"
-    begin = file.tell()
-    if os.fstat(file.fileno()).st_size - begin < 2 * count - 1:  # a digit for each, and blanks between them
-        raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
-    numbers = _parsed(file, count, what, line)
-    blocks = numbers.reshape(realisations, prod(sides), variables)
-    return dict(zip(names, blocks.transpose(0, 2, 1).reshape(len(names), -1), strict=True)), sides, lies
-
-
-def _geone_header(file: BinaryIO) -> dict[str, str]:
-    """Return the fields of the lines with ``#`` that begin a text of geone, and read past them."""
-    found: dict[str, str] = {}
-    while True:
-        at = file.tell()
-        line = _text(file.readline(_LINE))
-        if not line.startswith("#"):
-            file.seek(at)
-            return found
-        words = line[1:].split()
-        found[words[0] if len(words) == 2 else f"line {len(found)}"] = words[-1] if words else ""
-
-
-def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int]:
-    """Return nx ny nz, the position of cells, and the number of realisations, from the first two lines of a text."""
-    found = words[1:] or _of_title(title)
-    if found is None or len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
+                raise ValueError(f"line {number} has no name of a variable: it is cut short, or line 2 is wrong")
+    if len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
         raise ValueError(
             "its first two lines do not say how many cells it has: write nx ny nz on the first line, as 250 250 1"
         )
-    if not all(re.fullmatch("[0-9]{1,9}", word) and int(word) > 0 for word in (*found[:3], *found[9:])):
+    if not all(map(_is_count, (*found[:3], *found[9:]))):
         raise ValueError(f"its header says {' x '.join(found[:3])} cells: give whole numbers of 1 or more")
-    sides = tuple(int(word) for word in found[:3])
-    if words[1:]:  # of GSLIB: centre, then size
-        lies = Frame(tuple(map(float, found[3:6])) or (0.0,) * 3, tuple(map(float, found[6:9])) or (1.0,) * 3)
-    else:
-        size = found[3:6] or ["1"] * 3
-        corners = [Decimal(word) for word in found[6:9]] or [-Decimal(word) / 2 for word in size]
-        lies = Frame(  # in decimals, since a binary sum would change 0.1
-            tuple(float(corner + Decimal(word) / 2) for corner, word in zip(corners, size, strict=True)),
-            tuple(map(float, size)),
-        )
-    return sides, frame(*lies), int(found[9]) if found[9:] else 1
+    *sides, realisations = (int(word) for word in (*found[:3], *(found[9:] or "1")))
+    at, size = (found[3:6], found[6:9]) if own else (found[6:9], found[3:6])
+    if not own:  # a corner; in decimals, since a binary sum would change 0.1
+        at = [str(Decimal(corner) + Decimal(width) / 2) for corner, width in zip(at, size, strict=False)]
+    lies = frame(tuple(map(float, at)) or (0.0,) * 3, tuple(map(float, size)) or (1.0,) * 3)
+    variables = len(names)
+    if realisations > 1:
+        names = [f"{name}__real{k}" for k in range(realisations) for name in names]
+    count = prod(sides) * len(names)
+    check_size(count, BYTES * count, most)
+    what = f"{' x '.join(map(str, sides))} cells of {len(names)} variable{'s' * (len(names) != 1)}, {count} values"
+    if os.fstat(file.fileno()).st_size - file.tell() < 2 * count - 1:  # a digit for each, and blanks between them
+        raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
+    blocks = _parsed(file, count, what, line).reshape(realisations, prod(sides), variables)
+    return names, blocks.transpose(0, 2, 1), tuple(sides), lies
 
 
-def _of_title(title: str) -> list[str] | None:
-    """Return the numbers of a grid in its title, at least nx ny nz; None if there are none."""
+def _geone_header(file: BufferedReader) -> dict[str, str]:
+    """Return the fields of the lines with ``#`` that begin a text of geone, and read past them."""
+    found: dict[str, str] = {}
+    while file.peek(1)[:1] == b"#":
+        words = _text(file.readline(_LINE))[1:].split()
+        found[words[0] if len(words) == 2 else f"line {len(found)}"] = words[-1] if words else ""
+    return found
+
+
+def _of_title(title: str) -> list[str]:
+    """Return the numbers of a grid in its title, at least nx ny nz, if there are any."""
     words = title.split()
     if len(words) in (3, 6, 9) and _all_numbers(words):
         return words
     match = _SIDES.search(title)
-    return list(match.groups()) if match else None
+    return list(match.groups()) if match else []
 
 
 def number_of(word: Any) -> float | None:
@@ -380,26 +358,26 @@ def _all_numbers(words: Iterable[Any]) -> bool:
     return all((found := number_of(word)) is not None and isfinite(found) for word in words)
 
 
-def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.float64]:
+def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[np.float64]:
     """Return the ``count`` numbers of a text from here to its end; ``line`` is the number of the first line."""
-    found, at, last = np.empty(count), 0, b"\n"
-    while lines := file.readlines(2**20):
-        text, last = b"".join(lines), lines[-1][-1:]
-        words = text.split()
+    found, at, lines = np.empty(count), 0, [b"\n"]
+    while more := file.readlines(2**20):
+        lines, words = more, b"".join(more).split()
         if at + len(words) > count:
             raise ValueError(f"it has more values than its header says, {what}: correct the header")
         try:
             found[at : at + len(words)] = list(map(float, words))
         except ValueError:
-            for number, row in enumerate(lines, line):
-                wrong = next((word for word in row.split() if number_of(word) is None), None)
-                if wrong is not None:
-                    raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
+            strange = (
+                (n, word) for n, row in enumerate(lines, line) for word in row.split() if number_of(word) is None
+            )
+            number, wrong = next(strange)
+            raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
         at += len(words)
         line += len(lines)
     if at < count:
         raise ValueError(f"it has {at} values and its header says {what}: get it again, or correct the header")
-    if not last.isspace():
+    if not lines[-1][-1:].isspace():
         raise ValueError(
             "it ends without the end of a line, as if it were cut short: get it again, or add the end of the line"
         )
@@ -418,9 +396,10 @@ def _text(data: bytes) -> str:
     return data.decode("utf-8", "replace")
 
 
-def _sgems(file: BinaryIO, most: int) -> Read:
-    """Return the columns of a binary grid of SGeMS, read from after its magic number."""
+def _sgems(file: BufferedReader, most: int) -> Read:
+    """Return the variables of a binary grid of SGeMS."""
     length = os.fstat(file.fileno()).st_size
+    file.seek(len(MAGIC))
 
     def take(form: str) -> tuple[Any, ...]:
         size = struct.calcsize(form)
@@ -442,7 +421,7 @@ def _sgems(file: BinaryIO, most: int) -> Read:
     sides: tuple[int, ...] = take(">3I")
     size, origin = (tuple(float(str(np.float32(one))) for one in take(">3f")) for _ in range(2))
     (variables,) = take(">I")
-    names = _apart([word() for _ in range(variables)])
+    names = [word() for _ in range(variables)]
     if not prod(sides) * variables:
         raise ValueError(f"it has {' x '.join(map(str, sides))} cells and {variables} properties: save one with values")
     lies = frame(origin, size)
@@ -453,11 +432,11 @@ def _sgems(file: BinaryIO, most: int) -> Read:
             f"it ends before the last of {count} values, {' x '.join(map(str, sides))} cells of {variables} "
             f"propert{'y' if variables == 1 else 'ies'}: it is cut short; get it again"
         )
-    columns = np.frombuffer(file.read(4 * count), ">f4").astype(np.float32).reshape(variables, -1)
+    columns = np.frombuffer(file.read(4 * count), ">f4").astype(np.float32)
     rest = file.read(16)
     if rest and not rest.startswith(_BLOCKS):
         raise ValueError("it is longer than its header says: get it again, or save it again")
-    return dict(zip(names, columns, strict=True)), sides, lies
+    return names, columns, sides, lies
 
 
 def write_grid(
@@ -507,7 +486,7 @@ def write_grid(
             raise ValueError(f"a variable has the name {name!r}; give one of letters, digits and signs")
     sides = (1, *next(iter(shapes)))[-3:]
     whole = Frame(*((*one, last)[:3] for one, last in zip(lies, (0.0, 1.0), strict=True)))
-    layers = {name: array.reshape(sides) for name, array in arrays.items()}
+    layers = {name: np.ma.MaskedArray(one, np.isnan(one.data)).reshape(sides) for name, one in arrays.items()}
     if _suffix(path) == ".tif":
         if sides[0] > 1:
             raise ValueError(f"{path} is a GeoTIFF, which has no layers: end its name in .gslib or .sgems")
@@ -547,9 +526,9 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     check_real("the grid", array)
     known = array.compressed()
     if target.suffix.lower() == ".sgems":
-        with np.errstate(over="ignore"):
-            kept = known.astype(np.float32)
-        wrong = (kept.astype(np.float64) != known) if known.dtype.kind in "iu" else np.isinf(kept) & np.isfinite(known)
+        kept, wrong = cast(known, np.float32)
+        if known.dtype.kind in "iu":
+            wrong = kept.astype(np.float64) != known
         if wrong.any():
             raise ValueError(
                 f"{target} cannot hold {known[wrong][0]}, since SGeMS has 32-bit floats: end its name in .gslib"
@@ -583,7 +562,7 @@ def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame)
 def _words(row: np.ma.MaskedArray[Any, Any]) -> list[str]:
     """Return each value as the shortest text that represents it."""
     data = row.data.astype(np.uint8) if row.dtype == bool else row.data
-    found: list[str] = np.where(_unknown(row), str(NO_DATA), data.astype(str)).tolist()
+    found: list[str] = np.where(np.ma.getmaskarray(row), str(NO_DATA), data.astype(str)).tolist()
     return found
 
 
@@ -598,11 +577,4 @@ def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame)
     yield struct.pack(">3I6fI", *sides, *lies.cell, *lies.origin, len(layers))
     yield b"".join(map(word, layers))
     for array in layers.values():
-        values = array.data.astype(">f4")
-        values[_unknown(array)] = NO_DATA
-        yield values.tobytes()
-
-
-def _unknown(array: np.ma.MaskedArray[Any, Any]) -> NDArray[np.bool_]:
-    hidden = np.ma.getmaskarray(array)
-    return hidden | np.isnan(array.data) if array.dtype.kind == "f" else hidden
+        yield array.astype(">f4").filled(NO_DATA).tobytes()

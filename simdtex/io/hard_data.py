@@ -12,7 +12,7 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import prod
+from math import isnan, prod
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.grids import count_of, frame, known_numbers, number_of
+from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
 from simdtex.io.rasters import axis_of
@@ -132,26 +132,21 @@ def read_hard_data(
     -----
     Cost: about 4 s for a million rows of text.
     """
-    if not isinstance(table, (str, os.PathLike)):
-        cells = [[str(cell) for cell in table[name]] for name in table.columns]
-        data = _of_columns(cells, [str(name) for name in table.columns], None, columns, categories)
-        return _without_codes("the table", data, missing, valid)
-    binary = Path(table).suffix.lower() == ".npy"
-    with reading(table, "the hard data", max_pixels, each=BYTES if binary else 1) as most, open(table, "rb") as file:
-        if binary:
-            return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
-        try:
-            text = file.read().decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
-        data = _parsed(text, columns, categories)
-    return _without_codes(os.fspath(table), data, missing, valid)
-
-
-def _without_codes(name: str, data: HardData, missing: Iterable[float], valid: tuple[float, float] | None) -> HardData:
-    """Return the data with NaN for codes of unknown values, and warn of their number."""
-    for variable, column in zip(data.names, data.values.T, strict=True):
-        column[:] = known_numbers(f"{name}, column {variable}", column, missing, valid)
+    if isinstance(table, (str, os.PathLike)):
+        name, binary = os.fspath(table), Path(table).suffix.lower() == ".npy"
+        with reading(table, "the hard data", max_pixels, each=BYTES if binary else 1) as most, open(name, "rb") as file:
+            if binary:
+                return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
+            try:
+                text = file.read().decode("utf-8-sig")
+            except UnicodeDecodeError:
+                raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
+            data = _parsed(text, columns, categories)
+    else:
+        cells = [[str(cell) for cell in table[column]] for column in table.columns]
+        name, data = "the table", _of_columns(cells, list(map(str, table.columns)), None, columns, categories)
+    for variable, values in zip(data.names, data.values.T, strict=True):
+        values[:] = known_numbers(f"{name}, column {variable}", values, missing, valid)
     return data
 
 
@@ -159,32 +154,30 @@ def _parsed(text: str, columns: Any, categories: Any) -> HardData:
     """Return the data in the text of a table or of a point set."""
     lines = text.splitlines()
     width = count_of(lines[1]) if len(lines) > 1 else None
-    names = None if width is None else [line.strip() for line in lines[2 : 2 + width]]
-    body = enumerate(lines[0 if width is None else 2 + width :], 1 if width is None else 3 + width)
-    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in body)
-    kept = [(number, line) for number, line in stripped if line.strip()]
+    begin = 2 + width if width else 0
+    names = [line.strip() for line in lines[2:begin]]
+    kept = {number: line.partition("#")[0].strip(" ") for number, line in enumerate(lines[begin:], begin + 1)}
+    kept = {number: line for number, line in kept.items() if line.strip()}
     if not kept:
-        what = (
-            "the table is empty" if width is None else f"the point set has no line after the names of {width} columns"
-        )
+        what = f"the point set has no line after the names of {width} columns" if width else "the table is empty"
         raise ValueError(f"{what}: give a line with x, y and a value for each datum")
-    delimiter = next((one for one in ";\t," if one in kept[0][1]), None) if width is None else None
-    rows = [_cells(line, number, delimiter) for number, line in kept]
-    found = [number for number, _ in kept]
-    columns_there = len(rows[0])
-    if columns_there < 3:
+    first, line = next(iter(kept.items()))
+    delimiter = None if width else next((one for one in ";\t," if one in line), None)
+    rows = {number: _cells(line, number, delimiter) for number, line in kept.items()}
+    if (count := len(rows[first])) < 3:
         raise ValueError(
-            f"line {found[0]} has {columns_there} cell{'s' * (columns_there != 1)}: give x, y and one value or more, "
+            f"line {first} has {count} cell{'s' * (count != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
         )
-    for number, row in zip(found, rows, strict=True):
-        if len(row) != (before := columns_there if names is None else len(names)):
+    before = width or count
+    for number, row in rows.items():
+        if len(row) != before:
             raise ValueError(f"line {number} has {len(row)} cells and those before it {before}: give as many in all")
-    if names is None and sum(cell[:1] in _DIGITS for cell in rows[0] if cell) < 2:
-        names, rows, found = rows[0], rows[1:], found[1:]
+    if not width and sum(cell[:1] in _DIGITS for cell in rows[first] if cell) < 2:
+        names = rows.pop(first)
         if not rows:
             raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
-    return _of_columns(list(zip(*rows, strict=True)), names, found, columns, categories)
+    return _of_columns(list(zip(*rows.values(), strict=True)), names, tuple(rows), columns, categories)
 
 
 def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
@@ -198,25 +191,41 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
 
 
 def _of_columns(
-    cells: Sequence[Sequence[str]], names: list[str] | None, lines: list[int] | None, columns: Any, categories: Any
+    cells: Sequence[Sequence[str]], names: list[str], lines: tuple[int, ...] | None, columns: Any, categories: Any
 ) -> HardData:
     """Return the data of columns of texts; ``names`` are those of a header, ``lines`` the numbers of the rows."""
-    listed = {k: str(k + 1) for k in range(len(cells))} if names is None else dict(enumerate(names))
+    listed = dict(enumerate(names or map(str, range(1, len(cells) + 1))))
     if names and (not names[0] or names[0].startswith("Unnamed: 0")):  # the index of pandas
         del listed[0]
-    points, values = _roles(listed, names is not None, columns or {})
-    if not columns or "value" not in columns:  # without names of wells
-        left = [k for k in values if not categories and all(map(_is_text, cells[k]))]
+    points, values = _roles(listed, bool(names), columns or {})
+    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
+    codes |= dict.fromkeys(_UNKNOWN, np.nan)
+    found = {k: [number_of(cell) for cell in cells[k]] for k in points}
+    found |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
+    if not categories and not (columns and "value" in columns):  # without names of wells
+        left = [k for k in values if all(one is None or isnan(one) for one in found[k])]
         if 0 < len(left) < len(values):
             values = [k for k in values if k not in left]
             shown = ", ".join(listed[k] for k in left)
             warnings.warn(f"left out, because they hold text: the columns {shown}", DataWarning, stacklevel=2)
-    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
-    found = np.array([_numbers(cells[k], k, lines, codes if k in values else None) for k in (*points, *values)]).T
-    plain = ["value"] if len(values) == 1 else [f"value {k + 1}" for k in range(len(values))]
-    labels = tuple((names and names[k]) or name for k, name in zip(values, plain, strict=True))
-    axes = len(points)
-    return HardData(found[:, :axes].copy(), found[:, axes:].copy(), labels, tuple(lines) if lines else None)
+    labels = tuple((names and names[k]) or name for k, name in zip(values, _plain(len(values)), strict=True))
+    at, numbers = (np.array([found[k] for k in some], np.float64).T.copy() for some in (points, values))
+    data = HardData(at, numbers, labels, lines)
+    for k in (*points, *values):
+        if None in found[k]:
+            row = found[k].index(None)
+            remedy = "write numbers with a decimal point"
+            if k in values:
+                remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
+            raise ValueError(
+                f"{data.where(row)} has {cells[k][row][:40]!r} in column {k + 1}, which is no number: {remedy}"
+            )
+    return data
+
+
+def _plain(count: int) -> tuple[str, ...]:
+    """Return the names of variables without names."""
+    return ("value",) if count == 1 else tuple(f"value {k + 1}" for k in range(count))
 
 
 def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tuple[list[int], list[int]]:
@@ -232,9 +241,8 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
                 )
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]
-    meant = {k: axis_of(name) for k, name in names.items() if k not in taken}
     for axis in "xyz":
-        of_axis = [k for k, one in meant.items() if one == axis]
+        of_axis = [k for k, name in names.items() if k not in taken and axis_of(name) == axis]
         last = axis == "z" and "value" not in chosen and len(names) - len(taken) < 2
         if axis in chosen or not of_axis or last:
             continue
@@ -261,26 +269,6 @@ def _example(listed: Mapping[str, int], axis: str) -> str:
     return f"as {{{axis!r}: {name!r}, ...}} in Python or --columns {axis}={name},... on the command line"
 
 
-def _is_text(cell: str) -> bool:
-    return cell.lower() in _UNKNOWN or number_of(cell) is None
-
-
-def _numbers(cells: Sequence[str], column: int, lines: Sequence[int] | None, codes: dict[str, float] | None) -> Floats:
-    """Return the numbers of a column; ``codes`` are those of texts, or None for a column of coordinates."""
-    found = np.empty(len(cells))
-    for row, cell in enumerate(cells):
-        unknown = codes is not None and cell.lower() in _UNKNOWN
-        value = np.nan if unknown else (codes or {}).get(cell.lower(), number_of(cell))
-        if value is None:
-            where = f"row {row}" if lines is None else f"line {lines[row]}"
-            remedy = "write numbers with a decimal point"
-            if codes is not None:
-                remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
-            raise ValueError(f"{where} has {cell[:40]!r} in column {column + 1}, which is no number: {remedy}")
-        found[row] = value
-    return found
-
-
 def _table(array: Any) -> HardData:
     """Return the data of an array of rows."""
     try:
@@ -292,10 +280,8 @@ def _table(array: Any) -> HardData:
     check_real("the hard data", numbers)
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
-    found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)
-    variables = found.shape[1] - 2
-    names = ("value",) if variables == 1 else tuple(f"value {k + 1}" for k in range(variables))
-    return HardData(found[:, :2], found[:, 2:], names)
+    found: Floats = np.ma.filled(numbers.astype(np.float64), np.nan)
+    return HardData(found[:, :2], found[:, 2:], _plain(found.shape[1] - 2))
 
 
 def place_hard_data(
@@ -374,16 +360,10 @@ def place_hard_data(
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
     if len(sides) > data.points.shape[1]:
         raise ValueError(f"shape is {shape!r}: give (rows, cols), or hard data with a column z after x and y")
-    sites = _sites(data, sides, origin, cell)
-    inside = sites >= 0
-    if outside == "skip" and not inside.all():
-        skipped = f"{np.count_nonzero(~inside)} of {len(data)} data are outside of the grid and are left out"
-        warnings.warn(skipped, DataWarning, stacklevel=2)
-        rows = np.flatnonzero(inside)
-        lines = data.lines and tuple(data.lines[row] for row in rows)
-        data, sites = HardData(data.points[rows], data.values[rows], data.names, lines), sites[rows]
-    elif not inside.all():
-        _refuse_outside(data, int(inside.argmin()), sides, origin, cell)
+    sites, inside = _sites(data, sides, frame(origin, cell), outside == "skip")
+    if not inside.all():
+        lines = data.lines and tuple(np.array(data.lines)[inside].tolist())
+        data = HardData(data.points[inside], data.values[inside], data.names, lines)
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():
@@ -429,42 +409,35 @@ def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.int
     return found, values[first[order][chosen]]
 
 
-def _along(
-    data: HardData, shape: tuple[int, ...], origin: Sequence[float] | None, cell: Sequence[float] | None
-) -> tuple[Floats, Floats, NDArray[np.intp]]:
-    """Return the first centres, the sizes of a cell, and the numbers of cells, along x, y and, of such data, z."""
-    axes, lies = data.points.shape[1], frame(origin, cell)
-    at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
-    return at, size, np.array((1, *shape)[: -axes - 1 : -1])
-
-
 def _sites(
-    data: HardData, shape: tuple[int, ...], origin: Sequence[float] | None, cell: Sequence[float] | None
-) -> NDArray[np.intp]:
-    """Return the index of each datum's site, row by row, or -1 if it is outside of the grid."""
-    at, size, sides = _along(data, shape, origin, cell)
+    data: HardData, shape: tuple[int, ...], lies: Frame, skip: bool
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return the index, row by row, of the site of each datum inside of the grid, and which data are inside.
+
+    Data outside are left out with a warning or, unless ``skip``, refused.
+    """
+    axes = data.points.shape[1]
+    at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
+    sides = (1, *shape)[: -axes - 1 : -1]  # along x, y and, of such data, z
     with np.errstate(invalid="ignore", over="ignore"):  # infinity is outside
         cells = (data.points - at) / size
         low = np.floor(cells)
         nearest = low + (cells - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
     inside = ((nearest >= 0) & (nearest < sides)).all(axis=1)  # not of NaN
-    found: NDArray[np.intp] = np.zeros(len(data), np.intp)
-    for axis in range(len(sides))[::-1]:
-        found = found * sides[axis] + np.where(inside, nearest[:, axis], 0).astype(np.intp)
-    return np.where(inside, found, -1)
-
-
-def _refuse_outside(data: HardData, row: int, shape: tuple[int, ...], origin: Any, cell: Any) -> None:
-    """Raise since a datum is outside of the grid."""
-    at, size, sides = _along(data, shape, origin, cell)
-    there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
-    first, last = at - size / 2, at + (sides - 0.5) * size
-    ranges = ", ".join(f"{axis} from {a} to below {b}" for axis, a, b in zip("xyz", first, last, strict=False))
-    raise ValueError(
-        f"{data.where(row)} of the hard data is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
-        f"pixels (width x height{' x depth' * (len(sides) > 2)}): give {ranges}, tell `simulate` the origin and the "
-        'size of its cells, or leave such data out with outside="skip" (--outside skip)'
-    )
+    if skip and not inside.all():
+        skipped = f"{np.count_nonzero(~inside)} of {len(data)} data are outside of the grid and are left out"
+        warnings.warn(skipped, DataWarning, stacklevel=3)
+    elif not inside.all():
+        row = int(inside.argmin())
+        there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
+        bounds = zip("xyz", at - size / 2, at + (np.array(sides) - 0.5) * size, strict=False)
+        ranges = ", ".join(f"{axis} from {first} to below {last}" for axis, first, last in bounds)
+        raise ValueError(
+            f"{data.where(row)} of the hard data is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
+            f"pixels (width x height{' x depth' * (len(sides) > 2)}): give {ranges}, tell `simulate` the origin and "
+            'the size of its cells, or leave such data out with outside="skip" (--outside skip)'
+        )
+    return np.ravel_multi_index(tuple(nearest[inside].T.astype(np.intp)), sides, order="F"), inside
 
 
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:

@@ -137,11 +137,11 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         warnings.warn(
             "the scale and the offset of the raster are not applied to its numbers", DataWarning, stacklevel=2
         )
-    hidden = np.ma.getmaskarray(pixels)
-    pixels = np.moveaxis(np.ma.getdata(pixels), 0, -1)
-    if hidden.any():
-        hidden = np.moveaxis(hidden, 0, -1)
-        pixels = np.where(hidden, np.nan, pixels) if pixels.dtype.kind == "f" else np.ma.MaskedArray(pixels, hidden)
+    pixels = np.moveaxis(pixels, 0, -1)
+    if not np.ma.is_masked(pixels):
+        pixels = np.ma.getdata(pixels)
+    elif pixels.dtype.kind == "f":
+        pixels = pixels.filled(np.nan)
     return (pixels[..., 0] if len(names) == 1 else pixels), geo, names
 
 
@@ -244,13 +244,12 @@ def read_netcdf(path: PathLike, most: int) -> Library:
 def _steps(name: str, array: Any) -> dict[str, Any]:
     """Return a variable without axes other than z, y and x: one for each of their steps, with its number."""
     others = [dim for dim in array.dims if dim not in ("x", "y", "z")]
-    found = {}
-    for step in product(*(range(array.sizes[dim]) for dim in others)):
-        whole = all(array.sizes[dim] == 1 for dim in others)
-        found[name if whole else f"{name}[{','.join(map(str, step))}]"] = array.isel(
-            dict(zip(others, step, strict=True))
-        )
-    return found
+    whole = all(array.sizes[dim] == 1 for dim in others)
+    steps = product(*(range(array.sizes[dim]) for dim in others))
+    return {
+        name if whole else f"{name}[{','.join(map(str, step))}]": array.isel(dict(zip(others, step, strict=True)))
+        for step in steps
+    }
 
 
 def _ascending(array: Any) -> Any:

@@ -32,8 +32,10 @@ MARK = "simdtex_realisations"
 
 PathLike = str | os.PathLike[str]
 
-_NEEDED: dict[str, tuple[str, ...]] = {
-    **{".zarr": ("xarray", "zarr"), ".nc": ("xarray", "h5netcdf", "h5py"), ".npz": ()},
+_NEEDED = {
+    ".zarr": ("xarray", "zarr"),
+    ".nc": ("xarray", "h5netcdf", "h5py"),
+    ".npz": (),
     **dict.fromkeys(SUFFIXES, ()),
 }
 """The libraries that each suffix needs."""
@@ -85,7 +87,7 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
         x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
         ``source=True`` the result is a Dataset: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by
-        name, and a grid cannot hold it.
+        name, and a grid cannot hold it. A grid has the variables of any other Dataset, for example of `estimate`.
 
     Raises
     ------
@@ -96,30 +98,28 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     """
     if not hasattr(array, "coords"):
         raise TypeError(f"the realisations are of type {type(array).__name__}: give an xarray.DataArray")
-    source = hasattr(array, "data_vars")
-    suffix = check_realisations_path(path, source=source)
+    several: Any = getattr(array, "data_vars", {})
+    suffix = check_realisations_path(path, source="source_row" in several)
     if suffix in SUFFIXES:
         origin, cell = zip(*(axis_place(array, axis) for axis in "xyz"), strict=True)
-        write_grid(path, dict(_variables(array)), origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
+        arrays = sorted(several.values(), key=lambda one: one.ndim) or [array]
+        found = dict(pair for one in arrays for pair in _variables(one))
+        write_grid(path, found, origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
         return
     if suffix == ".npz":
         coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}
-        variables: Any = array.data_vars if source else {"values": array}
-        coordinates |= {name: one.values for name, one in variables.items()}
+        coordinates |= {name: one.values for name, one in (several or {"values": array}).items()}
         attributes = np.array(json.dumps(array.attrs))
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, attributes=attributes, **coordinates)
         return
-    named: Any = array
-    named = named if source else named.rename(named.name or "realisations")
+    whole: Any = array if several else array.to_dataset(name=array.name or "realisations")
     if suffix == ".nc":
         # in memory first, since HDF5 does not survive a full disk
-        packed = {name: {"zlib": True} for name in (named.data_vars if source else [named.name])}
-        data = named.to_netcdf(engine="h5netcdf", encoding=packed)
+        data = whole.to_netcdf(engine="h5netcdf", encoding={name: {"zlib": True} for name in whole.data_vars})
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
         return
-    whole = named if source else named.to_dataset()
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
         whole.to_zarr(store, mode="w-", zarr_format=3)
@@ -149,17 +149,17 @@ def _own(store: Path) -> bool:
 def _variables(array: Any) -> Iterator[tuple[str, Any]]:
     """Yield the name and the values, (z, y, x) or (y, x), of every variable of every realisation."""
     dims = [str(dim) for dim in array.dims]
-    wanted: list[str] = [dim for dim in ("realisation", "variable", "z", "y", "x") if dim in dims]
+    wanted: list[str] = [dim for dim in ("realisation", "variable", "category", "z", "y", "x") if dim in dims]
     if sorted(dims) != sorted(wanted) or wanted[-2:] != ["y", "x"]:
         raise ValueError(f"the realisations have the dimensions {', '.join(dims)}: give realisation, y and x")
     planes = np.asarray(array.values).transpose([dims.index(dim) for dim in wanted])
     if "region" in array.coords:
         planes = np.ma.masked_array(planes, np.broadcast_to(~array.coords["region"].values, planes.shape))
     names = [str(array.name or "realisations")]
-    for dim, joint in (("variable", "_"), ("realisation", "__real")):
+    for dim, joint in (("category", "_"), ("variable", "_"), ("realisation", "__real")):
         if dim in dims:
             count = planes.shape[wanted.index(dim)]
             numbers = array.coords[dim].values.tolist() if dim in array.coords else range(count)
             names = [f"{name}{joint}{number}" for number in numbers for name in names]
-    sides = planes.shape[sum(dim in dims for dim in ("realisation", "variable")) :]
+    sides = planes.shape[sum(dim not in "zyx" for dim in dims) :]
     yield from zip(names, planes.reshape(-1, *sides), strict=True)
