@@ -99,12 +99,6 @@ class Metadata(NamedTuple):
 NOTHING = Metadata()
 """The metadata of a file that has only pixels."""
 
-Decoded = tuple[Array, Metadata]
-
-
-GREYS = np.arange(256, dtype=np.uint8).repeat(3).tobytes()
-"""The palette whose colours are the indices."""
-
 
 class _Found(NamedTuple):
     """Pixels as they are stored: with the orientation of the file, and whether the last channel is alpha."""
@@ -115,7 +109,7 @@ class _Found(NamedTuple):
     alpha: bool = False
 
 
-def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> Decoded:
+def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> tuple[Array, Metadata]:
     """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
@@ -221,7 +215,7 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
         transparent, colours = picture.has_transparency_data, None
         if palette and picture.mode == "P":
             colours = bytes(picture.getpalette() or ())
-            picture.putpalette(GREYS)
+            picture.putpalette(bytes(np.arange(256, dtype=np.uint8).repeat(3)))  # whose colours are the indices
         if colours is not None or picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
         elif picture.mode in ("LA", "F", "I") or picture.mode.startswith("I;"):
@@ -322,7 +316,8 @@ def _read_exr(data: bytes, most: int) -> _Found:
 def _pictures(tiff: Any) -> list[Any]:
     """Return the series of a TIFF that are not masks or previews; none if a page after the first is damaged."""
     with suppress(Exception):
-        return [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
+        found = [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
+        return found if tiff.is_imagej == (found[0].kind == "imagej") else []
     return []
 
 
@@ -373,8 +368,8 @@ def is_stack(path: Any) -> bool:
 
     with quiet(), tifffile.TiffFile(path, _multifile=False) as tiff:
         if not (found := _pictures(tiff)):
-            return bool(tiff.pages.is_multipage)
-        return tiff.is_imagej != (found[0].kind == "imagej") or not set(found[0].axes) <= set("YXS")
+            return bool(tiff.pages.is_multipage or tiff.is_imagej)
+        return not set(found[0].axes) <= set("YXS")
 
 
 def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]:
@@ -386,7 +381,7 @@ def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[floa
     import tifffile
 
     with tifffile.TiffFile(path, _multifile=False) as tiff:
-        if not (found := _pictures(tiff)) or tiff.is_imagej != (found[0].kind == "imagej"):
+        if not (found := _pictures(tiff)):
             raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
         series, page, axes = found[0], found[0].keyframe, found[0].axes
         if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):

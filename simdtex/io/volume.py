@@ -11,7 +11,6 @@ import bz2
 import io
 import os
 import re
-import shutil
 import warnings
 import zipfile
 import zlib
@@ -26,21 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, earlier_files
+from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target, earlier_files
 from simdtex.io.decode import decode, is_stack, native, quiet, read_stack
 from simdtex.io.grids import CartesianGrid, frame
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import (
-    Refused,
-    check_size,
-    explained,
-    max_pixels_or_default,
-    needs,
-    read_npy,
-    read_npz,
-    reading,
-    size_of_file,
-)
+from simdtex.io.limits import Refused, check_size, explained, max_pixels_or_default, needs, read_npy, read_npz, reading
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
@@ -49,11 +38,11 @@ PathLike = str | os.PathLike[str]
 
 # "" means a folder of slices
 _FORMATS = {
-    ".npz": Format(None, None),
-    ".npy": Format(None, None),
-    ".tif": Format(INTEGERS | FLOATS, None),
-    ".tiff": Format(INTEGERS | FLOATS, None),
-    ".nrrd": Format(INTEGERS | {"float32", "float64"}, None),
+    ".npz": Format(),
+    ".npy": Format(),
+    ".tif": Format(INTEGERS | FLOATS),
+    ".tiff": Format(INTEGERS | FLOATS),
+    ".nrrd": Format(INTEGERS | {"float32", "float64"}),
     "": Format(frozenset({"uint8", "uint16"}), (1, 2, 3, 4)),
 }
 _SLICE = re.compile(r"slice-([0-9]{3,})\.png")
@@ -77,7 +66,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             "or give a name without suffix for a folder of PNG slices"
         )
     if suffix:
-        image.check_writable(target, suffixes=(suffix,))
+        check_target(target)
     else:
         earlier_files(target, "the slices", lambda name: bool(_SLICE.fullmatch(name)))
         check_folder_writable(target)
@@ -94,10 +83,9 @@ def is_volume(path: PathLike, channels: bool = False) -> bool:
     if os.path.isdir(path) or suffix not in (".tif", ".tiff", ".npy"):
         return os.path.isdir(path) or suffix in _READERS
     with suppress(Exception):  # the reader of pictures reports the error
-        if os.path.isfile(path) and suffix != ".npy":
-            return is_stack(path)
-        if os.path.isfile(path):
+        if os.path.isfile(path) and suffix == ".npy":
             return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) > 2 + channels
+        return os.path.isfile(path) and is_stack(path)
     return False
 
 
@@ -193,13 +181,13 @@ def _raw(path: Path, most: int) -> _Read:
     return {"value": np.fromfile(path, dtype).reshape(shape)}, _PLAIN
 
 
-def _beside(path: Path, name: str, most: int) -> Path:
-    """Return the data file that a header names, a file of its own folder within the limits."""
+def _beside(path: Path, name: str, most: int) -> bytes:
+    """Return the data of the file that a header names, a file of its own folder within the limits."""
     file = path.with_name(Path(name).name or "..")
     if file.name != name or name == "LIST" or "%" in name or file.resolve().parent != path.resolve().parent:
         raise Refused(f"names the data file {name[:100]!r}: put the data into one file in the folder of the header")
-    check_size(0, size_of_file(str(file), "the data file"), most)
-    return file
+    with reading(file, "the data file", most):
+        return file.read_bytes()
 
 
 def _nrrd(path: Path, most: int) -> _Read:
@@ -250,7 +238,7 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
     if count < 1:
         raise ValueError("it has no values")
     if name := header.pop("data file", None) or header.pop("datafile", None):
-        data = _beside(path, name, most).read_bytes()
+        data = _beside(path, name, most)
     lines, skip = (int(header.pop(f"{a} skip", 0) or header.pop(f"{a}skip", 0)) for a in ("line", "byte"))
     packed = header["encoding"].lower() in ("gzip", "gz", "bzip2", "bz2")
     if not (0 <= lines < 2**10 and packed - 1 <= skip <= most):
@@ -374,13 +362,11 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd gets the time by a deprecated call
             nrrd.write(written, values, header, index_order="C")
-        written.seek(0)
+        data = written.getvalue()
+        head = data[: data.index(b"\n\n")]
         with path.open("wb") as file:
-            for line in iter(written.readline, b"\n"):  # the header, which ends with an empty line
-                if not line.startswith(b"# on "):  # the time: the same volume is to be the same file
-                    file.write(line)
-            file.write(b"\n")
-            shutil.copyfileobj(written, file)
+            file.write(re.sub(rb"\n# on .*", b"", head))  # the time: the same volume is to be the same file
+            file.write(memoryview(data)[len(head) :])
     elif suffix:
         image.write_tiff(path, values)
     else:
