@@ -101,12 +101,12 @@ NOTHING = Metadata()
 
 
 class _Found(NamedTuple):
-    """Pixels as they are stored: with the orientation of the file, and whether the last channel is alpha."""
+    """Pixels as they are stored, whether the last channel is alpha, and the orientation of the file."""
 
     pixels: Array
-    metadata: Metadata = NOTHING
-    orientation: int = 1
     alpha: bool = False
+    orientation: int = 1
+    metadata: Metadata = NOTHING
 
 
 def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> tuple[Array, Metadata]:
@@ -135,7 +135,7 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
     tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
     if data[:5].lower() == b"ncols" or (tiff and rasters.is_raster(io.BytesIO(data))):
         pixels, geo, names = rasters.read_raster(data, most)
-        return _Found(pixels, Metadata(geo=geo), alpha=names[-1] == "alpha")
+        return _Found(pixels, names[-1] == "alpha", metadata=Metadata(geo=geo))
     if tiff:
         return _read_tiff(data, most, palette)
     if data.startswith(b"\x76\x2f\x31\x01"):
@@ -194,7 +194,7 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Found:
         raise ValueError("it ends before its last pixel")
     if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
         raise ValueError(f"it has a value that is not 0 to {largest}")
-    return _Found(pixels.reshape(shape).astype(dtype), Metadata(white=largest))
+    return _Found(pixels.reshape(shape).astype(dtype), metadata=Metadata(white=largest))
 
 
 def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found:
@@ -206,9 +206,8 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
             decoders = {"PNG": imagecodecs.png_decode, "AVIF": imagecodecs.avif_decode}
             pixels: Array = decoders.get(picture.format or "", imagecodecs.jpeg2k_decode)(data)
-            orientation, metadata = _metadata(picture)
             alpha = pixels.ndim == 3 and pixels.shape[2] in (2, 4)
-            return _Found(_full_scale(pixels, bits), metadata, orientation, alpha)
+            return _Found(_full_scale(pixels, bits), alpha, *_metadata(picture))
         picture.load()
         if picture.mode == "L" and bits < 8 and isinstance(grey := picture.info.get("transparency"), int):
             picture.info["transparency"] = grey * (255 // (2**bits - 1))  # Pillow scales pixels only
@@ -224,7 +223,7 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _Found(pixels, metadata._replace(palette=colours), orientation, mode in ("LA", "RGBA"))
+    return _Found(pixels, mode in ("LA", "RGBA"), orientation, metadata._replace(palette=colours))
 
 
 def _bits(kind: str | None, data: bytes) -> int:
@@ -359,7 +358,7 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
         elif page.axes not in ("YX", "YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
-    return _Found(_shown(page, pixels), metadata, orientation, extra in (1, 2))
+    return _Found(_shown(page, pixels), extra in (1, 2), orientation, metadata)
 
 
 def is_stack(path: Any) -> bool:

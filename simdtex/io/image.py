@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io import rasters
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
-from simdtex.io.limits import explained, max_pixels_or_default, reading
+from simdtex.io.limits import Refused, explained, max_pixels_or_default, reading
 from simdtex.options import check_real, require, unmasked
 
 __all__ = ["Image", "Metadata", "check_sample", "check_writable", "read", "read_mask", "split_alpha", "write"]
@@ -88,17 +88,16 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     -----
     The whole file is held in memory together with its pixels.
     """
-    with reading(path, "the image", max_pixels):
-        data = Path(path).read_bytes()
-    return read_bytes(os.fspath(path), data, max_pixels=max_pixels, palette=palette)
+    with reading(path, "the image", max_pixels) as most:
+        return read_bytes(os.fspath(path), Path(path).read_bytes(), max_pixels=most, palette=palette)
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return a picture from the bytes of its file, as `read` does; messages call it ``name``."""
     most = max_pixels_or_default(max_pixels)
-    if not data:
-        raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     with explained(name, "the image", "an image"):
+        if not data:
+            raise Refused("is empty (0 bytes): give a file with an image in it")
         found, metadata = decode(data, most, palette=palette)
     with explained(name, "the image"):
         pixels = native(pixels_of("the picture", np.ma.getdata(found)))
@@ -452,7 +451,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         head = 33  # bytes of the signature and the header; Pillow's chunks on colours and size follow
         path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
     elif suffix in (".tif", ".tiff") and metadata.geo:
-        rasters.write_raster(path, np.moveaxis(pixels if pixels.ndim == 3 else pixels[..., None], -1, 0), metadata.geo)
+        rasters.write_raster(path, np.moveaxis(np.atleast_3d(pixels), -1, 0), metadata.geo)
     elif suffix == ".exr":
         import OpenEXR
 
@@ -477,7 +476,7 @@ def coloured(pixels: Array, palette: bytes | None) -> Array:
     """
     if palette is None:
         return pixels
-    indices = pixels if pixels.ndim == 3 else pixels[..., None]
+    indices = np.atleast_3d(pixels)
     colours = np.frombuffer(palette.ljust(768, b"\0"), np.uint8).reshape(-1, 3)[indices[..., 0]]
     return np.concatenate([colours, indices[..., 1:]], -1)
 

@@ -209,6 +209,7 @@ def _metaimage(path: Path, most: int) -> _Read:
     def value(*keys: str) -> str:
         return next((said[key] for key in keys[:-1] if key in said), keys[-1]).lower()
 
+    binary, packed = (value(key, "") == "true" for key in ("BinaryData", "CompressedData"))
     parts, kind = int(value("ElementNumberOfChannels", "1")), value("ElementType", "").removeprefix("met_")
     bits = {"char": 8, "short": 16, "int": 32, "long": 32, "long_long": 64}.get(kind.lstrip("u"))
     sizes = [parts] * (parts > 1) + [int(side) for side in said["DimSize"].split()]
@@ -219,15 +220,12 @@ def _metaimage(path: Path, most: int) -> _Read:
         "sizes": np.array(sizes),
         "dimension": len(sizes),
         "endian": "big" if value("ElementByteOrderMSB", "BinaryDataByteOrderMSB", "") == "true" else "little",
-        "encoding": "ascii" if value("BinaryData", "") != "true" else "raw",
+        "encoding": "gzip" if packed else "raw" if binary else "ascii",
         "byte skip": int(value("HeaderSize", "0")),
         "space directions": steps.reshape(3, 3) * cell[:, None],
         "space origin": np.array(value("Offset", "Position", "Origin", "0 0 0").split(), float),
+        "data file": said["ElementDataFile"] if said["ElementDataFile"].upper() != "LOCAL" else "",
     }
-    if value("CompressedData", "") == "true":
-        header["encoding"] = "gzip"
-    if said["ElementDataFile"].upper() != "LOCAL":
-        header["data file"] = said["ElementDataFile"]
     return _stored(path, header, data, most)
 
 
@@ -243,7 +241,7 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
     packed = header["encoding"].lower() in ("gzip", "gz", "bzip2", "bz2")
     if not (0 <= lines < 2**10 and packed - 1 <= skip <= most):
         raise ValueError("its header skips too much")
-    data = data.split(b"\n", lines)[lines] if lines else data
+    data = data.split(b"\n", lines)[lines]
     if packed:
         gzip = header["encoding"][0] in "gG"
         unpack: Any = zlib.decompressobj(47) if gzip else bz2.BZ2Decompressor()  # 47: with a header of gzip or zlib
@@ -255,11 +253,10 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
         raise Refused(f"has the axes {', '.join(kinds)}: give three of space, and at most one of variables")
     for axis in others:
         values = np.moveaxis(values, values.ndim - 1 - axis, -1)
-    steps: Any = np.diag([1.0] * 3)
     if "space directions" in header:
-        steps = [row for row in header["space directions"] if row is not None and np.isfinite(row).all()]
-    elif "spacings" in header:
-        steps = np.diag(np.nan_to_num(np.delete(header["spacings"], others), nan=1.0))
+        steps: Any = [row for row in header["space directions"] if row is not None and np.isfinite(row).all()]
+    else:
+        steps = np.diag(np.nan_to_num(np.delete(header.get("spacings", [1.0] * len(kinds)), others), nan=1.0))
     return _placed({"value": values}, np.array(steps, np.float64), header.get("space origin", _PLAIN[0]))
 
 
