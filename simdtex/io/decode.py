@@ -353,10 +353,9 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
         pixels = page.asarray()
         if pixels.size == 0:
             raise ValueError("it has no pixels")
-        if page.axes == "SYX":
-            pixels = np.moveaxis(pixels, 0, -1)
-        elif page.axes not in ("YX", "YXS"):
+        if not set(page.axes) <= set("YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
+        pixels = pixels.transpose([page.axes.index(axis) for axis in "YXS" if axis in page.axes])
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
     return _Found(_shown(page, pixels), extra in (1, 2), orientation, metadata)
 
