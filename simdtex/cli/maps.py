@@ -113,8 +113,6 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
 
 def _written(path: Path, pixels: NDArray[Any]) -> str:
     """Return the name of a map's file in the output: its own, if its format is written and keeps all pixels."""
-    from simdtex.io.image import holds_all, suitable_suffix
+    from simdtex.io.image import suitable_suffix
 
-    if holds_all(path, pixels.dtype, channels(pixels)):
-        return path.name
-    return path.stem + suitable_suffix(pixels.dtype, channels(pixels))
+    return path.stem + suitable_suffix(pixels.dtype, channels(pixels), path.suffix)

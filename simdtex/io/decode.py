@@ -99,23 +99,17 @@ class Metadata(NamedTuple):
 NOTHING = Metadata()
 """The metadata of a file that has only pixels."""
 
-Decoded = tuple[Array, Metadata]
-
-
-GREYS = np.arange(256, dtype=np.uint8).repeat(3).tobytes()
-"""The palette whose colours are the indices."""
-
 
 class _Found(NamedTuple):
-    """Pixels as they are stored: with the orientation of the file, and whether the last channel is alpha."""
+    """Pixels as they are stored, whether the last channel is alpha, and the orientation of the file."""
 
     pixels: Array
-    metadata: Metadata = NOTHING
-    orientation: int = 1
     alpha: bool = False
+    orientation: int = 1
+    metadata: Metadata = NOTHING
 
 
-def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> Decoded:
+def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> tuple[Array, Metadata]:
     """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
@@ -141,7 +135,7 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
     tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
     if data[:5].lower() == b"ncols" or (tiff and rasters.is_raster(io.BytesIO(data))):
         pixels, geo, names = rasters.read_raster(data, most)
-        return _Found(pixels, Metadata(geo=geo), alpha=names[-1] == "alpha")
+        return _Found(pixels, names[-1] == "alpha", metadata=Metadata(geo=geo))
     if tiff:
         return _read_tiff(data, most, palette)
     if data.startswith(b"\x76\x2f\x31\x01"):
@@ -200,7 +194,7 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Found:
         raise ValueError("it ends before its last pixel")
     if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
         raise ValueError(f"it has a value that is not 0 to {largest}")
-    return _Found(pixels.reshape(shape).astype(dtype), Metadata(white=largest))
+    return _Found(pixels.reshape(shape).astype(dtype), metadata=Metadata(white=largest))
 
 
 def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found:
@@ -212,16 +206,15 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
             decoders = {"PNG": imagecodecs.png_decode, "AVIF": imagecodecs.avif_decode}
             pixels: Array = decoders.get(picture.format or "", imagecodecs.jpeg2k_decode)(data)
-            orientation, metadata = _metadata(picture)
             alpha = pixels.ndim == 3 and pixels.shape[2] in (2, 4)
-            return _Found(_full_scale(pixels, bits), metadata, orientation, alpha)
+            return _Found(_full_scale(pixels, bits), alpha, *_metadata(picture))
         picture.load()
         if picture.mode == "L" and bits < 8 and isinstance(grey := picture.info.get("transparency"), int):
             picture.info["transparency"] = grey * (255 // (2**bits - 1))  # Pillow scales pixels only
         transparent, colours = picture.has_transparency_data, None
         if palette and picture.mode == "P":
             colours = bytes(picture.getpalette() or ())
-            picture.putpalette(GREYS)
+            picture.putpalette(bytes(np.arange(256, dtype=np.uint8).repeat(3)))  # whose colours are the indices
         if colours is not None or picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
         elif picture.mode in ("LA", "F", "I") or picture.mode.startswith("I;"):
@@ -230,7 +223,7 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _Found(pixels, metadata._replace(palette=colours), orientation, mode in ("LA", "RGBA"))
+    return _Found(pixels, mode in ("LA", "RGBA"), orientation, metadata._replace(palette=colours))
 
 
 def _bits(kind: str | None, data: bytes) -> int:
@@ -322,7 +315,8 @@ def _read_exr(data: bytes, most: int) -> _Found:
 def _pictures(tiff: Any) -> list[Any]:
     """Return the series of a TIFF that are not masks or previews; none if a page after the first is damaged."""
     with suppress(Exception):
-        return [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
+        found = [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
+        return found if tiff.is_imagej == (found[0].kind == "imagej") else []
     return []
 
 
@@ -359,12 +353,11 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
         pixels = page.asarray()
         if pixels.size == 0:
             raise ValueError("it has no pixels")
-        if page.axes == "SYX":
-            pixels = np.moveaxis(pixels, 0, -1)
-        elif page.axes not in ("YX", "YXS"):
+        if not set(page.axes) <= set("YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
+        pixels = pixels.transpose([page.axes.index(axis) for axis in "YXS" if axis in page.axes])
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
-    return _Found(_shown(page, pixels), metadata, orientation, extra in (1, 2))
+    return _Found(_shown(page, pixels), extra in (1, 2), orientation, metadata)
 
 
 def is_stack(path: Any) -> bool:
@@ -373,8 +366,8 @@ def is_stack(path: Any) -> bool:
 
     with quiet(), tifffile.TiffFile(path, _multifile=False) as tiff:
         if not (found := _pictures(tiff)):
-            return bool(tiff.pages.is_multipage)
-        return tiff.is_imagej != (found[0].kind == "imagej") or not set(found[0].axes) <= set("YXS")
+            return bool(tiff.pages.is_multipage or tiff.is_imagej)
+        return not set(found[0].axes) <= set("YXS")
 
 
 def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]:
@@ -386,7 +379,7 @@ def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[floa
     import tifffile
 
     with tifffile.TiffFile(path, _multifile=False) as tiff:
-        if not (found := _pictures(tiff)) or tiff.is_imagej != (found[0].kind == "imagej"):
+        if not (found := _pictures(tiff)):
             raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
         series, page, axes = found[0], found[0].keyframe, found[0].axes
         if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):

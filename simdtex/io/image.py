@@ -12,7 +12,7 @@ import io
 import os
 import re
 import struct
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,25 +24,10 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io import rasters
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
-from simdtex.io.limits import explained, max_pixels_or_default, reading
+from simdtex.io.limits import Refused, explained, max_pixels_or_default, reading
 from simdtex.options import check_real, require, unmasked
 
-__all__ = [
-    "Image",
-    "Metadata",
-    "as_array",
-    "cast",
-    "check_sample",
-    "check_writable",
-    "parse_size",
-    "read",
-    "read_bytes",
-    "read_mask",
-    "split_alpha",
-    "suitable_suffix",
-    "to_display",
-    "write",
-]
+__all__ = ["Image", "Metadata", "check_sample", "check_writable", "read", "read_mask", "split_alpha", "write"]
 
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
@@ -103,17 +88,16 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     -----
     The whole file is held in memory together with its pixels.
     """
-    with reading(path, "the image", max_pixels):
-        data = Path(path).read_bytes()
-    return read_bytes(os.fspath(path), data, max_pixels=max_pixels, palette=palette)
+    with reading(path, "the image", max_pixels) as most:
+        return read_bytes(os.fspath(path), Path(path).read_bytes(), max_pixels=most, palette=palette)
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
     """Return a picture from the bytes of its file, as `read` does; messages call it ``name``."""
     most = max_pixels_or_default(max_pixels)
-    if not data:
-        raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     with explained(name, "the image", "an image"):
+        if not data:
+            raise Refused("is empty (0 bytes): give a file with an image in it")
         found, metadata = decode(data, most, palette=palette)
     with explained(name, "the image"):
         pixels = native(pixels_of("the picture", np.ma.getdata(found)))
@@ -326,10 +310,11 @@ def pixels_of(name: str, values: Any, axes: int = 2) -> Array:
 
 
 class Format(NamedTuple):
-    """The types and the numbers of channels that a format holds without loss; None allows any."""
+    """The types and the numbers of channels that a format holds without loss, None for any; and options of Pillow."""
 
-    types: frozenset[str] | None
-    channels: tuple[int, ...] | None
+    types: frozenset[str] | None = None
+    channels: tuple[int, ...] | None = None
+    options: dict[str, Any] | None = None
 
     def holds(self, dtype: DTypeLike | None, channels: int | None) -> bool:
         """Return whether the format holds values of this type and number of channels; None is not checked."""
@@ -342,35 +327,25 @@ EIGHT = frozenset({"bool", "uint8"})
 INTEGERS = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 FLOATS = frozenset({"float16", "float32", "float64"})
 
+_JPEG = Format(EIGHT, (1, 3), {"quality": 95, "subsampling": 0})
+_TIFF = Format(EIGHT | INTEGERS | FLOATS)
 _FORMATS = {
     ".png": Format(EIGHT | {"uint16"}, (1, 2, 3, 4)),
-    ".tif": Format(EIGHT | INTEGERS | FLOATS, None),
-    ".tiff": Format(EIGHT | INTEGERS | FLOATS, None),
-    ".jpg": Format(EIGHT, (1, 3)),
-    ".jpeg": Format(EIGHT, (1, 3)),
-    ".webp": Format(EIGHT, (1, 3, 4)),
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
+    ".jpg": _JPEG,
+    ".jpeg": _JPEG,
+    ".webp": Format(EIGHT, (1, 3, 4), {"lossless": True, "exact": True}),
     ".bmp": Format(EIGHT, (1, 3)),
     ".exr": Format(frozenset({"float16", "float32"}), (1, 3)),
-    ".npy": Format(None, None),
-}
-
-_OPTIONS: dict[str, dict[str, Any]] = {
-    ".jpg": {"quality": 95, "subsampling": 0},
-    ".jpeg": {"quality": 95, "subsampling": 0},
-    ".webp": {"lossless": True, "exact": True},
+    ".npy": Format(),
 }
 
 LOSSY = (".jpg", ".jpeg")
 """The suffixes of a format that changes pixels."""
 
-_MARKER = 65533
-"""The most bytes of EXIF that a JPEG holds."""
-
 _ENTRY = np.dtype([("tag", "<u2"), ("value", "V10")])
 """An entry of a directory of TIFF."""
-
-_BIG = 2**32 - 2**25
-"""The size in bytes from which a TIFF must be a BigTIFF."""
 
 
 def check_writable(
@@ -398,12 +373,6 @@ def check_writable(
         check_holds(target, _FORMATS, dtype, channels, suitable_suffix(dtype, channels))
 
 
-def holds_all(path: PathLike, dtype: DTypeLike, channels: int) -> bool:
-    """Return whether the format of a path's suffix can be written, and holds such pixels without loss."""
-    suffix = Path(path).suffix.lower()
-    return suffix in _FORMATS and suffix not in LOSSY and _FORMATS[suffix].holds(dtype, channels)
-
-
 def check_holds(
     target: Path, formats: dict[str, Format], dtype: DTypeLike | None, channels: int | None, other: str
 ) -> None:
@@ -417,9 +386,11 @@ def check_holds(
     raise ValueError(f"{target}: {suffix or 'PNG slices'} cannot hold {what}: end its name in {other} instead")
 
 
-def suitable_suffix(dtype: DTypeLike | None, channels: int | None) -> str:
-    """Return the suffix of a format that holds such pixels without loss: PNG, else TIFF, else NumPy's own."""
-    return next(suffix for suffix in (".png", ".tif", ".npy") if _FORMATS[suffix].holds(dtype, channels))
+def suitable_suffix(dtype: DTypeLike | None, channels: int | None, own: str = ".png") -> str:
+    """Return the suffix of a format that holds such pixels without loss: its own, else PNG, TIFF, or NumPy's own."""
+    lossless = _FORMATS.keys() - LOSSY
+    suffixes = (one for one in (own, ".png", ".tif", ".npy") if one.lower() in lossless)
+    return next(suffix for suffix in suffixes if _FORMATS[suffix.lower()].holds(dtype, channels))
 
 
 def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) -> None:
@@ -466,7 +437,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
     channels = 3 if palette else 1 if pixels.ndim == 2 else pixels.shape[2]
     metadata = metadata._replace(profile=fitting(metadata.profile, channels))
     beside = {"icc_profile": metadata.profile, "dpi": metadata.dpi, "exif": metadata.exif}
-    if suffix in LOSSY and len(metadata.exif or b"") > _MARKER:
+    if suffix in LOSSY and len(metadata.exif or b"") > 65533:  # the most that a JPEG holds
         del beside["exif"]
     beside = {name: value for name, value in beside.items() if value}
     if suffix == ".npy":
@@ -480,7 +451,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         head = 33  # bytes of the signature and the header; Pillow's chunks on colours and size follow
         path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
     elif suffix in (".tif", ".tiff") and metadata.geo:
-        rasters.write_raster(path, np.moveaxis(pixels if pixels.ndim == 3 else pixels[..., None], -1, 0), metadata.geo)
+        rasters.write_raster(path, np.moveaxis(np.atleast_3d(pixels), -1, 0), metadata.geo)
     elif suffix == ".exr":
         import OpenEXR
 
@@ -495,7 +466,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         picture = PIL.Image.fromarray(pixels)
         if palette:
             picture.putpalette(palette.ljust(768, b"\0"))  # of 256 colours, so that indices keep 8 bits
-        path.write_bytes(pillow_bytes(picture, kind, **_OPTIONS.get(suffix, {}), **beside))
+        path.write_bytes(pillow_bytes(picture, kind, **(_FORMATS[suffix].options or {}), **beside))
 
 
 def coloured(pixels: Array, palette: bytes | None) -> Array:
@@ -505,7 +476,7 @@ def coloured(pixels: Array, palette: bytes | None) -> Array:
     """
     if palette is None:
         return pixels
-    indices = pixels if pixels.ndim == 3 else pixels[..., None]
+    indices = np.atleast_3d(pixels)
     colours = np.frombuffer(palette.ljust(768, b"\0"), np.uint8).reshape(-1, 3)[indices[..., 0]]
     return np.concatenate([colours, indices[..., 1:]], -1)
 
@@ -517,14 +488,13 @@ def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
     return buffer.getvalue()
 
 
-def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING) -> None:
+def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = NOTHING) -> None:
     """Write pictures of one shape as the pages of a TIFF."""
     import tifffile
 
-    pages = list(pages)
     channels = 1 if pages[0].ndim == 2 else pages[0].shape[2]
     colours = 3 if channels in (3, 4) else 1
-    big = len(pages) * pages[0].nbytes > _BIG
+    big = len(pages) * pages[0].nbytes > 2**32 - 2**25
     with tifffile.TiffWriter(path, bigtiff=big, byteorder="<") as file:
         for page in pages:
             file.write(
@@ -544,7 +514,7 @@ def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING)
 
 
 def _add_exif(path: Path, exif: bytes) -> None:
-    """Add EXIF data to the first page of a little-endian TIFF, whose directory moves to the end of the file."""
+    """Add EXIF data to the only page of a little-endian TIFF, whose directory moves to the end of the file."""
     found = PIL.Image.Exif()
     found.load(exif)
     found.update([(tag, value.encode("latin-1")) for tag, value in found.items() if isinstance(value, str)])
@@ -552,14 +522,14 @@ def _add_exif(path: Path, exif: bytes) -> None:
     with path.open("r+b") as file:
         file.seek(*struct.unpack("<4xI", file.read(8)))
         own = np.frombuffer(file.read(12 * int.from_bytes(file.read(2), "little")), _ENTRY)
-        own, following = own[~np.isin(own["tag"], list(found))], file.read(4)
+        own = own[~np.isin(own["tag"], list(found))]
         place = -(-file.seek(0, os.SEEK_END) // 2) * 2
         added = found.tobytes(place + own.nbytes)[14:]  # after two headers
         more = np.frombuffer(added, _ENTRY, int.from_bytes(added[:2], "little"), 2)
         entries = np.concatenate([own, more])
         file.seek(place)
         file.write(struct.pack("<H", len(entries)) + entries[entries["tag"].argsort()].tobytes())
-        file.write(following + added[2 + more.nbytes + 4 :])
+        file.write(added[2 + more.nbytes :])
         file.seek(4)
         file.write(struct.pack("<I", place))
 

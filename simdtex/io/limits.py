@@ -70,32 +70,21 @@ def needs(library: str, extra: str, what: str) -> None:
         raise Refused(f"is {what}: pip install 'simdtex[{extra}]' to read it")
 
 
-def size_of_file(name: str, what: str) -> int:
-    """Return the size of a file in bytes; raise unless it is a regular file. ``what`` names it, as ``"the image"``."""
-    try:
-        found = os.stat(name)
-    except FileNotFoundError:
-        raise Unreadable(f"{name} does not exist: check the path of {what}") from None
-    except OSError as error:
-        raise Unreadable(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
-    if stat.S_ISDIR(found.st_mode):
-        raise Unreadable(f"{name} is a folder: give the path of {what}, which is a file in it")
-    if not stat.S_ISREG(found.st_mode):
-        raise Unreadable(f"{name} is not a regular file: give the path of {what}")
-    return found.st_size
-
-
 @contextmanager
 def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
-    """Check a file and yield the most pixels to read; errors of the block name the file and a remedy.
+    """Check a regular file and yield the most pixels to read; errors of the block name the file and a remedy.
 
     ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. ``kind`` is that
     of `explained`.
     """
     name, most = os.fspath(path), max_pixels_or_default(max_pixels)
-    size = size_of_file(name, what)
     with explained(name, what, kind):
-        check_size(0, size, most, each)
+        found = os.stat(name)
+        if stat.S_ISDIR(found.st_mode):
+            raise Refused(f"is a folder: give the path of {what}, which is a file in it")
+        if not stat.S_ISREG(found.st_mode):
+            raise Refused(f"is not a regular file: give the path of {what}")
+        check_size(0, found.st_size, most, each)
         yield most
 
 
@@ -116,7 +105,9 @@ def explained(name: str, what: str, kind: str = "") -> Iterator[None]:
         raise Unreadable(f"{name} is too large for the memory: crop it first") from None
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:
-            raise Unreadable(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
+            missing = isinstance(error, FileNotFoundError)
+            reason = "does not exist" if missing else f"cannot be read ({error.strerror})"
+            raise Unreadable(f"{name} {reason}: check the path of {what}") from None
         text = " ".join(str(error).split()) or type(error).__name__
         if kind:
             text = text if len(text) <= 100 else text[:97] + "..."
@@ -129,14 +120,11 @@ def explained(name: str, what: str, kind: str = "") -> Iterator[None]:
 def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:
     """Return an ``.npy`` array of ``length`` bytes, including its header, if it is within the limits."""
     begin = file.tell()
-    version = np.lib.format.read_magic(file)
+    headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    if not (read_header := headers.get(np.lib.format.read_magic(file))):
+        raise ValueError("it holds no plain array of numbers")
     try:
-        if version == (1, 0):
-            shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-        elif version == (2, 0):
-            shape, _, dtype = np.lib.format.read_array_header_2_0(file)
-        else:
-            raise ValueError("it holds no plain array of numbers")
+        shape, _, dtype = read_header(file)
     except TokenError:
         raise ValueError("its header is damaged") from None
     if dtype.hasobject:

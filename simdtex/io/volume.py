@@ -11,7 +11,6 @@ import bz2
 import io
 import os
 import re
-import shutil
 import warnings
 import zipfile
 import zlib
@@ -26,21 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, earlier_files
+from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target, earlier_files
 from simdtex.io.decode import decode, is_stack, native, quiet, read_stack
 from simdtex.io.grids import CartesianGrid, frame
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import (
-    Refused,
-    check_size,
-    explained,
-    max_pixels_or_default,
-    needs,
-    read_npy,
-    read_npz,
-    reading,
-    size_of_file,
-)
+from simdtex.io.limits import Refused, check_size, explained, max_pixels_or_default, needs, read_npy, read_npz, reading
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
@@ -49,11 +38,11 @@ PathLike = str | os.PathLike[str]
 
 # "" means a folder of slices
 _FORMATS = {
-    ".npz": Format(None, None),
-    ".npy": Format(None, None),
-    ".tif": Format(INTEGERS | FLOATS, None),
-    ".tiff": Format(INTEGERS | FLOATS, None),
-    ".nrrd": Format(INTEGERS | {"float32", "float64"}, None),
+    ".npz": Format(),
+    ".npy": Format(),
+    ".tif": Format(INTEGERS | FLOATS),
+    ".tiff": Format(INTEGERS | FLOATS),
+    ".nrrd": Format(INTEGERS | {"float32", "float64"}),
     "": Format(frozenset({"uint8", "uint16"}), (1, 2, 3, 4)),
 }
 _SLICE = re.compile(r"slice-([0-9]{3,})\.png")
@@ -77,7 +66,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             "or give a name without suffix for a folder of PNG slices"
         )
     if suffix:
-        image.check_writable(target, suffixes=(suffix,))
+        check_target(target)
     else:
         earlier_files(target, "the slices", lambda name: bool(_SLICE.fullmatch(name)))
         check_folder_writable(target)
@@ -94,10 +83,9 @@ def is_volume(path: PathLike, channels: bool = False) -> bool:
     if os.path.isdir(path) or suffix not in (".tif", ".tiff", ".npy"):
         return os.path.isdir(path) or suffix in _READERS
     with suppress(Exception):  # the reader of pictures reports the error
-        if os.path.isfile(path) and suffix != ".npy":
-            return is_stack(path)
-        if os.path.isfile(path):
+        if os.path.isfile(path) and suffix == ".npy":
             return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) > 2 + channels
+        return os.path.isfile(path) and is_stack(path)
     return False
 
 
@@ -193,13 +181,13 @@ def _raw(path: Path, most: int) -> _Read:
     return {"value": np.fromfile(path, dtype).reshape(shape)}, _PLAIN
 
 
-def _beside(path: Path, name: str, most: int) -> Path:
-    """Return the data file that a header names, a file of its own folder within the limits."""
+def _beside(path: Path, name: str, most: int) -> bytes:
+    """Return the data of the file that a header names, a file of its own folder within the limits."""
     file = path.with_name(Path(name).name or "..")
     if file.name != name or name == "LIST" or "%" in name or file.resolve().parent != path.resolve().parent:
         raise Refused(f"names the data file {name[:100]!r}: put the data into one file in the folder of the header")
-    check_size(0, size_of_file(str(file), "the data file"), most)
-    return file
+    with reading(file, "the data file", most):
+        return file.read_bytes()
 
 
 def _nrrd(path: Path, most: int) -> _Read:
@@ -221,6 +209,7 @@ def _metaimage(path: Path, most: int) -> _Read:
     def value(*keys: str) -> str:
         return next((said[key] for key in keys[:-1] if key in said), keys[-1]).lower()
 
+    binary, packed = (value(key, "") == "true" for key in ("BinaryData", "CompressedData"))
     parts, kind = int(value("ElementNumberOfChannels", "1")), value("ElementType", "").removeprefix("met_")
     bits = {"char": 8, "short": 16, "int": 32, "long": 32, "long_long": 64}.get(kind.lstrip("u"))
     sizes = [parts] * (parts > 1) + [int(side) for side in said["DimSize"].split()]
@@ -231,15 +220,12 @@ def _metaimage(path: Path, most: int) -> _Read:
         "sizes": np.array(sizes),
         "dimension": len(sizes),
         "endian": "big" if value("ElementByteOrderMSB", "BinaryDataByteOrderMSB", "") == "true" else "little",
-        "encoding": "ascii" if value("BinaryData", "") != "true" else "raw",
+        "encoding": "gzip" if packed else "raw" if binary else "ascii",
         "byte skip": int(value("HeaderSize", "0")),
         "space directions": steps.reshape(3, 3) * cell[:, None],
         "space origin": np.array(value("Offset", "Position", "Origin", "0 0 0").split(), float),
+        "data file": said["ElementDataFile"] if said["ElementDataFile"].upper() != "LOCAL" else "",
     }
-    if value("CompressedData", "") == "true":
-        header["encoding"] = "gzip"
-    if said["ElementDataFile"].upper() != "LOCAL":
-        header["data file"] = said["ElementDataFile"]
     return _stored(path, header, data, most)
 
 
@@ -250,12 +236,12 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
     if count < 1:
         raise ValueError("it has no values")
     if name := header.pop("data file", None) or header.pop("datafile", None):
-        data = _beside(path, name, most).read_bytes()
+        data = _beside(path, name, most)
     lines, skip = (int(header.pop(f"{a} skip", 0) or header.pop(f"{a}skip", 0)) for a in ("line", "byte"))
     packed = header["encoding"].lower() in ("gzip", "gz", "bzip2", "bz2")
     if not (0 <= lines < 2**10 and packed - 1 <= skip <= most):
         raise ValueError("its header skips too much")
-    data = data.split(b"\n", lines)[lines] if lines else data
+    data = data.split(b"\n", lines)[lines]
     if packed:
         gzip = header["encoding"][0] in "gG"
         unpack: Any = zlib.decompressobj(47) if gzip else bz2.BZ2Decompressor()  # 47: with a header of gzip or zlib
@@ -267,11 +253,10 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
         raise Refused(f"has the axes {', '.join(kinds)}: give three of space, and at most one of variables")
     for axis in others:
         values = np.moveaxis(values, values.ndim - 1 - axis, -1)
-    steps: Any = np.diag([1.0] * 3)
     if "space directions" in header:
-        steps = [row for row in header["space directions"] if row is not None and np.isfinite(row).all()]
-    elif "spacings" in header:
-        steps = np.diag(np.nan_to_num(np.delete(header["spacings"], others), nan=1.0))
+        steps: Any = [row for row in header["space directions"] if row is not None and np.isfinite(row).all()]
+    else:
+        steps = np.diag(np.nan_to_num(np.delete(header.get("spacings", [1.0] * len(kinds)), others), nan=1.0))
     return _placed({"value": values}, np.array(steps, np.float64), header.get("space origin", _PLAIN[0]))
 
 
@@ -374,13 +359,11 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd gets the time by a deprecated call
             nrrd.write(written, values, header, index_order="C")
-        written.seek(0)
+        data = written.getvalue()
+        head = data[: data.index(b"\n\n")]
         with path.open("wb") as file:
-            for line in iter(written.readline, b"\n"):  # the header, which ends with an empty line
-                if not line.startswith(b"# on "):  # the time: the same volume is to be the same file
-                    file.write(line)
-            file.write(b"\n")
-            shutil.copyfileobj(written, file)
+            file.write(re.sub(rb"\n# on .*", b"", head))  # the time: the same volume is to be the same file
+            file.write(memoryview(data)[len(head) :])
     elif suffix:
         image.write_tiff(path, values)
     else:
