@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
 from simdtex.cli.inputs import Also, Material, channels, note_lossy, read_also, read_material, size, write_arranged
-from simdtex.cli.places import check_input
+from simdtex.cli.places import Named, check_input
 
 if TYPE_CHECKING:
     from simdtex.io.image import Metadata
@@ -131,7 +131,7 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
     if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files:
-        check_input(output, path)
+        check_input(Named(output, "folder"), Named(path, "read"))
     return Folder(found, albedos[0], output)
 
 
