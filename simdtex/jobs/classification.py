@@ -174,7 +174,7 @@ def _region(name: str, sample: Any, mask: Any, like: NDArray[Any], channel_axis:
     except (ValueError, TypeError) as error:
         raise type(error)(f"class {name!r}: {error}") from None
     check_alike(f"class {name!r}", pixels, "the picture", like)
-    if unknown.all():
+    if not sites.any():
         raise ValueError(f"class {name!r} has a sample without a known pixel; leave it out")
     return Region(completed(pixels, unknown), sites)
 
