@@ -41,11 +41,9 @@ def reporting() -> Iterator[None]:
         with catch_signals(context), noting():
             check_places(context)
             yield
-    except BrokenPipeError as error:
-        if _printing(error):
-            raise  # the reader has read enough; click ends the process without a word
-        settle(error)
     except (ValueError, TypeError, OSError) as error:
+        if isinstance(error, BrokenPipeError) and _printing(error):
+            raise  # the reader has read enough; click ends the process without a word
         settle(error)
     except MemoryError:
         note("there is not enough memory; give a smaller size")

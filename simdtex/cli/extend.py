@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from simdtex.cli.inputs import Reading, channels, check_source_map, note_lossy, read_also, read_material, write_arranged
+from simdtex.cli.inputs import Reading, check_source_map, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import folder_of
+from simdtex.cli.maps import arranged, folder_of
 from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given, option, report_option
 from simdtex.cli.places import EITHER, ENTER
 
@@ -71,7 +71,6 @@ def extend(
     give its path instead of the folder's.
     """
     from simdtex import extend
-    from simdtex.io import image
 
     folder = folder_of([picture], output, roles)
     whole = read_material([folder.lead if folder else picture], Reading(palette=bool(options["categorical"])))
@@ -86,17 +85,11 @@ def extend(
         raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
     if options["band"] is not None and not tiling:
         raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
-    others = read_also(also, whole)
     check_source_map(source_map, whole)
-    if folder:
-        folder.read(whole)
-    else:
-        image.check_writable(output, pixels.dtype, channels(pixels))
-        note_lossy(output, pixels, whole.metadata)
     metadata = whole.metadata
     if metadata and metadata.geo:
         metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
-    writers = write_arranged(folder.write if folder else output, others, source_map, metadata)
+    writers = arranged(folder or output, whole, also, source_map, metadata, kept=True)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

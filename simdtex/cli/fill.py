@@ -11,20 +11,9 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import (
-    Reading,
-    channels,
-    check_profiles,
-    check_source_map,
-    note_lossy,
-    parted,
-    planes,
-    read_also,
-    read_material,
-    write_arranged,
-)
+from simdtex.cli.inputs import Reading, check_profiles, check_source_map, parted, planes, read_material
 from simdtex.cli.job import Task, job
-from simdtex.cli.maps import folder_of
+from simdtex.cli.maps import arranged, folder_of
 from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given
 from simdtex.cli.places import EITHER, ENTER, READ
 from simdtex.model.pictures import unknown_in
@@ -86,7 +75,6 @@ def fill(
     material, as in `simdtex extend`; the holes are those of the albedo, or of --mask.
     """
     from simdtex import fill
-    from simdtex.io import image
     from simdtex.jobs.filling import widened
 
     folder = folder_of([picture], output, roles)
@@ -100,13 +88,8 @@ def fill(
     if texture and (also or folder):
         what = "give one picture" if folder else "leave --also out"
         raise ValueError(f"maps cannot be filled with --sample, since no pixel comes from the picture; {what}")
-    others = read_also(also, whole)
-    if folder:
-        folder.read(whole)
-    else:
-        image.check_writable(output, pixels.dtype, channels(pixels))
-        note_lossy(output, pixels, whole.metadata)
     check_source_map(source_map, texture or whole, everywhere=not texture)
+    writers = arranged(folder or output, whole, also, source_map, whole.metadata, kept=True)
     sample = texture and texture.array
     filled = np.count_nonzero(widened(hole, options["grow"], options["feather"]))
     axis = None if pixels.ndim == 2 else -1
@@ -114,7 +97,7 @@ def fill(
         partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
         lambda made: f"{filled} of {hole.size} pixels filled",
         str(folder or output),
-        write_arranged(folder.write if folder else output, others, source_map, whole.metadata),
+        writers,
     )
 
 

@@ -3,71 +3,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
-from simdtex.cli.inputs import Also, Material, channels, read_material, size
-from simdtex.cli.places import check_input
+from simdtex.cli.inputs import Also, Material, channels, note_lossy, read_also, read_material, size, write_arranged
+from simdtex.cli.places import Named, check_input
 
 if TYPE_CHECKING:
     from simdtex.io.image import Metadata
     from simdtex.model.material import Maps
 
 
+@dataclass
 class Folder:
-    """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``."""
+    """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``.
 
-    def __init__(self, maps: Maps, lead: Path, output: Path) -> None:
-        self.output, self.lead, self.role = output, lead, maps.files[lead]
-        self.paths = [path for path in maps.files if path != lead]
-        self.unknown = [name for name in maps.unknown if lead.with_name(name) not in maps.files]
-        self.sample: NDArray[Any] = np.empty(0)
-        self.others: list[Also] = []
-        self.name = ""
+    ``maps`` are those that are read, ``lead`` first.
+    """
+
+    found: Maps
+    lead: Path
+    output: Path
+    maps: list[Also] = field(default_factory=list)
 
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
         from simdtex.io.atomic import earlier_files
 
-        self.sample = lead.pixels[0]
-        self.name = _written(self.lead, self.sample)
-        for path in self.paths:
-            maps = read_material([path])
+        for path in sorted(self.found.files, key=lambda path: path != self.lead):
+            maps = read_material([path]) if self.maps else lead
             if maps.sizes != lead.sizes:
                 raise ValueError(
-                    f"{path} is {size(maps.pixels[0])} and {self.lead.name} {size(self.sample)}: scale it to that "
+                    f"{path} is {size(maps.pixels[0])} and {self.lead.name} {size(lead.pixels[0])}: scale it to that "
                     "size, or move it out of the folder"
                 )
-            self.others.append(Also(maps, self.output / _written(path, maps.pixels[0])))
-        names = [self.name, *(one.out.name for one in self.others)]
+            self.maps.append(Also(maps, self.output / _written(path, maps.pixels[0])))
+        names = [one.out.name for one in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
-        if self.unknown:
-            note(f"left out, because the name does not show the kind of map: {', '.join(self.unknown)}")
+        if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
+            note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
 
     def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
         from simdtex.io import image
         from simdtex.io.atomic import atomic_folder
         from simdtex.model.material import NORMALS, unit_normals
-        from simdtex.model.source_map import apply_source_map
 
-        if self.role in NORMALS and made.ndim == 3:
-            mixed = (made != apply_source_map(run.source, self.sample)).any(axis=2)
-            made = unit_normals(made, mixed)
+        lead, *others = self.maps
+        if self.found.files[self.lead] in NORMALS and made.ndim == 3:
+            made = unit_normals(made, (made != lead.carried(run.source)).any(axis=2))
         with atomic_folder(self.output) as temporary:
-            image.write(temporary / self.name, made, metadata)
-            for one in self.others:
+            image.write(temporary / lead.out.name, made, metadata)
+            for one in others:
                 image.write(temporary / one.out.name, one.carried(run.source), one.maps.metadata)
 
     def __str__(self) -> str:
-        return f"{self.output} ({1 + len(self.others)} maps arranged by {self.lead.name})"
+        return f"{self.output} ({len(self.maps)} maps arranged by {self.lead.name})"
+
+
+def arranged(
+    output: Folder | Path,
+    samples: Material,
+    also: Sequence[str],
+    source_map: Path | None,
+    metadata: Metadata | None,
+    *,
+    kept: bool,
+) -> list[Callable[[Any, Any], object]]:
+    """Return functions that write a picture or all maps of a folder, ``--also`` and ``--source-map``.
+
+    Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to stay as they are, and its
+    ``metadata`` holds for the output; a format that loses them is noted.
+    """
+    from simdtex.io import image
+
+    others, pixels = read_also(also, samples), samples.pixels[0]
+    if isinstance(output, Folder):
+        output.read(samples)
+        return write_arranged(output.write, others, source_map, metadata)
+    image.check_writable(output, pixels.dtype, channels(pixels))
+    if kept:
+        note_lossy(output, pixels, metadata)
+    return write_arranged(output, others, source_map, metadata)
 
 
 def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> Folder | None:
@@ -107,7 +131,7 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
     if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files:
-        check_input(output, path)
+        check_input(Named(output, "folder"), Named(path, "read"))
     return Folder(found, albedos[0], output)
 
 

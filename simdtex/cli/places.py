@@ -56,7 +56,7 @@ READING = ("read", "enter")
 READ_PAIR, WRITE_PAIR, READ_NAMED = Pair("read"), Pair("write"), Pair("read", named=True)
 
 
-class _Named(NamedTuple):
+class Named(NamedTuple):
     """A path as it was given, and its role."""
 
     path: Path
@@ -70,7 +70,7 @@ def check_places(context: click.Context) -> None:
     writes = [one for one in named if one.role not in READING]
     for number, out in enumerate(writes):
         for one in reads:
-            _check_input(out, one)
+            check_input(out, one)
         for other in writes[:number]:
             if _same(out.path, other.path):
                 raise ValueError(f"{out.path} would be written twice; give each output a file of its own")
@@ -89,12 +89,7 @@ def outputs(context: click.Context) -> dict[Path, tuple[int, int]]:
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in there}
 
 
-def check_input(folder: Path, path: Path) -> None:
-    """Raise if a file that is read would be overwritten or removed where a folder is written."""
-    _check_input(_Named(folder, "folder"), _Named(path, "read"))
-
-
-def _check_input(out: _Named, one: _Named) -> None:
+def check_input(out: Named, one: Named) -> None:
     """Raise if an output would overwrite or remove an input, or change a folder that is one."""
     if _same(out.path, one.path):
         raise ValueError(f"{out.path} is an input and would be overwritten; give the output another name")
@@ -106,7 +101,7 @@ def _check_input(out: _Named, one: _Named) -> None:
         raise ValueError(f"{out.path} would be written into {one.path}, which is an input; give another folder")
 
 
-def _named(context: click.Context) -> Iterator[_Named]:
+def _named(context: click.Context) -> Iterator[Named]:
     """Yield every path that a command was given, or has by default."""
     for parameter in context.command.params:
         kind, value = parameter.type, context.params.get(parameter.name or "")
@@ -114,15 +109,15 @@ def _named(context: click.Context) -> Iterator[_Named]:
             if one is None:
                 continue
             if isinstance(kind, Place):
-                yield _Named(Path(one), kind.role)
+                yield Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
                 pairs = [(str(one).partition("=")[2], "")] if kind.named else split_pair(str(one))
                 for left, right in pairs:
                     # how many files the left names depends on the samples; a file that is not there harms nothing
                     for text in {left, *(part.strip() for part in left.split(","))} - {""}:
-                        yield _Named(Path(text), "read")
+                        yield Named(Path(text), "read")
                     if right:
-                        yield _Named(Path(right), kind.role)
+                        yield Named(Path(right), kind.role)
 
 
 def split_pair(text: str) -> list[tuple[str, str]]:

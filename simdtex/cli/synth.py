@@ -10,19 +10,9 @@ from typing import Any
 import click
 
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import (
-    channels,
-    check_source_map,
-    last_iteration,
-    note_lossy,
-    output_shape,
-    read_also,
-    read_material,
-    take_reading,
-    write_arranged,
-)
+from simdtex.cli.inputs import check_source_map, last_iteration, output_shape, read_also, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import folder_of
+from simdtex.cli.maps import arranged, folder_of
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
@@ -90,7 +80,6 @@ def synth(
     The method mrf takes several samples of one type; unknown pixels may be NaN. SAMPLE may be a folder with the maps
     of a material, as in `simdtex extend`.
     """
-    from simdtex.io import image
     from simdtex.synthesis import synthesize
 
     context = click.get_current_context()
@@ -116,19 +105,12 @@ def synth(
         others = read_also(also, material, files=False)
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
         return None
-    if folder:
-        folder.read(material)
-    else:
-        image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)
-    others = read_also(also, material)
-    if (others or folder) and known is not None:
+    if (also or folder) and known is not None:
         what = "give one picture" if folder else "leave --also out"
         raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
-    if known is not None:
-        note_lossy(output, pixels)
     like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
-    writers = write_arranged(folder.write if folder else output, others, source_map, like)
+    writers = arranged(folder or output, material, also, source_map, like, kept=known is not None)
     if report:
         from simdtex.report.synthesis import write_synthesis
 

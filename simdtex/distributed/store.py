@@ -185,8 +185,7 @@ class Sources:
         self.shape = (*array.shape, 2 + (len(sample.boxes) > 1))
 
     def __getitem__(self, where: Any) -> NDArray[np.int32]:
-        place: NDArray[np.int32] = self._sample.place(self._array[where])
-        return place
+        return self._sample.place(self._array[where])
 
 
 class Store:
@@ -232,14 +231,13 @@ class Store:
             if (here := conditions.at(level.number, grid)) is not None:
                 held = True
                 for name, plane in here._asdict().items():
-                    store._planes(f"work/given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = (
-                        plane
-                    )
+                    place = f"work/given/held{level.number}/{name}"
+                    store._sites(place, level, plane.dtype, before=plane.shape[:-2])[:] = plane
             if (data := conditions.scattered(level.number)) is not None:
                 scattered[str(level.number)] = data
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
-                store._pixels(f"work/given/{name}", layout.levels[0], array.shape[2:], array.dtype)[:] = array
+                store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
         about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command}
         more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
         store._keep("run", about, [described(plan), layout.levels[0].side, *more])
@@ -294,7 +292,7 @@ class Store:
         level = work.layout.levels[turn.level]
         if turn.phase == "show":
             for name, (after, dtype) in work.outputs.items():
-                self._pixels(name, level, after, dtype)
+                self._sites(name, level, dtype, after=after)
             count, side = len(work.outputs), -(-level.side // level.chunk)
             shape = (count, *self._at("image").counts[:2])
             axes = ("array", "chunk_y", "chunk_x")
@@ -302,7 +300,7 @@ class Store:
         else:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
                 before = (work.layout.channels,) if name == "values" else ()
-                self._planes(f"work/level{level.number}/{turn.number}/{name}", level, before, np.dtype(kind))
+                self._sites(f"work/level{level.number}/{turn.number}/{name}", level, kind, before)
         row = 2 + candidates
         self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
 
@@ -490,13 +488,13 @@ class Store:
                 raise Damaged(f"{name}/zarr.json") from None
         return self._arrays[name]
 
-    def _planes(self, name: str, level: LevelLayout, before: tuple[int, ...], dtype: np.dtype[Any]) -> Checked:
-        shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
-        return self._array(name, shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
-
-    def _pixels(self, name: str, level: LevelLayout, after: tuple[int, ...], dtype: np.dtype[Any]) -> Checked:
-        shape, chunks = (level.rows, level.cols, *after), (level.chunk, level.chunk, *after)
-        return self._array(name, shape, chunks, dtype, ("y", "x", *("channel",) * len(after)))
+    def _sites(
+        self, name: str, level: LevelLayout, dtype: Any, before: tuple[int, ...] = (), after: tuple[int, ...] = ()
+    ) -> Checked:
+        """Return an array with rows and columns of sites, and further axes ``before`` and ``after`` these."""
+        shape, chunks = ((*before, *sides, *after) for sides in ((level.rows, level.cols), (level.chunk, level.chunk)))
+        axes = (*("channel",) * len(before), "y", "x", *("channel",) * len(after))
+        return self._array(name, shape, chunks, np.dtype(dtype), axes)
 
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]

@@ -48,22 +48,14 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
     block or the renaming raises OSError, for example because the disk is full.
     """
     check_target(Path(path))
-    target = Path(os.path.realpath(path))
-    temporary, replaced = _hidden(target), target.exists()
-    try:
-        _remove_leftovers(target)
-        # not tempfile, whose file would be readable only by its owner
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if replaced else 0o666))
-        with _locked(temporary):
-            yield temporary
-            _sync(temporary)
-            if replaced:
-                shutil.copymode(target, temporary)
-            os.replace(temporary, target)
-    except (OSError, NotWritten) as error:
-        raise _not_written(path, error, temporary) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    replaced = Path(path).exists()
+    # not tempfile, whose file would be readable only by its owner
+    with _temporary(path, lambda new: new.touch(0o600 if replaced else 0o666, exist_ok=False)) as (target, temporary):
+        yield temporary
+        _sync(temporary)
+        if replaced:
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
 
 
 @contextmanager
@@ -72,23 +64,19 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
 
     An existing folder `path`, which the caller has checked, is replaced as a whole at the end, and the new one has its
     permissions. The block must not replace the temporary folder itself, which is locked. If the block fails, also by
-    Ctrl-C, the temporary folder is removed and `path` is left as it was.
-    Errors are those of `atomic_path`.
+    Ctrl-C, the temporary folder is removed and `path` is left as it was. Errors are those of `atomic_path`.
     """
-    target = Path(os.path.realpath(path))
-    temporary = _hidden(target)
-    old = target.with_name(f".simdtex-old-{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]}")
-    try:
-        _remove_leftovers(target)
-        if old.exists() and not target.exists():  # a process was killed while it replaced the folder
+    with _temporary(path, Path.mkdir) as (target, temporary):
+        old = target.with_name(f".simdtex-old-{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]}")
+        if target.exists():
+            shutil.rmtree(old, ignore_errors=True)
+        elif old.exists():  # a process was killed while it replaced the folder
             old.rename(target)
-        temporary.mkdir()
-        with _locked(temporary):
-            yield temporary
-            for folder, _, names in os.walk(temporary):
-                for name in names:
-                    _sync(Path(folder, name))
-                _sync_folder(Path(folder))
+        yield temporary
+        for folder, _, names in os.walk(temporary):
+            for name in names:
+                _sync(Path(folder, name))
+            _sync_folder(Path(folder))
         try:
             if target.exists():
                 shutil.copymode(target, temporary)
@@ -101,16 +89,38 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
+        shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _temporary(path: PathLike, make: Callable[[Path], object]) -> Iterator[tuple[Path, Path]]:
+    """Yield where `path` leads, and a locked hidden file or folder beside it that ``make`` creates.
+
+    It is removed at the end if it has not been renamed, and unfinished files of killed processes before.
+    """
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".simdtex-{secrets.token_hex(8)}{target.suffix}")
+    try:
+        for entry in target.parent.iterdir():
+            if is_leftover(entry):
+                _remove(entry)
+        make(temporary)
+        with _locked(temporary):
+            yield target, temporary
     except (OSError, NotWritten) as error:
         raise _not_written(path, error, temporary) from None
     finally:
-        for _ in range(20):  # threads of a library, such as Zarr's, may write for a while after Ctrl-C
-            if not temporary.exists():
-                break
-            shutil.rmtree(temporary, ignore_errors=True)
-            time.sleep(0.05)
-        if target.exists():
-            shutil.rmtree(old, ignore_errors=True)
+        _remove(temporary)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or a folder, if it exists."""
+    for _ in range(20):  # threads of a library, such as Zarr's, may write for a while after Ctrl-C
+        if not path.is_dir():
+            path.unlink(missing_ok=True)
+            break
+        shutil.rmtree(path, ignore_errors=True)
+        time.sleep(0.05)
 
 
 def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
@@ -304,10 +314,6 @@ def _is_at(descriptor: int | None, path: Path) -> bool:
         return False
 
 
-def _hidden(target: Path) -> Path:
-    return target.with_name(f".simdtex-{secrets.token_hex(8)}{target.suffix}")
-
-
 def is_leftover(path: Path) -> bool:
     """Return whether a path is an unfinished file, started more than a day ago, that no process is writing."""
     try:
@@ -317,13 +323,3 @@ def is_leftover(path: Path) -> bool:
             return True
     except OSError:  # it is locked, or has meanwhile been renamed
         return False
-
-
-def _remove_leftovers(target: Path) -> None:
-    """Remove unfinished files of killed processes in the target's folder."""
-    for entry in target.parent.iterdir():
-        if is_leftover(entry):
-            if entry.is_dir():
-                shutil.rmtree(entry, ignore_errors=True)
-            else:
-                entry.unlink(missing_ok=True)

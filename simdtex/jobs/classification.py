@@ -174,7 +174,7 @@ def _region(name: str, sample: Any, mask: Any, like: NDArray[Any], channel_axis:
     except (ValueError, TypeError) as error:
         raise type(error)(f"class {name!r}: {error}") from None
     check_alike(f"class {name!r}", pixels, "the picture", like)
-    if unknown.all():
+    if not sites.any():
         raise ValueError(f"class {name!r} has a sample without a known pixel; leave it out")
     return Region(completed(pixels, unknown), sites)
 
@@ -336,13 +336,11 @@ class TextureClassifier:
 
     def predict_proba(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return the probability of each class at each pixel, (rows, cols, classes), as `Output.probability`."""
-        probability: NDArray[np.float32] = self._run(image)[1].probability
-        return probability
+        return np.asarray(self._run(image)[1].probability)
 
     def predict_fit(self, image: ArrayLike) -> NDArray[np.float32]:
         """Return how well each class fits each pixel, (rows, cols, classes), as `Output.fit`."""
-        fit: NDArray[np.float32] = self._run(image)[1].fit
-        return fit
+        return np.asarray(self._run(image)[1].fit)
 
     def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Any]:
         if not hasattr(self, "_model"):

@@ -75,13 +75,11 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
         found = boxes
         for box in found:
             near[box] = True  # the bend of a hole may contain another hole
-    area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
-    ends = [np.flatnonzero(near.any(axis))[[0, -1]].tolist() for axis in (1, 0)]
-    rows, cols = (slice(first, last + 1) for first, last in ends)
-    all_of_it = (rows.stop - rows.start) * (cols.stop - cols.start)
+    around_all = ndimage.find_objects(near.astype(np.uint8))
+    area, all_of_it = (sum((r.stop - r.start) * (c.stop - c.start) for r, c in boxes) for boxes in (found, around_all))
     cheaper = wanted == 1 and MANY < all_of_it < len(found) * EACH
     if len(found) > FEW or area > near.size // 2 or cheaper:
-        found = [(rows, cols)]
+        found = around_all
     return [Window(r, c, wanted) for r, c in found]
 
 
@@ -368,26 +366,40 @@ class Filling:
         finished = [Made(*made) for made in done]
         for number, window in enumerate(parts):
             at = (window.rows, window.cols)
+            hole = self.hole[at]
             if number == len(finished):
                 around = self.around(window)
-                seen = callback and _pasting(callback, whole, at, self.hole[at], around.corner, number, len(parts))
+                seen = callback and partial(self._show, callback, whole, window, around, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                finished.append(self._window(machine, window, around, seed, seen, now))
+                made, output = drive(self.plan(window, around), machine, seed, seen, now)
+                assert output.source is not None and output.temperature is not None
+                about = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
+                finished.append(Made(around.corner, made[hole], output.temperature[hole], output.source[hole], about))
                 inside = None
                 checkpointing.offer(None, lambda: (finished, None))
             found = finished[number]
-            hole = self.hole[at]
             whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
             whole.source[at][hole] = shifted(found.source, found.corner)
         self._blend(whole)
         runs = [found.statistics for found in finished]
         seconds = [run["device_seconds"] for run in runs]
-        statistics = {
-            **{name: runs[0][name] for name in ("device", "seed", "options")},
-            **{"seconds": sum(run["seconds"] for run in runs), "windows": runs, "levels": runs[0]["levels"]},
-            "device_seconds": None if None in seconds else sum(seconds),
-        }
+        statistics = {name: runs[0][name] for name in ("device", "seed", "options", "levels")}
+        statistics |= {"seconds": sum(run["seconds"] for run in runs), "windows": runs}
+        statistics["device_seconds"] = None if None in seconds else sum(seconds)
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
+
+    def _show(
+        self, callback: Callback, whole: Whole, window: Window, around: Around, number: int, count: int, progress: Any
+    ) -> Any:
+        """Call back with the whole picture, with the current hole in it, and the share of all windows."""
+        at = (window.rows, window.cols)
+        pasted = partial(paste, at=at, hole=self.hole[at], level=progress.level)
+        shown = {
+            "image": lambda: pasted(whole.image, progress.image()),
+            "temperature": lambda: pasted(whole.temperature, progress.temperature()),
+            "source": lambda: pasted(whole.source, shifted(progress.source(), around.corner)),
+        }
+        return callback(replace(progress, **shown, fraction=(number + progress.fraction) / count))
 
     def _blend(self, whole: Whole) -> None:
         """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""
@@ -419,57 +431,31 @@ class Filling:
         """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
             return Around(self.sample, (0, 0), None)
-        hole, (rows, cols) = self.hole[window.rows, window.cols], self.hole.shape
-        lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
-        sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
-        reach = self.reach or max(REACH, 2 * max(sides))
-        top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
-        near = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
-        inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
-        place = np.moveaxis(inside, 0, -1).astype(np.int32)
+        at = (window.rows, window.cols)
+        ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
+        reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
+        top, left = (max(0, side.start - reach) for side in at)
+        near = (slice(top, window.rows.stop + reach), slice(left, window.cols.stop + reach))
+        place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
         return Around(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
-    def _guide(self, window: Window, around: Around, values: NDArray[Any]) -> Surroundings | None:
-        """Return the colours around a window's hole as its guide; None with a separate sample or with categories."""
-        pictures = around.pictures
-        if self.sample is not None or not _has_tones(self.options, pictures):
-            return None
-        known = pictures.known[0] if pictures.known else np.ones(pictures.pixels[0].shape[:2], bool)
-        top, left = around.corner
-        corner = (window.rows.start - top, window.cols.start - left)
-        return Surroundings(pictures.pixels[0], known, values, ~self.hole[window.rows, window.cols], corner)
-
     def plan(self, window: Window, around: Around) -> mrf.Plan:
-        """Return the plan of a window's run."""
-        at, options = (window.rows, window.cols), self.options
-        hole, least = self.hole[at], window.levels and options.levels is None
+        """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
+        at, options, guide = (window.rows, window.cols), self.options, None
+        pictures, hole, least = around.pictures, self.hole[at], window.levels and options.levels is None
         known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
         values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
+        if around.place is not None and pictures.known and _has_tones(options, pictures):
+            row, col = around.place[0, 0].tolist()
+            guide = Surroundings(pictures.pixels[0], pictures.known[0], values, ~hole, (row, col))
         return mrf.plan(
-            around.pictures,
+            pictures,
             hole.shape,
             replace(options, overview=LEAST) if least else options,
             Given(values, known, around.place, suggests=False),
-            self._guide(window, around, values),
-            most=max(window.levels, _fewest_levels(around.pictures)) if window.levels else None,
+            guide,
+            most=max(window.levels, _fewest_levels(pictures)) if window.levels else None,
         )
-
-    def _window(
-        self,
-        machine: Machine,
-        window: Window,
-        around: Around,
-        seed: int,
-        callback: Callback | None,
-        checkpointing: Checkpointing,
-    ) -> Made:
-        """Fill one window, and return its result."""
-        at = (window.rows, window.cols)
-        hole = self.hole[at]
-        made, output = drive(self.plan(window, around), machine, seed, callback, checkpointing)
-        assert output.source is not None and output.temperature is not None
-        statistics = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
-        return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)
 
 
 def filling(
@@ -533,36 +519,3 @@ def paste(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], ho
     fine = values.repeat(2**level, 0).repeat(2**level, 1)[: hole.shape[0], : hole.shape[1]]
     above[at][hole] = fine[hole]
     return above
-
-
-def _pasting(
-    callback: Callback,
-    whole: Whole,
-    at: tuple[slice, slice],
-    hole: NDArray[np.bool_],
-    corner: tuple[int, int],
-    number: int,
-    count: int,
-) -> Callback:
-    """Return a callback that receives the whole picture, with the current hole in it, and the share of all windows.
-
-    The sources of the hole are relative to ``corner``.
-    """
-
-    def seen(progress: Any) -> Any:
-        pasted = partial(paste, at=at, hole=hole, level=progress.level)
-
-        def source() -> NDArray[np.int32]:
-            return pasted(whole.source, shifted(progress.source(), corner))
-
-        return callback(
-            replace(
-                progress,
-                image=lambda: pasted(whole.image, progress.image()),
-                temperature=lambda: pasted(whole.temperature, progress.temperature()),
-                source=source,
-                fraction=(number + progress.fraction) / count,
-            )
-        )
-
-    return seen

@@ -6,6 +6,7 @@ The arrays of a CPU and of the NumPy reference are in the host's memory, and are
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -56,8 +57,6 @@ def available() -> int:
     taken = psutil.Process().memory_info()
     found: int = min(psutil.virtual_memory().available, runtimes.address_space() - taken.vms)
     for path in LIMITS:
-        try:
+        with suppress(OSError, ValueError):  # no such version; or "max", which is no limit
             found = min(found, int(path.read_text()) - taken.rss)
-        except (OSError, ValueError):  # no such version; or "max", which is no limit
-            continue
     return max(0, found)

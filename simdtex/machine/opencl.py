@@ -163,13 +163,12 @@ class OpenCL:
         large = array.nbytes > SMALL_COPY  # without the pool, which would round the size up and keep the memory
         with self._plain_errors():
             if large:
-                data: Any = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
+                data = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
+                result = DeviceArray(data, array.shape, array.dtype)
             else:
-                with self._lock:
-                    data = self._pool.allocate(max(1, array.nbytes))
-            result = DeviceArray(data, array.shape, array.dtype)
+                result = self.empty(array.shape, array.dtype)
             if array.size:
-                event = cl.enqueue_copy(self.queue, data, array, is_blocking=large)
+                event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=large)
                 result.event = None if large else event
             return result
 
@@ -258,8 +257,7 @@ class OpenCL:
     @contextmanager
     def _plain_errors(self) -> Iterator[None]:
         """Raise DeviceError if the process was forked, or if the device runs out of memory."""
-        if runtimes.forked:
-            raise DeviceError(runtimes.FORKED)
+        runtimes.check_fork()
         try:
             yield
         except cl.Error as error:

@@ -19,15 +19,11 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Lock, RLock
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-try:
-    import resource
-except ImportError:  # on Windows
-    resource = None  # type: ignore[assignment]
 if TYPE_CHECKING:
     import pyopencl as cl
 
@@ -53,7 +49,8 @@ FORKED = (
 forked = False
 """Whether this process was forked from one that had used OpenCL."""
 _in_use = False
-_building = RLock()
+_lock = RLock()
+"""For compilation, and for the environment variable that names the loader's folder."""
 _report: Path | None = None
 """The file that gets a report of each crash of a process that uses OpenCL, and of each failed reading of a cache."""
 _reported = 0
@@ -61,8 +58,6 @@ _reported = 0
 """
 apart = False
 """Whether devices are probed in separate processes, since a probe has crashed before."""
-_listing = Lock()
-"""For the environment variable that names the loader's folder."""
 
 
 class DeviceError(ValueError):
@@ -104,7 +99,7 @@ def platforms() -> list[cl.Platform]:
     _in_use = True
     _prepare_caches()
     try:
-        with _listing, _icd_folder():
+        with _lock, _icd_folder():
             found = pyopencl.get_platforms()
     except pyopencl.Error:  # raised if there is no platform
         return []
@@ -113,9 +108,12 @@ def platforms() -> list[cl.Platform]:
 
 def address_space() -> int:
     """Return the limit on this process's virtual memory in bytes, as ``ulimit -v`` sets it."""
-    if resource is None or (limit := resource.getrlimit(resource.RLIMIT_AS)[0]) == resource.RLIM_INFINITY:
+    if sys.platform == "win32":
         return sys.maxsize
-    return limit
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return sys.maxsize if limit == resource.RLIM_INFINITY else limit
 
 
 def _prepare_caches() -> None:
@@ -224,7 +222,7 @@ def build(context: cl.Context, source: str, options: Sequence[str]) -> dict[str,
         return kernels
 
     global _reported
-    with _building, warnings.catch_warnings():
+    with _lock, warnings.catch_warnings():
         warnings.simplefilter("ignore", pyopencl.CompilerWarning)
         try:
             return built()

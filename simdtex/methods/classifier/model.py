@@ -188,19 +188,17 @@ def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Seq
     """Return the number of levels at which all classes have enough sites; raise if it is 0."""
     regions = [region for one in classes for region in one]
     side = min(min(region.sites.shape) for region in regions)
-    levels = max(1, sum(side >= SIDE << level for level in range(options.levels)))
-    while True:
+    most = max(1, sum(side >= SIDE << level for level in range(options.levels)))
+    for levels in range(most, 0, -1):
         reach = experts_of(options, levels)[-1].reach
         counts = [sum(int(_centres(region, reach).sum()) for region in one if not region.judged) for one in classes]
         if min(counts) >= LEAST:
-            return int(levels)
-        if levels == 1:
-            few = int(np.argmin(counts))
-            raise ValueError(
-                f"class {names[few]!r} has {counts[few]} whole neighbourhoods of {2 * reach + 1}x{2 * reach + 1} "
-                f"pixels, and {LEAST} are needed; give a larger sample of it"
-            )
-        levels -= 1
+            return levels
+    few = int(np.argmin(counts))
+    raise ValueError(
+        f"class {names[few]!r} has {counts[few]} whole neighbourhoods of {2 * reach + 1}x{2 * reach + 1} "
+        f"pixels, and {LEAST} are needed; give a larger sample of it"
+    )
 
 
 def _centres(region: Region, reach: int) -> Mask:
@@ -210,16 +208,13 @@ def _centres(region: Region, reach: int) -> Mask:
     inside[reach : rows - reach, reach : cols - reach] = True
     if not region.whole or region.sites.all():
         return inside & region.sites
-    found: Mask = inside & ndimage.minimum_filter(region.sites, 2 * reach + 1, mode="nearest")
-    return found
+    return np.asarray(inside & ndimage.minimum_filter(region.sites, 2 * reach + 1, mode="nearest"))
 
 
 def _cropped(region: Region, margin: int) -> Region:
     """Return the part of a region with its sites and ``margin`` pixels around them."""
-    box = tuple(
-        slice(max(0, int(line[0]) - margin), int(line[-1]) + margin + 1)
-        for line in (np.flatnonzero(region.sites.any(axis)) for axis in (1, 0))
-    )
+    (sides,) = ndimage.find_objects(region.sites.astype(np.uint8))
+    box = tuple(slice(max(0, side.start - margin), side.stop + margin) for side in sides)
     return region._replace(pixels=region.pixels[box], sites=region.sites[box])
 
 
@@ -277,10 +272,7 @@ class _Class:
         self, machine: Machine, levels: list[Array], expert: Expert, sites: NDArray[np.intp]
     ) -> NDArray[np.float32]:
         placed, offsets = machine.put(sites.astype(np.int32)), machine.put(expert.offsets)
-        values: NDArray[np.float32] = machine.get(
-            features(machine, levels[expert.level], placed, offsets, expert.contrast)
-        )
-        return values
+        return np.asarray(machine.get(features(machine, levels[expert.level], placed, offsets, expert.contrast)))
 
     def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> Self:
         """Return the distances of the parts of the class from the rest of it, for each expert."""
@@ -369,8 +361,7 @@ def _covariance(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the covariance of values (E, n), with the same order of summation on every machine."""
     gap = values - np.array([np.add.accumulate(line)[-1] for line in values])[:, None] / values.shape[1]
     products = [[np.add.accumulate(a * b)[-1] for a in gap] for b in gap]
-    found: NDArray[np.float64] = np.array(products) / max(1, values.shape[1] - 1)
-    return found
+    return np.asarray(np.array(products) / max(1, values.shape[1] - 1))
 
 
 def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
