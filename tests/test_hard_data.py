@@ -153,7 +153,7 @@ def test_columns_are_chosen_by_name(tmp_path):
     ):
         with pytest.raises(ValueError, match=words):
             read_hard_data(path, columns=columns, categories={"sand": 1})
-    with pytest.raises(ValueError, match=r"line 2 has 'sand' in column 4, .* --categories"):
+    with pytest.raises(ValueError, match=r"line 2 has 'sand' in column 4, .*--categories"):
         read_hard_data(path, columns=chosen)
 
 

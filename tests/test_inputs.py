@@ -1,12 +1,14 @@
 """What users give beside a sample: the forms that are taken, and a sentence for each that is not."""
 
 import numpy as np
+import pandas
 import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import check_inputs, check_samples, is_several
+from simdtex.options import DataWarning
 
 SHAPE = (6, 7)
 GREY, COLOUR = texture((9, 10)), texture((9, 10), 3)
@@ -295,3 +297,22 @@ def test_bad_input_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         check(**change)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+
+
+def test_a_code_within_the_values_of_the_sample_is_a_datum(tmp_path):
+    """A table in a file or a DataFrame; -99 is a temperature here, and -999 is unknown."""
+    frame = pandas.DataFrame({"lat": [0, 1, 2], "lon": [2, 1, 0], "t": [-99.0, -999.0, 5.0]})
+    frame.to_csv(tmp_path / "t.csv")
+    sample = np.linspace(-120, 50, 64).reshape(8, 8)
+    for known in (frame, tmp_path / "t.csv"):
+        with pytest.warns(DataWarning, match="1 of 3 values are -999, and are taken as unknown"):
+            given = check_inputs(sample, (3, 3), known=known).given
+        assert given.values[0, 2, 0] == -99 and given.known.sum() == 2
+
+
+def test_data_beyond_the_sample_are_warned_about():
+    table = HardData(np.array([[0, 0], [1, 1], [2, 2.0]]), np.array([[5], [240], [2.0]]), ("v",))
+    with pytest.warns(
+        DataWarning, match=r"2 of 3 known values are beyond those of the sample, 5 to 219, the first 240;"
+    ):
+        check_inputs(np.array([[5, 219]], np.uint8), (3, 3), known=table)

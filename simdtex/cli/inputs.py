@@ -84,7 +84,8 @@ class Material(NamedTuple):
     @property
     def limits(self) -> tuple[float, float]:
         """The smallest and the largest value that is known."""
-        low, high = ([extreme.reduce(a, None) for a in self.pixels] for extreme in (np.fmin, np.fmax))
+        known = [np.ma.compressed(pixels) for pixels in self.pixels]
+        low, high = ([extreme.reduce(a) for a in known] for extreme in (np.fmin, np.fmax))
         return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
 
     @property

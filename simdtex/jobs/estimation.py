@@ -106,7 +106,7 @@ def estimate(
     least = min(min(one.shape[:2]) for one in pictures.pixels)
     reach = least // 8 if reach is None else reach
     whole("reach", reach, 0, least - 1)
-    known = as_known(known)
+    known = as_known(known, pictures=pictures)
     size = pictures.pixels[0].shape[:2] if shape is None else shape
     size = check_shape(known.shape if shape is None and isinstance(known, np.ndarray) and known.ndim == 2 else size)
     along, sides_of_cells = grid_axes(size, origin, cell)

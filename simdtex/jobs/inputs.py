@@ -117,11 +117,24 @@ def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = 
     return found
 
 
-def as_known(known: Any, name: str = "known") -> HardData | NDArray[Any]:
-    """Return known values as an array or as a table, which is read if ``known`` is a path."""
-    if isinstance(known, (str, os.PathLike)):
-        return read_hard_data(known)
+def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) -> HardData | NDArray[Any]:
+    """Return known values as an array or as a table, which is read if ``known`` is a path or a DataFrame.
+
+    Codes of unknown values within the values of ``pictures`` are values.
+    """
+    if isinstance(known, (str, os.PathLike)) or hasattr(known, "columns"):
+        if pictures is None:
+            return read_hard_data(known)
+        low, high = _ranges(pictures)
+        return read_hard_data(known, valid=(float(low.min()), float(high.max())))
     return known if isinstance(known, HardData) else as_array(name, known)
+
+
+def _ranges(pictures: Pictures) -> tuple[Any, Any]:
+    """Return the smallest and the largest known value of each variable of the samples."""
+    ends = np.fmin, np.fmax
+    low, high = (end.reduce([end.reduce(one, tuple(range(one.ndim - 1))) for one in pictures.pixels]) for end in ends)
+    return low, high
 
 
 def check_known(
@@ -136,7 +149,7 @@ def check_known(
 
     ``known`` is a masked array, floats with NaN for unknown values, a table or its path.
     """
-    known = as_known(known)
+    known = as_known(known, pictures=pictures)
     variables, dtype = pictures.pixels[0].shape[-1], pictures.pixels[0].dtype
     if isinstance(known, HardData):
         if len(known.names) != variables:
@@ -177,10 +190,7 @@ def check_known(
 
 def _warn_beyond(values: NDArray[Any], there: NDArray[np.bool_], pictures: Pictures) -> None:
     """Warn of known values beyond those of the samples, which no candidate has."""
-    axes = tuple(range(values.ndim - 1))
-    low, high = (
-        extreme.reduce([extreme.reduce(one, axes) for one in pictures.pixels]) for extreme in (np.fmin, np.fmax)
-    )
+    low, high = _ranges(pictures)
     beyond = there & ((values < low) | (values > high))
     if beyond.any():
         variable = int(np.argwhere(beyond)[0][-1])

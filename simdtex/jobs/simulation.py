@@ -85,9 +85,9 @@ def simulate(
     shape : (int, int) or (int, int, int), optional
         Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the first map
         below, if that is an array, else of the training image.
-    known : array, HardData or path, optional
-        Hard data: a masked array of `shape`, floats with NaN for unknown values, a table ``x,y,value``
-        (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
+    known : array, HardData, pandas.DataFrame or path, optional
+        Hard data: a masked array of `shape`, floats with NaN for unknown values, a table of x, y and value
+        (`simdtex.read_hard_data`), its file or a DataFrame. Every realisation has these values, to the bit.
     several : {"refuse", "mean", "most"}
         Value for different data of a table in one cell: an error, their mean (not of categories), or the most frequent
         value, as in `simdtex.place_hard_data`.
@@ -188,7 +188,7 @@ def simulate(
         within_32_bits(check_sides(shape, sides), 1)
     frame(origin, cell)  # raises early
     pictures = check_samples(training, channel_axis, mask, axes)
-    known = None if known is None else as_known(known)
+    known = None if known is None else as_known(known, pictures=pictures)
     given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
     given["scale"] = scale
     flat = ("image_map", "rotation", "scale")
