@@ -246,5 +246,5 @@ def test_bad_mixtures_get_one_sentence_and_write_nothing(folder, case):
 def test_samples_that_do_not_mix(folder, samples, words, monkeypatch):
     if "four.png" in samples:
         pictures = {"four.png": texture((20, 20), 4), "colour.png": COLOUR}
-        monkeypatch.setattr(image, "read", lambda path: image.Image(pictures[str(path)], -1))
+        monkeypatch.setattr(image, "read", lambda path, palette: image.Image(pictures[str(path)], -1))
     assert_one_sentence(mix(samples=samples), words, folder)

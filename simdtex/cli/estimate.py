@@ -71,11 +71,11 @@ def estimate(
         raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    if options["known"] is None:
-        raise ValueError("an estimate requires data; give --known")
     lies = read_place(material, output, options)
     data = read_data(material, options, how)
     height, width = output_shape(size, material.pixels[0], data["known"], material.pixels[0])
+    if data["known"] is None:
+        raise ValueError("an estimate requires data; give --known")
     inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | lies
     made = georeferenced(estimate(material.array, shape=(height, width), **inputs), material.crs)
     write_realisations(output, made)

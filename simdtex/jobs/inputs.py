@@ -118,11 +118,11 @@ def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = 
 
 
 def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) -> HardData | NDArray[Any]:
-    """Return known values as an array or as a table, which is read if ``known`` is a path or a DataFrame.
+    """Return known values as an array or as a table: a path, or a DataFrame whose columns have names.
 
     Codes of unknown values within the values of ``pictures`` are values.
     """
-    if isinstance(known, (str, os.PathLike)) or hasattr(known, "columns"):
+    if isinstance(known, (str, os.PathLike)) or all(isinstance(one, str) for one in getattr(known, "columns", [0])):
         if pictures is None:
             return read_hard_data(known)
         low, high = _ranges(pictures)

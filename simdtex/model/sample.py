@@ -504,7 +504,8 @@ def moved(own: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) 
     if pixels.dtype == np.bool_:
         legal: NDArray[Any] = half > 0.25
     elif pixels.dtype.kind == "f":
-        legal = (2 * np.clip(half, float(pixels.min()) / 2, float(pixels.max()) / 2)).astype(pixels.dtype)
+        with np.errstate(over="ignore"):
+            legal = np.clip(2 * half, float(pixels.min()), float(pixels.max())).astype(pixels.dtype)
     else:
         bounds = np.iinfo(pixels.dtype)
         most = float(bounds.max)  # may be one above the range of the type
