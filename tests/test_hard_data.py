@@ -178,6 +178,9 @@ def test_codes_of_unknown_values(tmp_path, code):
         data = read_hard_data(path)
     np.testing.assert_array_equal(data.values, [[23, 0], [NAN, 1], [219, 2]])
     assert read_hard_data(path, valid=(-np.inf, np.inf)).values[1, 0] == code
+    np.save(tmp_path / "wells.npy", [[1, 2, 23], [3, 4, code], [5, 6, 219]])
+    with pytest.warns(DataWarning, match="1 of 3 values are"):
+        np.testing.assert_array_equal(read_hard_data(tmp_path / "wells.npy").values.ravel(), [23, NAN, 219])
     with pytest.warns(DataWarning):
         assert np.isnan(read_hard_data(path, missing=[23]).values[:2, 0]).all()
 

@@ -136,18 +136,22 @@ def read_hard_data(
         name, binary = os.fspath(table), Path(table).suffix.lower() == ".npy"
         with reading(table, "the hard data", max_pixels, each=BYTES if binary else 1) as most, open(name, "rb") as file:
             if binary:
-                return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
-            try:
-                text = file.read().decode("utf-8-sig")
-            except UnicodeDecodeError:
-                raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
-            data = _parsed(text, columns, categories)
+                data = _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
+            else:
+                data = _parsed(_decoded(file.read()), columns, categories)
     else:
         cells = [[str(cell) for cell in table[column]] for column in table.columns]
         name, data = "the table", _of_columns(cells, list(map(str, table.columns)), None, columns, categories)
     for variable, values in zip(data.names, data.values.T, strict=True):
         values[:] = known_numbers(f"{name}, column {variable}", values, missing, valid)
     return data
+
+
+def _decoded(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
 
 
 def _parsed(text: str, columns: Any, categories: Any) -> HardData:
@@ -280,7 +284,7 @@ def _table(array: Any) -> HardData:
     check_real("the hard data", numbers)
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
-    found: Floats = np.ma.filled(numbers.astype(np.float64), np.nan)
+    found: Floats = np.array(np.ma.filled(numbers.astype(np.float64), np.nan))
     return HardData(found[:, :2], found[:, 2:], _plain(found.shape[1] - 2))
 
 
