@@ -130,7 +130,7 @@ def read_hard_data(
 
     Notes
     -----
-    Cost: about 4 s for a million rows of text.
+    Cost: about 10 s for a million rows of text.
     """
     if isinstance(table, (str, os.PathLike)):
         name, binary = os.fspath(table), Path(table).suffix.lower() == ".npy"
