@@ -256,6 +256,10 @@ def failure(handle: cl.Device) -> str:
         result = np.zeros_like(host)
         pyopencl.enqueue_copy(queue, result, target)
     except Exception as error:  # the device is not usable, whatever the reason
+        if " " in str(intel_library() or "") and "Intel" in handle.platform.name:
+            return (
+                "Intel's runtime does not work in a folder with a space in its path; move the environment, or use PoCL"
+            )
         return one_line(error)
     return "" if np.all(result == 2.0**-24) else "a tiny program ran, but gave a wrong answer"
 
