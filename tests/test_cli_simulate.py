@@ -338,6 +338,17 @@ def test_a_source_map_is_in_the_file(folder):
         assert np.array_equal(grey[found.source_row, found.source_column], found.simulation)
 
 
+def test_a_region_is_the_white_parts_of_a_picture(folder, maps):
+    """Grey below half is outside, as of masks, and so is black of three channels."""
+    grey = np.where(maps["region"], 200, 100).astype(np.uint8)
+    image.write(folder / "grey-region.png", grey)
+    image.write(folder / "colour-region.png", np.stack([grey] * 3, -1))
+    for name in ("grey-region.png", "colour-region.png"):
+        made(folder, "facies.png", "--region", name, "--categorical")
+        with np.load(folder / "out.npz") as arrays:
+            assert np.array_equal(arrays["region"], maps["region"])
+
+
 def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
     result = simulate(folder, "facies.png", "--region", "region.png", "--categorical", "-o", "out.gslib")
     assert result.exit_code == 0, result.output

@@ -341,8 +341,12 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
 
 def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
+    from simdtex.io import grids, image
+
     if name == "probabilities" and (table := read_table(path, how)) is not None:
         return table
+    if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
+        return image.read_mask(path, image.read(path).pixels.shape)
     pixels = planes(read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels)
     if pixels.shape[-1] > 1:
         return np.moveaxis(pixels, -1, 0)
