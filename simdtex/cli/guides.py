@@ -27,8 +27,15 @@ def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[
 
     These options are taken out; ``labels`` is set if the guides decide it.
     """
+    from simdtex.io.grids import kind_of
+
     if samples.deep and (options["sample_mask"] or options["guide"]):
         raise ValueError("--sample-mask and --guide take no volumes; use simdtex.simulate in Python")
+    if how.deep and kind_of(samples.paths[0]) == "raster" and (options["sample_mask"] or options.get("guide")):
+        raise ValueError(
+            f"{samples.paths[0]} is a raster, whose rows are counted from the south, and --sample-mask and --guide are "
+            "pictures; set no-data in the raster, or use simdtex.simulate in Python"
+        )
     masks = read_masks(options.pop("sample_mask"), samples)
     file, guide = options.pop("known"), options.pop("guide", None)
     found: dict[str, Any] = {
