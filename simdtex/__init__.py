@@ -52,6 +52,14 @@ _NAMES = {
 }
 """The public names by their modules, each of which is loaded at its first use, so that the command line starts fast."""
 
+_WORDS = {
+    "fill": ("inpaint", "heal"),
+    "extend": ("tile", "seamless", "expand", "outpaint"),
+    "synthesize": ("synth", "generate", "texture"),
+    "read_hard_data": ("read_csv", "read_table"),
+}
+"""Words of other programs for functions, by ours."""
+
 __all__ = sorted(name for names in _NAMES.values() for name in names)
 
 
@@ -66,7 +74,11 @@ def __getattr__(name: str) -> Any:
 
         found = import_module(f"{home}.{name}") if name == "quality" else getattr(import_module(home), name)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from difflib import get_close_matches
+
+        near = [ours for ours, theirs in _WORDS.items() if name in theirs] or get_close_matches(name, __all__, 1)
+        meant = f"; did you mean {near[0]!r}?" if near else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
     globals()[name] = found  # the next time it is found without this function
     return found
 

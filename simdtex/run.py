@@ -170,29 +170,30 @@ class Iterating(Progress):
 
 @dataclass(frozen=True, kw_only=True)
 class Simulating(Progress):
-    """The progress of `simdtex.simulate`, after every realisation.
-
-    The level is always 0; the picture is the realisation.
+    """The progress of `simdtex.simulate`, after every part of a step of a realisation, and at its end.
 
     Attributes
     ----------
     realisation : int
-        The number of the realisation.
+        The number of the realisation, whose picture it is.
+    complete : bool
+        Whether this realisation is finished.
     finished, realisations : int
         The number of finished realisations, and of all.
     """
 
     realisation: int
+    complete: bool
     finished: int
     realisations: int
 
     @property
     def doing(self) -> str:  # noqa: D102
-        return f"realisation {self.finished} of {self.realisations}"
+        return f"{self.finished} of {self.realisations} realisations finished"
 
     @property
     def stage(self) -> str | None:  # noqa: D102
-        return f"realisation{self.realisation:04d}"
+        return f"realisation{self.realisation:04d}" if self.complete else None
 
 
 @dataclass(frozen=True, kw_only=True)

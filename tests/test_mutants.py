@@ -270,8 +270,9 @@ def test_how_far_a_run_is():
 def test_the_work_that_is_expected(given, each, first):
     run = prepared(**given)
     free = given.get("free_sweeps", 2)
-    expected = {0: (460 * each * 4.5, 460 * each * free), 1: (120 * each * 4.5, 120 * each * free)}
-    expected[2] = (30 * 600 * first, 30 * 600 * free)
+    each *= 1 if given["search"] == "exact" else 16
+    sweeps = {n: sites * by + 5.4 * 200_000 for n, sites, by in [(0, 460, each), (1, 120, each), (2, 30, 600)]}
+    expected = {number: (sweep * (first if number == 2 else 4.5), sweep * free) for number, sweep in sweeps.items()}
     found = expected_work(run)
     assert set(found) == set(expected)
     for level, work in expected.items():

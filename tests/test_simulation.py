@@ -288,16 +288,20 @@ def test_an_unknown_pixel_is_not_what_it_is_completed_with():
 
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize("axis", [None, 0])
-def test_a_callback_is_told_of_every_realisation(jobs, axis):
-    seen = []
+def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
+    seen, shares = [], []
 
     def look(progress):
-        seen.append((progress, progress.image()))
+        shares.append(progress.fraction)
+        if progress.complete:
+            seen.append((progress, progress.image()))
+        else:
+            assert progress.stage is None and progress.image().ndim == 2 + (axis is not None)
 
     training = TRAINING if axis is None else np.moveaxis(texture((16, 20), 2), -1, 0)
     found = simulate(training, n=3, first=2, jobs=jobs, channel_axis=axis, callback=look)
     assert [one.finished for one, _ in seen] == [1, 2, 3]
-    assert [one.fraction for one, _ in seen] == [1 / 3, 2 / 3, 1.0]
+    assert len(shares) > 9 and shares == sorted(shares) and (0 < shares[0] < 1 / 3, shares[-1]) == (True, 1.0)
     assert sorted(one.realisation for one, _ in seen) == [2, 3, 4]
     assert {one.realisations for one, _ in seen} == {3}
     assert len({one.stage for one, _ in seen}) == 3

@@ -16,6 +16,7 @@ GROUPS = {
         "live": "Synthesise, fill, extend and classify on a page in the browser.",
         "synth": "Synthesise a picture of any size with the texture of SAMPLE.",
         "fill": "Fill the holes of PICTURE with the texture around them.",
+        "tile": "Make PICTURE tile, or all maps of a material.",
         "extend": "Continue PICTURE beyond its edges, or make it seamless.",
         "mix": "Mix the textures SAMPLE... into one picture.",
         "solid": "Make a solid block whose slices have the texture of SAMPLE.",
@@ -46,10 +47,26 @@ COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in gr
 
 WHAT = "Texture synthesis from samples, by parallel relaxation on any OpenCL device."
 
+COMMAND_WORDS = {
+    "fill": ("inpaint", "heal", "remove", "erase", "patch", "repair"),
+    "tile": ("seamless", "loop", "wrap", "tileable", "make-seamless"),
+    "synth": ("synthesize", "synthesise", "generate", "texture", "variations", "make", "grow"),
+    "extend": ("expand", "outpaint", "uncrop", "continue"),
+    "solid": ("volume", "3d", "block"),
+    "mix": ("blend", "merge"),
+    "simulate": ("simulation", "realisations", "realizations", "mps"),
+    "estimate": ("krige", "kriging", "probabilities"),
+    "classify": ("segment", "label"),
+    "live": ("gui", "ui", "web", "serve", "app"),
+    "devices": ("device", "gpus", "info", "list"),
+    "bench": ("benchmark", "time", "speed"),
+}
+"""Words of other programs for commands, by ours."""
+
 EXAMPLES = (
     ("synth gravel.png -o more.png", "Make a larger texture that tiles."),
-    ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
-    ("extend brick -o tiled --seamless", "Make all maps of a material tile, from one folder to another."),
+    ("tile photo.png -o tile.png", "Make a photo tile."),
+    ("tile brick -o tiled", "Make all maps of a material tile, from one folder to another."),
     ("fill photo.png -o whole.png --mask hole.png", "Fill a hole."),
 )
 
@@ -67,7 +84,10 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the name of a command, the command itself and its arguments."""
+        """Return the name of a command, the command itself and its arguments; a word of another program names ours."""
+        for ours, theirs in COMMAND_WORDS.items():
+            if args[0] in theirs:
+                ctx.fail(f"No such command '{args[0]}': use `simdtex {ours}`.")
         name, _, rest = super().resolve_command(ctx, args)
         return name, load(str(name)), rest
 

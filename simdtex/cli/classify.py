@@ -31,6 +31,7 @@ UNLABELLED = 255
         "Label pixels as one of two classes, or as unknown.",
     ),
     ("classify photo.png --strokes strokes.png -o labels.png", "Learn the classes from strokes on the picture."),
+    usual="output textures strokes truth confidence report order seed dry_run device quiet",
     profile=True,
 )
 @click.argument("picture", type=READ)
@@ -117,7 +118,8 @@ def classify(
         check_folder(report)
         writers.append(lambda made, run: write_classification(report, pixels, made, run, true, command_line()))
     run = partial(classify, pixels, known, **more, **given(options))
-    return Task(run, partial(_summary, true, names), str(output), writers)
+    summary = f"{size(pixels)}, {len(names)} classes"
+    return Task(run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)))
 
 
 def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
@@ -148,7 +150,7 @@ def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
     return true
 
 
-def _summary(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:
+def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:
     """Return the share of each class and, if the truth is known, how much of it was found."""
     shares = ((name, (labels == label).mean()) for label, name in [(0, "unknown"), *names.items()])
     text = ", ".join(f"{name} {share:.1%}" for name, share in shares)

@@ -33,7 +33,7 @@ from simdtex.cli.simulate import georeferenced, read_place
     help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.",
 )
 @CHANNELS
-@size_option("that of --known, else of TRAINING_IMAGE", "maps")
+@size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
 @data_options
 @places
 @SAMPLE_MASK

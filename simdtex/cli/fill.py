@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from simdtex.cli.inputs import Reading, check_profiles, check_source_map, parted, planes, read_material
 from simdtex.cli.job import Task, job
 from simdtex.cli.maps import arranged, folder_of
-from simdtex.cli.options import ALSO, MAP, SOURCE_MAP, given
-from simdtex.cli.places import EITHER, ENTER, READ
+from simdtex.cli.options import ALSO, MAP, OUTPUT, SOURCE_MAP, given
+from simdtex.cli.places import ENTER, READ
 from simdtex.model.pictures import unknown_in
 
 
@@ -24,9 +24,10 @@ from simdtex.model.pictures import unknown_in
     ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
     ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
     ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
+    usual="output mask invert grow feather samples reach seed also dry_run device quiet",
 )
 @click.argument("picture", type=ENTER)
-@click.option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")
+@OUTPUT
 @click.option(
     "--mask",
     type=READ,
@@ -72,7 +73,7 @@ def fill(
     """Fill the holes of PICTURE with the texture around them.
 
     Pixels outside the holes do not change, except with --grow and --feather. PICTURE may be a folder with the maps of a
-    material, as in `simdtex extend`; the holes are those of the albedo, or of --mask.
+    material, as in `simdtex tile`; the holes are those of the albedo, or of --mask.
     """
     from simdtex import fill
     from simdtex.jobs.filling import widened
@@ -95,7 +96,7 @@ def fill(
     axis = None if pixels.ndim == 2 else -1
     return Task(
         partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
-        lambda made: f"{filled} of {hole.size} pixels filled",
+        f"{filled} of {hole.size} pixels filled",
         str(folder or output),
         writers,
     )

@@ -310,7 +310,9 @@ def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tu
     from simdtex.io.image import parse_sides
 
     if size is not None:
-        return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT")[::-1]
+        return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT", pixels.shape[axes - 1 :: -1])[
+            ::-1
+        ]
     doubled = tuple(2 * side for side in pixels.shape[:axes])
     return next((picture.shape[:axes] for picture in like if hasattr(picture, "shape")), doubled)  # a table has none
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import functools
 import os
+import secrets
 import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,37 +20,52 @@ from click.core import ParameterSource
 
 from simdtex.cli.command import command
 from simdtex.cli.ending import RESUME, afterwards, note, settle
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, job_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, PROFILE, QUIET, SEED, job_options, stages_option
 
 if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
+
+
+CALIBRATION = 0.1
+"""Seconds of a run after which its duration is estimated."""
+
+LONG = 60.0
+"""Seconds beyond which the expected duration of a run is said."""
+
+EVERY = 10.0
+"""Seconds between two lines of progress without a terminal."""
+
+SEEDS = 10**6
+"""Random seeds are below this, so that they are short to give again."""
 
 
 class Task(NamedTuple):
     """What a command does once its input is read and checked.
 
     ``make`` is a public function with its own arguments, which returns what it made and a `simdtex.run.Output`.
-    ``summary(made)`` says what was made of what, and ``names`` are the files that are written, in words. ``outputs``
-    are functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the
-    same. ``limits`` are black and white in the pictures of stages, and ``more(statistics)`` prints further lines after
+    ``summary`` says what is made of what, and ``names`` are the files that are written, in words. ``outputs`` are
+    functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the same.
+    ``limits`` are black and white in the pictures of stages, and ``more(made, statistics)`` prints further lines after
     the summary.
     """
 
     make: Callable[..., Any]
-    summary: Callable[[Any], str]
+    summary: str
     names: str
     outputs: Sequence[Callable[[Any, Any], object]]
     limits: tuple[float, float] = (0.0, 1.0)
-    more: Callable[[dict[str, Any]], None] | None = None
+    more: Callable[[Any, dict[str, Any]], None] | None = None
 
 
 def job(
-    *examples: tuple[str, str], stages: str = "", profile: bool = False
+    *examples: tuple[str, str], usual: str, of: str = "", stages: str = "", profile: bool = False
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
-    The command has the options of its methods, ``--seed``, ``--device``, ``--checkpoint`` and ``--quiet`` beside those
-    of the function, and ``--stages`` and ``--profile`` if it is said what stages are, and that kernels are timed.
+    The command has the options of its methods, ``--seed``, ``--dry-run``, ``--device``, ``--checkpoint`` and
+    ``--quiet`` beside those of the function, and ``--stages`` and ``--profile`` if it is said what stages are, and that
+    kernels are timed. ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the
+    command has, by default that of its name.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
@@ -58,6 +75,7 @@ def job(
             device: str | None,
             checkpoint: Path | None,
             quiet: bool,
+            dry_run: bool,
             stages: Path | None = None,
             profile: bool = False,
             **own: Any,
@@ -65,8 +83,13 @@ def job(
             task = plan(**own)
             if task is None:
                 return
+            if dry_run:
+                click.echo(f"{task.names}: {task.summary}, {expected(task.make, device)}; nothing was written")
+                return
             began = time.perf_counter()
             kept = _checkpoint(checkpoint)
+            if seed is None and not (kept and kept.path.exists()):  # else the seed of the checkpoint
+                seed = secrets.randbelow(SEEDS)
             with watching(quiet, stages, task.limits, kept) as callback:
                 given = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
                 made, output = task.make(full_output=True, **given)
@@ -79,24 +102,68 @@ def job(
             statistics = output.statistics
             if not quiet:
                 seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}, seed {statistics['seed']}"
-                click.echo(f"{task.names}: {task.summary(made)} {seconds}")
+                click.echo(f"{task.names}: {task.summary} {seconds}")
                 if task.more:
-                    task.more(statistics)
+                    task.more(made, statistics)
             if profile:
                 from simdtex.report.terminal import print_profile
 
                 print_profile(statistics)
 
         own = planned.__dict__.pop("__click_params__", [])
-        shared: list[Callable[..., Any]] = [SEED, DEVICE, job_options(plan.__name__), CHECKPOINT, QUIET]
+        shared: list[Callable[..., Any]] = [SEED, DEVICE, job_options(of or plan.__name__), CHECKPOINT, DRY_RUN, QUIET]
         shared += [stages_option(stages)] * bool(stages) + [PROFILE] * profile
         function: Any = planned
         for add in reversed(shared):
             function = add(function)
         function.__click_params__ += own
-        return command(*examples)(function)
+        return command(*examples, usual=usual)(function)
 
     return decorate
+
+
+class Forecast:
+    """The expected duration of a run, from the shares that its callbacks report."""
+
+    def __init__(self) -> None:
+        self.began = time.perf_counter()
+        self.first: tuple[float, float] | None = None
+
+    def seconds(self, fraction: float) -> float | None:
+        """Return the expected seconds from the beginning to the end; None before the run was observed for a while."""
+        now = time.perf_counter() - self.began
+        before, share = self.first = self.first or (now, fraction)  # before it, kernels are compiled
+        if now - before < CALIBRATION or fraction <= share:
+            return None
+        return now + (now - before) / (fraction - share) * (1 - fraction)
+
+
+class Enough(Exception):
+    """A run has been observed for long enough to estimate its duration."""
+
+
+def expected(make: Callable[..., Any], device: str | None) -> str:
+    """Return the levels, the memory and the expected time of a run, in words, of which the first part is run."""
+    from simdtex.machine import memory, open_machine
+    from simdtex.report.tables import duration_text
+
+    machine, forecast = open_machine(device), Forecast()
+    seconds, levels = None, 1
+
+    def observe(progress: Any) -> None:
+        nonlocal seconds, levels
+        seconds, levels = forecast.seconds(progress.fraction), progress.levels
+        if seconds is not None:
+            raise Enough
+
+    with suppress(Enough):
+        make(full_output=True, rng=1, device=device, callback=observe, checkpoint=None)
+    needed = [sum(part) / 2**20 for part in zip(*memory.required.values(), strict=True)]
+    where = f" and {needed[0]:.0f} MiB of the device's" if needed and not memory.shared(machine) else ""
+    total = f"{sum(needed) if not where else needed[1]:.0f} MiB of memory{where}"
+    duration = duration_text(time.perf_counter() - forecast.began if seconds is None else seconds)
+    parts = [f"{levels} levels"] * (levels > 1) + [total, f"about {duration} on {machine.name}"]
+    return ", ".join(parts)
 
 
 def _device(device: str | None, profile: bool) -> Any:
@@ -155,31 +222,51 @@ def given_words(context: click.Context) -> tuple[list[str], list[str]]:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
-    """Show a progress bar on a terminal; elsewhere print a line whenever another job begins.
+    """Show a progress bar on a terminal; elsewhere print a line every ten seconds, and whenever another job begins.
 
     Yields ``show(fraction, doing, job="")``: the share of the whole that is done, what is being done, and the job that
-    this is part of if there are several.
+    this is part of if there are several. Once, it says how long a long run is expected to last.
     """
-    if quiet or not sys.stderr.isatty():
-        last = ""
+    if quiet:
+        yield lambda fraction, doing, job="": None
+        return
+    forecast, last, said, next_line = Forecast(), "", False, time.perf_counter() + EVERY
 
-        def tell(fraction: float, doing: str, job: str = "") -> None:
-            nonlocal last
-            if job != last and not quiet:
-                click.echo(job, err=True)
-            last = job
+    def tell(fraction: float, doing: str, job: str = "") -> None:
+        nonlocal last, said, next_line
+        if job != last and not bar:
+            click.echo(job, err=True)
+        last, seconds = job, forecast.seconds(fraction)
+        if seconds is None:
+            return
+        if seconds > LONG and not said:
+            said = True
+            echo(f"simdtex: this is expected to last {duration(seconds)}")
+        now = time.perf_counter()
+        if now >= next_line and not bar:
+            next_line = now + EVERY
+            click.echo(f"{fraction:.0%}, {doing}; {duration(seconds - (now - forecast.began))} left", err=True)
 
+    def duration(seconds: float) -> str:
+        from simdtex.report.tables import duration_text
+
+        return f"about {duration_text(seconds)}"
+
+    bar = sys.stderr.isatty()
+    echo: Callable[[str], Any] = partial(click.echo, err=True)
+    if not bar:
         yield tell
         return
     from rich.console import Console  # only where a bar is drawn: it takes long to load
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=1.0)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task, echo = shown.add_task("starting", total=1.0), shown.console.print
 
         def show(fraction: float, doing: str, job: str = "") -> None:
-            bar.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
+            shown.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
+            tell(fraction, doing, job)
 
         yield show
 

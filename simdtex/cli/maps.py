@@ -8,15 +8,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
 from simdtex.cli.inputs import Also, Material, channels, note_lossy, read_also, read_material, size, write_arranged
-from simdtex.cli.places import Named, check_input
+from simdtex.cli.places import Named, check_input, preview_of
 
 if TYPE_CHECKING:
     from simdtex.io.image import Metadata
     from simdtex.model.material import Maps
+
+SHEET = 4096
+"""The most pixels a side of a picture of copies; a larger one is reduced."""
 
 
 @dataclass
@@ -76,8 +80,9 @@ def arranged(
     metadata: Metadata | None,
     *,
     kept: bool,
+    preview: bool = False,
 ) -> list[Callable[[Any, Any], object]]:
-    """Return functions that write a picture or all maps of a folder, ``--also`` and ``--source-map``.
+    """Return functions that write a picture or all maps of a folder, ``--also``, ``--source-map`` and ``--preview``.
 
     Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to stay as they are, and its
     ``metadata`` holds for the output; a format that loses them is noted.
@@ -87,11 +92,25 @@ def arranged(
     others, pixels = read_also(also, samples), samples.pixels[0]
     if isinstance(output, Folder):
         output.read(samples)
-        return write_arranged(output.write, others, source_map, metadata)
-    image.check_writable(output, pixels.dtype, channels(pixels))
-    if kept:
-        note_lossy(output, pixels, metadata)
-    return write_arranged(output, others, source_map, metadata)
+    else:
+        image.check_writable(output, pixels.dtype, channels(pixels))
+        if kept:
+            note_lossy(output, pixels, metadata)
+    write = output.write if isinstance(output, Folder) else output
+    writers = write_arranged(write, others, source_map, metadata)
+    if preview:
+        path = preview_of(output.output if isinstance(output, Folder) else output)
+        palette = metadata and metadata.palette
+        writers.append(lambda made, run: _write_copies(path, image.coloured(made, palette or None)))
+    return writers
+
+
+def _write_copies(path: Path, made: NDArray[Any]) -> None:
+    """Write 3x3 copies of a picture, edge to edge, of at most `SHEET` pixels a side."""
+    from simdtex.io import image
+    from simdtex.report.sheet import fitted, rgb
+
+    image.write(path, fitted(np.tile(rgb(made), (3, 3, 1)), SHEET))
 
 
 def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> Folder | None:

@@ -21,12 +21,13 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @job(
     ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
+    usual="output size palette pattern average low high seed dry_run device quiet",
     stages="every iteration",
     profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
-@size_option("twice the first sample")
+@size_option("twice the first sample", base="the first sample")
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
 @click.option("--average", metavar="W,W,...", help="Average the patterns with these weights, one for each sample.")
@@ -51,11 +52,11 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
     image.check_writable(output, arrays[0].dtype, max(map(channels, arrays)))
     return Task(
         partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen | {"average": weights})),
-        lambda made: f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
+        f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
         str(output),
         [lambda made, run: image.write(output, made, pictures[0].metadata._replace(exif=None))],
         (min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)),
-        lambda statistics: click.echo(last_iteration(statistics)),
+        lambda made, statistics: click.echo(last_iteration(statistics)),
     )
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
+from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -31,7 +31,8 @@ class Option(click.Option):
     """An option in a ``group`` of the help.
 
     The shell completes ``words``, which are the metavar if they are few; ``kind`` is the declared kind of an option of
-    a method. The help names ``method`` in a command that has several, and ends in ``with_tiles`` in one with tiles.
+    a method. ``methods`` are the helps of those methods, of several, that have the option; of one of them, ``method``.
+    In a command with tiles the help ends in ``with_tiles``.
     """
 
     def __init__(
@@ -41,12 +42,13 @@ class Option(click.Option):
         words: Iterable[str] = (),
         kind: Any = None,
         method: str = "",
+        methods: dict[str, str] | None = None,
         with_tiles: str = "",
         **given: Any,
     ) -> None:
         super().__init__(*names, **given)
         self.group, self.words, self.kind = group, list(dict.fromkeys(words)), kind
-        self.method, self.with_tiles = method, with_tiles
+        self.methods, self.with_tiles = methods or ({method: str(self.help)} if method else {}), with_tiles
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
@@ -55,11 +57,9 @@ class Option(click.Option):
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """Return the names and the help in this command."""
-        found, names = super().get_help_record(ctx), {one.name for one in ctx.command.params}
-        if found is None:
-            return None
-        help = f"{self.method}: {found[1]}" if self.method and "method" in names else found[1]
-        return found[0], f"{help} {self.with_tiles}".rstrip() if "tiles" in names else help
+        found = super().get_help_record(ctx)
+        tiles = self.with_tiles if any(one.name == "tiles" for one in ctx.command.params) else ""
+        return found and (found[0], f"{found[1]} {tiles}".rstrip())
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -93,14 +93,11 @@ def job_options(job: str) -> Callable[[Command], Command]:
 
 def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Command], Command]:
     """Return the command line's option of a name; `methods` are its declarations, by method if there are several."""
-    method, first = next(iter(methods.items()))
+    first = next(iter(methods.values()))
     kind = first.kind
     flag = f"--{name.replace('_', '-')}"
-    how: dict[str, Any] = {"kind": kind, "group": first.group}
-    if method and len(methods) == 1 and first.group not in FIRST:
-        how |= {"help": _help(job, first), "group": f"Method {method}: {first.group.lower()}"}
-    else:
-        how["help"] = " ".join(f"{one}: {_help(job, of)}" if one else _help(job, of) for one, of in methods.items())
+    helps = {method: _help(job, one) for method, one in methods.items() if method}
+    how: dict[str, Any] = {"kind": kind, "group": first.group, "help": _help(job, first), "methods": helps}
     if is_flag(kind):
         flag = f"{flag}/--no-{flag[2:]}" if first.default is None else flag
         return option(flag, is_flag=True, default=None, **how)
@@ -142,6 +139,7 @@ def numbers(name: str, text: str) -> list[float]:
         raise ValueError(f"{name} {text} must be numbers separated by commas, such as 0.1,0.2") from None
 
 
+OUTPUT = option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")
 SEED = option(
     "--seed",
     type=int,
@@ -159,6 +157,18 @@ PROFILE = option(
     is_flag=True,
     group=DEVICE_GROUP,
     help="Print the time of each kernel, and of the host.",
+)
+DRY_RUN = option(
+    "--dry-run",
+    is_flag=True,
+    group=RUNS,
+    help="Print the size, the levels, the memory and the expected time of the run, and write nothing.",
+)
+PREVIEW = option(
+    "--preview",
+    is_flag=True,
+    group=OUTPUTS,
+    help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress bar and no summary.")
 CHECKPOINT = option(
@@ -272,6 +282,12 @@ def places(command: Command) -> Command:
     return command
 
 
+BAND = option(
+    "--band",
+    type=int,
+    help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  "
+    "[an eighth of the shorter side, 8 to 64]",
+)
 CHANNELS = option(
     "--channels",
     is_flag=True,
@@ -311,9 +327,10 @@ def report_option(what: str) -> Callable[[Command], Command]:
     return option("--report", type=FOLDER, metavar="DIR", group=OUTPUTS, help=f"Write a page about the run: {what}.")
 
 
-def size_option(default: str, of: str = "an output") -> Callable[[Command], Command]:
+def size_option(default: str, of: str = "an output", base: str = "the sample") -> Callable[[Command], Command]:
     """Return ``--size``, with its default in words."""
-    return option("--size", metavar="WIDTHxHEIGHT", help=f"Make {of} of this size, in pixels.  [{default}]")
+    help = f"Make {of} of this size: 640x480 pixels, 512 for a square, or 2x or 150% of {base}.  [{default}]"
+    return option("--size", metavar="WIDTHxHEIGHT", help=help)
 
 
 def stages_option(what: str) -> Callable[[Command], Command]:

@@ -105,6 +105,8 @@ def _named(context: click.Context) -> Iterator[Named]:
     """Yield every path that a command was given, or has by default."""
     for parameter in context.command.params:
         kind, value = parameter.type, context.params.get(parameter.name or "")
+        if parameter.name == "preview" and value:
+            yield Named(preview_of(context.params["output"]), "write")
         for one in value if isinstance(value, tuple) else [value]:
             if one is None:
                 continue
@@ -118,6 +120,11 @@ def _named(context: click.Context) -> Iterator[Named]:
                         yield Named(Path(text), "read")
                     if right:
                         yield Named(Path(right), kind.role)
+
+
+def preview_of(output: Path) -> Path:
+    """Return the file of ``--preview``, beside an output."""
+    return output.with_name(f"{output.stem}-3x3.png")
 
 
 def split_pair(text: str) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from simdtex.cli.options import DEVICE, QUIET
 from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import resume_tiles, workers_option
 
-COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth")
+COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "tile")
 """Those that keep checkpoints."""
 
 

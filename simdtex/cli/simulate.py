@@ -43,6 +43,7 @@ from simdtex.cli.places import EITHER, ENTER
         "simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10",
         "Read a grid, and write a grid.",
     ),
+    usual="output number size seed known categorical columns origin cell report dry_run device quiet",
 )
 @click.argument("training_image", nargs=-1, required=True, type=ENTER)
 @click.option(
@@ -55,7 +56,7 @@ from simdtex.cli.places import EITHER, ENTER
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
 @CHANNELS
-@size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations")
+@size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations", "TRAINING_IMAGE")
 @places
 @data_options
 @SAMPLE_MASK
@@ -137,7 +138,7 @@ def simulate(
 
     return Task(
         make,
-        lambda made: f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
+        f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
         str(output),
         writers,
     )

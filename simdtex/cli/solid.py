@@ -27,6 +27,7 @@ SIDE = 128
         "Make a cube of 64^3 voxels, and a picture of it.",
     ),
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
+    usual="outputs size picture seed iterations pyramid dry_run device quiet",
     stages="the middle slice of every iteration",
     profile=True,
 )
@@ -74,9 +75,9 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Pa
         writers.append(lambda block, run: view(np.asarray(block), picture))
     return Task(
         partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
-        lambda block: f"{'x'.join(map(str, shape))} from {size_of(pixels)}",
+        f"{'x'.join(map(str, shape))} from {size_of(pixels)}",
         ", ".join(str(path) for path in (*outputs, picture) if path),
         writers,
         material.limits,
-        lambda statistics: click.echo(last_iteration(statistics)),
+        lambda made, statistics: click.echo(last_iteration(statistics)),
     )

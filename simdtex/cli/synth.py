@@ -18,6 +18,7 @@ from simdtex.cli.options import (
     GUIDE,
     MAP,
     METHODS,
+    PREVIEW,
     SAMPLE_MASK,
     SOURCE_MAP,
     data_options,
@@ -32,11 +33,13 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 @job(
     ("synth gravel.png -o more.png", "Make a texture of twice the size that tiles."),
+    ("synth brick -o more --size 2x", "Make more of a material: all maps in the folder brick, arranged alike."),
     (
-        "synth gravel.png -o more.png --size 1024x512 --seed 7 --also normal.png=more-normal.png",
-        "Set the size and the seed, and arrange a normal map like the output.",
+        "synth gravel.png -o more.png --size 1024x512 --seed 7 --preview",
+        "Set size and seed, and see 3x3 copies in more-3x3.png.",
     ),
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
+    usual="output size seed method order also guide preview report dry_run device quiet",
     stages="every level, sweep or iteration",
     profile=True,
 )
@@ -62,6 +65,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @MAP
 @SOURCE_MAP
 @ALSO
+@PREVIEW
 @report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @tiles_options
 def synth(
@@ -73,12 +77,13 @@ def synth(
     roles: tuple[str, ...],
     also: tuple[str, ...],
     report: Path | None,
+    preview: bool,
     **options: Any,
 ) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
     The method mrf takes several samples of one type; unknown pixels may be NaN. SAMPLE may be a folder with the maps
-    of a material, as in `simdtex extend`.
+    of a material, as in `simdtex tile`.
     """
     from simdtex.synthesis import synthesize
 
@@ -94,7 +99,7 @@ def synth(
     data = read_data(material, options, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
-    inputs = data | given(options, without=("tiles", "workers", "dry_run"))
+    inputs = data | given(options, without=("tiles", "workers"))
     if report:
         from simdtex.report.page import check_folder
 
@@ -110,13 +115,13 @@ def synth(
         what = "give one picture" if folder else "leave --also out"
         raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
     like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
-    writers = arranged(folder or output, material, also, source_map, like, kept=known is not None)
+    writers = arranged(folder or output, material, also, source_map, like, kept=known is not None, preview=preview)
     if report:
         from simdtex.report.synthesis import write_synthesis
 
         writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
 
-    def more(statistics: dict[str, Any]) -> None:
+    def more(made: Any, statistics: dict[str, Any]) -> None:
         if method == "multires":
             counts = " ".join(f"{level['candidates']:.3g}" for level in statistics["levels"][1:])
             click.echo(f"candidates per level, coarse to fine: {counts}")
@@ -136,7 +141,7 @@ def synth(
     by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
     return Task(
         partial(synthesize, material.array, shape, method=method, **inputs),
-        lambda made: f"{shape[1]}x{shape[0]} from {by}",
+        f"{shape[1]}x{shape[0]} from {by}",
         str(folder or output),
         writers,
         material.limits,

@@ -18,21 +18,19 @@ from simdtex.cli.inputs import Also
 from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import option
 
-ALONE = ("stages", "profile", "array")
+ALONE = ("stages", "profile", "array", "preview")
 """Options that are of a picture which one process holds."""
 
 
 def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--tiles`` and what goes with it."""
     for one in (
-        option("--dry-run", group=RUNS, is_flag=True, help="Print the plan of --tiles and end."),
         workers_option,
         option(
             "--tiles",
             group=RUNS,
             type=int,
             metavar="SIDE",
-            method="mrf",
             help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
             "one machine. The pixels are the same.",
         ),
@@ -63,11 +61,8 @@ def check_tiles(context: click.Context) -> None:
     """Raise if options exclude one another."""
     given = context.params
     if given["tiles"] is None:
-        for name in ("workers", "dry_run"):
-            if given[name]:
-                raise ValueError(
-                    f"--{name.replace('_', '-')} requires --tiles; give the side of a tile, such as --tiles 2048"
-                )
+        if given["workers"]:
+            raise ValueError("--workers requires --tiles; give the side of a tile, such as --tiles 2048")
         return
     if given["method"] != "mrf":
         raise ValueError(f"the method {given['method']} needs the whole output at once; leave --tiles out")

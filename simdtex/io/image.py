@@ -289,12 +289,21 @@ def parse_size(text: str) -> tuple[int, int]:
     return height, width
 
 
-def parse_sides(text: str, form: str) -> tuple[int, ...]:
-    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; a single number gives all sides."""
+def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...]:
+    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; a single number gives all sides.
+
+    ``2x`` and ``200%`` are multiples of the sides ``own`` of a sample, if it has them.
+    """
     sides, words = form.split("x"), re.split(r"\s*[xX\u00d7]\s*", text.strip())
+    if own and (times := re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([xX\u00d7%])", text.strip())):
+        factor = float(times[1]) / (100 if times[2] == "%" else 1)
+        words = [str(round(factor * side)) for side in own]
     if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
         example = "x".join(("640", "480", "100")[: len(sides)])
-        raise ValueError(f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all sides")
+        more = ", or 2x or 200% of the sample" if own else ""
+        raise ValueError(
+            f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all sides{more}"
+        )
     return tuple(int(word) for word in (words * len(sides))[: len(sides)])
 
 

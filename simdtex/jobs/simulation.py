@@ -130,7 +130,7 @@ def simulate(
     device : str, optional
         As in `simdtex.synthesize`.
     callback : callable, optional
-        Called with a `simdtex.run.Simulating` after every realisation.
+        Called with a `simdtex.run.Simulating` after every part of a realisation.
     checkpoint
         As in `simdtex.synthesize`; it keeps the finished realisations.
     **options
@@ -243,8 +243,22 @@ def simulate(
                 with lock:
                     checkpointing.offer(info, state)
 
+        shares = np.zeros(n)
+        shares[finished] = 1
+        axis, call = None if channel_axis is None else -1, callback or (lambda progress: None)
+
+        def tell(number: int, progress: Any, picture: Any = None) -> None:
+            """Report a part of a realisation, or without ``progress`` its end."""
+            shares[number] = progress.fraction if progress else 1
+            levels = {"level": progress.level if progress else 0, "levels": plan.levels}
+            where = {"realisation": first + number, "finished": len(finished), "realisations": n}
+            read = (lambda: restored(progress.image(), axis)) if progress else (lambda: restored(picture, axis))
+            with lock:
+                call(Simulating(fraction=shares.sum() / n, image=read, complete=progress is None, **levels, **where))
+
         def one(number: int, machine: Machine) -> None:
-            picture, output = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
+            told = callback and partial(tell, number)
+            picture, output = drive(plan, machine, int(seeds[number]), told, Checkpointing(None, offer_finished))
             if inputs.given and inputs.given.outside is not None:
                 picture[inputs.given.outside] = missing
             with lock:
@@ -254,10 +268,7 @@ def simulate(
                     sources[number] = copies.sources(place, columns == 3) if copies else place
                 finished.append(number)
                 checkpointing.offer(None, state)
-                if callback:
-                    shown = restored(picture, None if channel_axis is None else -1)
-                    done = {"realisation": first + number, "finished": len(finished), "realisations": n}
-                    callback(Simulating(level=0, levels=1, fraction=len(finished) / n, image=lambda: shown, **done))
+            tell(number, None, picture)
 
         try:
             _in_turn(one, [number for number in range(n) if number not in finished], machines)

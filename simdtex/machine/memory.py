@@ -23,6 +23,10 @@ TEMPORARY = 2**26
 """Bytes of the host's memory that a machine takes at any size: scratch memory, sorting, its pool."""
 
 
+required: dict[int, tuple[int, int]] = {}
+"""The most bytes on the device and on the host that runs of this process required, by the `id` of the machine."""
+
+
 def shared(machine: Machine) -> bool:
     """Return whether a machine's arrays are in the host's memory."""
     return machine.kind in ("cpu", "reference")
@@ -34,6 +38,8 @@ def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER)
     ``device`` and ``host`` are the most bytes of the run in arrays of the machine, and in other arrays on
     the host; ``remedy`` is the end of the error message.
     """
+    before = required.get(id(machine), (0, 0))
+    required[id(machine)] = (max(before[0], device), max(before[1], host))
     if device > machine.memory:
         raise DeviceError(
             f"this needs about {device / 2**20:.0f} MiB and {machine.name} has {machine.memory / 2**20:.0f}; "

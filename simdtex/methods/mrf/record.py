@@ -23,6 +23,9 @@ from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Listed, most_listed
 from simdtex.run import Callback, Output, Relaxing, Stage
 
+STEP, LISTED = 200_000, 16
+"""What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
+
 
 class Record:
     """The observer of a run: it receives every part and every end of a sweep, and changes nothing.
@@ -207,21 +210,21 @@ def sources(run: Lattices, grid: Grid, field: Field) -> NDArray[np.int32]:
 
 
 def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
-    """Return the expected product of relaxations and candidates of each level, for its cooling and its free sweeps.
+    """Return the expected work of each level, for its cooling and its free sweeps, in evaluated candidates.
 
     Measured at xi = -1: the coarsest level takes about 0.6 |N| sweeps, and every other level relaxes each of its new
-    sites about 6 times.
+    sites about 6 times; a sweep has about 0.6 (|N| + 1) steps.
     """
     work = {}
     for number in range(run.levels):
         grid, options = run.grid(number), run.options
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
-        candidates = run.places(number).positions.size
+        each = run.places(number).positions.size
         if not run.exhaustive(number):
-            candidates = min(candidates, most_listed(len(run.offsets), options.chance_at(number)))
-        sites = grid.size * candidates
-        work[number] = (sites * sweeps, float(sites * options.free_sweeps))
+            each = LISTED * min(each, most_listed(len(run.offsets), options.chance_at(number)))
+        sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
+        work[number] = (sweep * sweeps, sweep * options.free_sweeps)
     return work
 
 
