@@ -18,8 +18,8 @@ from simdtex.machine.devices import DeviceError, DeviceInfo, devices, find
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 
-REPEATS, BUDGET = 3, 2.0
-"""The most timed runs of a case, and the seconds after which no further run starts."""
+REPEATS = 3
+"""The most timed runs of a case."""
 
 
 class Case(NamedTuple):
@@ -43,26 +43,32 @@ class Case(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """The cases of a benchmark: those for devices only, and those also for the NumPy reference."""
+    """The cases of a benchmark: those for devices only, and those also for the NumPy reference.
+
+    ``budget`` are the seconds after which no further run of a case starts.
+    """
 
     devices: tuple[Case, ...]
     reference: tuple[Case, ...]
+    budget: float
 
 
-def _searches(sample: int, output: int) -> tuple[Case, ...]:
-    return tuple(Case("mrf", sample, output, n, search) for n in (8, 18, 32) for search in ("exact", "coherent"))
+def _searches(sample: int, output: int, *orders: int) -> tuple[Case, ...]:
+    return tuple(Case("mrf", sample, output, n, search) for n in orders for search in ("exact", "coherent"))
 
 
 QUICK = Sizes(
-    (*_searches(64, 64), Case("multires", 64, 128), Case("pyramid", 64, 128), Case("solid", 64, 32)),
+    (*_searches(64, 64, 8, 18), Case("multires", 64, 128), Case("pyramid", 64, 128), Case("solid", 64, 32)),
     (Case("mrf", 32, 32, 8, "exact"), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)),
+    0.5,
 )
 FULL = Sizes(
-    (*_searches(128, 256), Case("multires", 256, 1024), Case("pyramid", 256, 1024), Case("solid", 128, 64)),
+    (*_searches(128, 256, 8, 18, 32), Case("multires", 256, 1024), Case("pyramid", 256, 1024), Case("solid", 128, 64)),
     (
         *(Case("mrf", 32, 32, 8, "exact"), Case("mrf", 32, 32, 18, "exact"), Case("multires", 64, 128)),
         *(Case("pyramid", 128, 256), Case("solid", 64, 32)),
     ),
+    2.0,
 )
 
 
@@ -115,7 +121,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
         cases = []
         for case in (*sizes.devices, *sizes.reference):
             tell(f"{machine.name}: {case.name}")
-            seconds, busy = fastest(machine, case)
+            seconds, busy = fastest(machine, case, sizes.budget)
             ratio = plain[case] / seconds if case in plain else None
             cases.append({"name": case.name, "seconds": seconds, "busy": busy, "reference": ratio})
         about = {name: getattr(info, name) for name in ("kind", "version", "driver", "compute_units", "memory")}
@@ -135,12 +141,12 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     }
 
 
-def fastest(machine: Machine, case: Case) -> tuple[float, float]:
+def fastest(machine: Machine, case: Case, budget: float) -> tuple[float, float]:
     """Return the seconds of the fastest of a few runs of a case, after one that compiles, and those in kernels."""
     once(machine, case)
     began = perf_counter()
     runs: list[tuple[float, float]] = []
-    while not runs or (len(runs) < REPEATS and perf_counter() - began < BUDGET):
+    while not runs or (len(runs) < REPEATS and perf_counter() - began < budget):
         runs.append(once(machine, case))
     return min(runs)
 

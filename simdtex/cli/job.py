@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
 
 
-CALIBRATION = 0.1
-"""Seconds of a run after which its duration is estimated."""
+CALIBRATION, SURE = 0.1, 1.0
+"""Seconds of a run after which its duration is estimated, and is said to be long."""
 
 LONG = 60.0
 """Seconds beyond which the expected duration of a run is said."""
@@ -129,11 +129,11 @@ class Forecast:
         self.began = time.perf_counter()
         self.first: tuple[float, float] | None = None
 
-    def seconds(self, fraction: float) -> float | None:
-        """Return the expected seconds from the beginning to the end; None before the run was observed for a while."""
+    def seconds(self, fraction: float, observed: float = CALIBRATION) -> float | None:
+        """Return the expected seconds from the beginning to the end; None before so many seconds are ``observed``."""
         now = time.perf_counter() - self.began
         before, share = self.first = self.first or (now, fraction)  # before it, kernels are compiled
-        if now - before < CALIBRATION or fraction <= share:
+        if now - before < observed or fraction <= share:
             return None
         return now + (now - before) / (fraction - share) * (1 - fraction)
 
@@ -142,13 +142,9 @@ class Enough(Exception):
     """A run has been observed for long enough to estimate its duration."""
 
 
-def expected(make: Callable[..., Any], device: str | None) -> str:
-    """Return the levels, the memory and the expected time of a run, in words, of which the first part is run."""
-    from simdtex.machine import memory, open_machine
-    from simdtex.report.tables import duration_text
-
-    machine, forecast = open_machine(device), Forecast()
-    seconds, levels = None, 1
+def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
+    """Return the expected seconds of a run, of which the first part is run, and its levels."""
+    forecast, seconds, levels = Forecast(), None, 1
 
     def observe(progress: Any) -> None:
         nonlocal seconds, levels
@@ -158,11 +154,20 @@ def expected(make: Callable[..., Any], device: str | None) -> str:
 
     with suppress(Enough):
         make(full_output=True, rng=1, device=device, callback=observe, checkpoint=None)
+    return time.perf_counter() - forecast.began if seconds is None else seconds, levels
+
+
+def expected(make: Callable[..., Any], device: str | None) -> str:
+    """Return the levels, the memory and the expected time of a run, in words."""
+    from simdtex.machine import memory, open_machine
+    from simdtex.report.tables import duration_text
+
+    seconds, levels = observed(make, device)
+    machine = open_machine(device)
     needed = [sum(part) / 2**20 for part in zip(*memory.required.values(), strict=True)]
     where = f" and {needed[0]:.0f} MiB of the device's" if needed and not memory.shared(machine) else ""
     total = f"{sum(needed) if not where else needed[1]:.0f} MiB of memory{where}"
-    duration = duration_text(time.perf_counter() - forecast.began if seconds is None else seconds)
-    parts = [f"{levels} levels"] * (levels > 1) + [total, f"about {duration} on {machine.name}"]
+    parts = [f"{levels} levels"] * (levels > 1) + [total, f"about {duration_text(seconds)} on {machine.name}"]
     return ", ".join(parts)
 
 
@@ -236,7 +241,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
         nonlocal last, said, next_line
         if job != last and not bar:
             click.echo(job, err=True)
-        last, seconds = job, forecast.seconds(fraction)
+        last, seconds = job, forecast.seconds(fraction, SURE)
         if seconds is None:
             return
         if seconds > LONG and not said:

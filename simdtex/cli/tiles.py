@@ -7,6 +7,8 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +17,14 @@ import click
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
-from simdtex.cli.job import command_line, progress_bar
+from simdtex.cli.job import command_line, observed, progress_bar
 from simdtex.cli.options import option
 
 ALONE = ("stages", "profile", "array", "preview")
 """Options that are of a picture which one process holds."""
+
+CALIBRATED = 512
+"""The side of the output, in pixels, from which the time of tiles is estimated."""
 
 
 def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -83,7 +88,8 @@ def synthesize_in_tiles(
     context: click.Context, sample: Any, shape: tuple[int, int], others: Sequence[Also], options: dict[str, Any]
 ) -> None:
     """Make an output in tiles and other maps in its arrangement; ``options`` are keywords of `distributed.plan`."""
-    from simdtex import distributed
+    from simdtex import distributed, synthesize
+    from simdtex.report.tables import duration_text
 
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
@@ -98,6 +104,11 @@ def synthesize_in_tiles(
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
+        if options["known"] is None and options["guide"] is None:  # which have the size of the output
+            side = min(CALIBRATED, *shape)
+            own = {name: value for name, value in options.items() if name not in ("source_map", "maps")}
+            seconds, _ = observed(partial(synthesize, sample, (side, side), **own), given["device"])
+            click.echo(f"one process needs about {duration_text(seconds * prod(shape) / side**2)}; nothing was written")
         return
     options |= {"rng": given["seed"], "device": given["device"], "ended": _write_report}
     if given["report"]:
