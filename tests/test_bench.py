@@ -13,7 +13,7 @@ from simdtex.machine.reference import Reference
 from simdtex.report.terminal import benchmark_table
 
 MRF = Case("mrf", 16, 16, 2, "exact")
-TINY = Sizes((Case("multires", 16, 16), Case("pyramid", 16, 16), Case("solid", 16, 8)), (MRF,))
+TINY = Sizes((Case("multires", 16, 16), Case("pyramid", 16, 16), Case("solid", 16, 8)), (MRF,), 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,6 @@ def command(any_device, tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "r.json"
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(benchmark, "QUICK", TINY)
-        patched.setattr(benchmark, "BUDGET", 0.0)
         done = CliRunner().invoke(main, ["bench", "--quick", "--device", str(any_device.index), "--json", str(path)])
     assert done.exit_code == 0, done.output
     return done, json.loads(path.read_text())
@@ -51,8 +50,7 @@ def test_the_fastest_run_counts(monkeypatch, budget, runs):
         return made[-1]
 
     monkeypatch.setattr(benchmark, "once", once)
-    monkeypatch.setattr(benchmark, "BUDGET", budget)
-    assert benchmark.fastest(Reference(), MRF) == min(made[1:]), "the first compiles"
+    assert benchmark.fastest(Reference(), MRF, budget) == min(made[1:]), "the first compiles"
     assert len(made) == runs
 
 

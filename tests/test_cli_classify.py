@@ -60,7 +60,8 @@ def test_the_command_gives_the_bytes_of_the_function(folder):
     assert (read_labels("labels.png") == wanted).all()
     assert (image.read("fit.tif").pixels == output.fit).all()
     shares = [f"{one['name']} {one['share']:.1%}" for one in output.statistics["classes"]]
-    assert f"labels.png: {', '.join(shares)} in " in result.output and "seed 5" in result.output
+    assert result.output.startswith("labels.png: 40x24, 2 classes in ") and "seed 5\n" in result.output
+    assert result.output.endswith(f"{', '.join(shares)}\n")
 
 
 def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):

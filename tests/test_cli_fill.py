@@ -196,17 +196,19 @@ def test_extend_gives_the_bytes_of_the_function(folder):
 
 
 @pytest.mark.parametrize(
-    ("flags", "tile"),
+    ("command", "flags", "tile"),
     [
-        (["--seamless"], True),
-        (["--seamless", "x"], "x"),
-        (["--seamless", "y"], "y"),
+        ("extend", ["--seamless"], True),
+        ("extend", ["--seamless", "y"], "y"),
+        ("tile", [], True),
+        ("tile", ["--direction", "x"], "x"),
     ],
 )
-def test_a_material_becomes_seamless(folder, flags, tile):
+def test_a_material_becomes_seamless(folder, command, flags, tile):
     args = ["photo.png", "-o", "out.png", *flags, "--band", 3, "--also", "normal.png=normal-out.png", "--finish", 0]
-    result = small(folder, "extend", *args, "--source-map", "s.png")
+    result = small(folder, command, *args, "--source-map", "s.png", "--preview")
     assert result.exit_code == 0, result.output
+    assert np.array_equal(pixels(folder, "out-3x3.png"), np.tile(pixels(folder, "out.png"), (3, 3, 1)))
     photo, source = pixels(folder, "photo.png"), load_source_map(folder / "s.png")
     made = pixels(folder, "out.png")
     assert np.array_equal(
@@ -243,3 +245,10 @@ BAD_EXTEND = {
 def test_bad_extensions_get_one_sentence_and_write_nothing(folder, case):
     args, words = BAD_EXTEND[case]
     refused(folder, "extend", args, words)
+
+
+def test_bad_tiles_get_one_sentence_and_write_nothing(folder):
+    refused(folder, "tile", [*PHOTO, "--direction", "z"], "--direction z is not a direction; give x, y or both")
+    refused(folder, "tile", [*PHOTO, "--band", 12], "band=12 leaves nothing of a picture of 24x32")
+    image.write(folder / "photo-3x3.png", pixels(folder, "grey.png"))
+    refused(folder, "tile", ["photo-3x3.png", "-o", "photo.png", "--preview"], "photo-3x3.png is an input and would be")

@@ -10,8 +10,10 @@ import pytest
 from click.shell_completion import BashComplete
 from click.testing import CliRunner
 
-from simdtex.cli import COMMANDS, EXAMPLES, load, main
+from simdtex.cli import COMMAND_WORDS, COMMANDS, EXAMPLES, load, main
+from simdtex.cli.command import OPTION_WORDS, entries_of
 from simdtex.cli.options import METHODS
+from simdtex.cli.resume import COMMANDS as RUNS
 from simdtex.io import image
 from simdtex.options import Number, Whole, has_presets, is_flag, table
 
@@ -21,9 +23,9 @@ LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [word
 
 VERBS = re.findall(
     r"\w+",
-    """add arrange average blend compare count couple cover draw evaluate exchange fill follow give keep label learn
-    listen look make match measure open penalise place prefer print reflect relax replace resolve run scale set show
-    split start sweep take treat use wrap write""",
+    """add arrange average blend compare count couple cover draw evaluate exchange fill follow give join keep label
+    learn listen look make match measure open penalise place prefer print reflect relax replace resolve run scale set
+    show split start sweep take treat use wrap write""",
 )
 
 
@@ -32,27 +34,47 @@ def run(*words):
 
 
 def help_of(name, width=100):
-    return CliRunner(env={"COLUMNS": str(width)}).invoke(main, [name, "--help"], prog_name="simdtex").output
+    """Return the help with all options."""
+    flag = "--help-all" if name in COMMANDS and load(name).usual else "--help"
+    return CliRunner(env={"COLUMNS": str(width)}).invoke(main, [name, flag], prog_name="simdtex").output
 
 
 def test_there_are_not_too_many_options():
-    assert len([one for name, one in OPTIONS if name == "synth"]) < 49, "one more is --help"
-    assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 109, "each is needed"
+    assert len([one for name, one in OPTIONS if name == "synth"]) <= 50, "one more is --help"
+    assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 112, "each is needed"
 
 
-@pytest.mark.parametrize("name", ["synth", "fill", "extend", "simulate", "schedules", "mix", "solid", "classify"])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_lists_the_usual_options_and_says_where_the_others_are(name):
+    """In 80 columns, at most fourteen options; the rest with --help-all."""
+    command = load(name)
+    said = CliRunner(env={"COLUMNS": "80"}).invoke(main, [name, "--help"], prog_name="simdtex").output
+    listed = re.findall(r"^  (-[a-z], )?(--[a-z-]+)", said, re.MULTILINE)
+    assert max(map(len, said.splitlines())) <= 80 or any(len(words) > 70 for words, _ in command.examples)
+    every = len(re.findall(r"^  (-[a-z], )?(--[a-z-]+)", help_of(name), re.MULTILINE))
+    own = [one for one in command.params if isinstance(one, click.Option)]
+    if not command.usual:
+        assert len(listed) == len(own) + 1 or len(own) > 14  # schedules
+        return
+    assert 10 <= len(listed) <= 14
+    assert f"`simdtex {name} --help-all` lists the other {len(own) - len(listed)} options too." in said
+    assert every >= len(own) + 1, "an option of several methods is listed for each"
+
+
+@pytest.mark.parametrize("name", (*RUNS, "schedules"))
 def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
     params = {one.name: one for one in load(name).params if getattr(one, "kind", None)}
     tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
-    declared = {option: one for options in tables for option, one in options.items() if name in one.shown}
+    job = "extend" if name == "tile" else name
+    declared = {option: one for options in tables for option, one in options.items() if job in one.shown}
     assert set(params) == {*["preset"] * any(map(has_presets, tables)), *declared}
     said = "".join(help_of(name, 1000).split())
     for option, one in declared.items():
         assert f"{one.help}.".replace(" ", "") in said
-        default = one.default_of(name)
+        default = one.default_of(job)
         if default is not None and default is not False:
             shown = f"{default:g}" if isinstance(default, float) else str(default)
-            assert f"[{shown}]" in params[option].help
+            assert f"{one.help}.[{shown}]".replace(" ", "") in said
         number = {Whole: "integer", Number: "float"}.get(type(one.kind), "")
         assert is_flag(one.kind) or params[option].type.name == (number or "text")
 
@@ -60,18 +82,18 @@ def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
 def test_a_group_names_its_method():
     said = help_of("synth")
     assert re.search(r"Method multires: appearance:\n  --alpha FLOAT +Exchange places", said)
-    assert re.search(r"--known FILE +mrf: Keep these", said), "a group of several methods names each method"
+    assert re.search(r"Method mrf: data and guides:\n  --sample-mask FILE +Take pixels only", said)
+    for method, first in (("mrf", "Use this many levels, from"), ("pyramid", "Use this many levels of the pyramids")):
+        assert re.search(rf"Method {method}: scales and edges:\n  --levels INTEGER +{first}", said)
+    assert not re.search(r"\b(mrf|multires|pyramid): [A-Z]", said), "methods are named in headings"
     assert "Method" not in help_of("fill") and "\nSearch:\n" in help_of("fill")
-    assert said.index("Job:") < said.index("Scales and edges:") < said.index("Device and messages:")
+    assert said.index("Job:") < said.index("Method mrf: scales and edges:") < said.index("Device and messages:")
 
 
 def test_the_help_of_an_option_begins_with_what_it_does():
     for command, one in OPTIONS:
-        said = one.get_help_record(click.Context(load(command)))[1]
-        assert said[0].isupper() or re.match("mrf|multires|pyramid", said), f"{command} {one.opts[0]}: {said}"
-        for part in re.split(r"(?:^|\] )(?:(?:mrf|multires|pyramid)(?:, |: ))+", said):
-            first = part.partition(" ")[0].rstrip(":,").lower()
-            assert not part or first in VERBS, f"{command} {one.opts[0]}: {part}"
+        for _, (_, said) in entries_of(one, click.Context(load(command))):
+            assert said[0].isupper() and said.partition(" ")[0].lower() in VERBS, f"{command} {one.opts[0]}: {said}"
 
 
 def test_a_short_list_has_no_groups():
@@ -131,6 +153,20 @@ def test_versions_without_a_device(monkeypatch):
 def test_near_misses_are_named():
     assert "Did you mean 'synth'?" in run("snth").output
     assert "--coherence" in run("synth", "a.png", "-o", "b.png", "--coherense", 1).output
+
+
+def test_words_of_other_programs_name_ours():
+    for ours, theirs in COMMAND_WORDS.items():
+        for word in theirs:
+            assert ours in COMMANDS and f"No such command '{word}': use `simdtex {ours}`." in run(word, "a.png").output
+    own = {flag for _, one in OPTIONS for flag in one.opts}
+    for ours, theirs in OPTION_WORDS.items():
+        assert theirs and (ours in own or ours.removeprefix("simdtex ") in COMMANDS)
+    found = {
+        (command, word): run(command, "a.png", "-o", "b.png", word).output.splitlines()[-1].partition(": use ")[2]
+        for command, word in [("synth", "--scale"), ("synth", "--seamless"), ("tile", "--scale"), ("fill", "--hole")]
+    }
+    assert list(found.values()) == ["--size.", "simdtex tile.", "", "--mask or simdtex fill."]
 
 
 @pytest.mark.parametrize(

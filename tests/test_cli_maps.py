@@ -58,17 +58,17 @@ def pixels(*parts):
 SEAMLESS = ["--seamless", "--band", 3]
 
 
-@pytest.mark.parametrize("command", ["extend", "synth"])
+@pytest.mark.parametrize("command", ["extend", "synth", "tile"])
 def test_all_maps_are_arranged_by_the_albedo(folder, command):
-    more = SEAMLESS if command == "extend" else ["--size", "30x26"]
+    more = {"extend": SEAMLESS, "synth": ["--size", "150%"], "tile": SEAMLESS[1:]}[command]
     done = run(command, "brick", "-o", "tiled", *more, "--source-map", "s.npz")
     assert done.exit_code == 0, done.output
     assert done.output.startswith("tiled (5 maps arranged by brick_albedo.png): ")
     albedo = pixels("brick", "brick_albedo.png")
-    if command == "extend":
+    if command != "synth":
         made = simdtex.extend(albedo, seamless=True, band=3, channel_axis=-1, rng=5, **OPTIONS)
     else:
-        made = simdtex.synthesize(albedo, (26, 30), channel_axis=-1, rng=5, **OPTIONS)
+        made = simdtex.synthesize(albedo, (30, 36), channel_axis=-1, rng=5, **OPTIONS)
     assert names(folder / "tiled") == NAMES
     np.testing.assert_array_equal(pixels("tiled", "brick_albedo.png"), made)
     source = load_source_map("s.npz")

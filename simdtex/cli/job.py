@@ -58,7 +58,7 @@ class Task(NamedTuple):
 
 
 def job(
-    *examples: tuple[str, str], usual: str, of: str = "", stages: str = "", profile: bool = False
+    *examples: tuple[str, str], usual: str = "", of: str = "", stages: str = "", profile: bool = False
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
@@ -144,7 +144,10 @@ class Enough(Exception):
 
 def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
     """Return the expected seconds of a run, of which the first part is run, and its levels."""
+    from simdtex.machine import memory
+
     forecast, seconds, levels = Forecast(), None, 1
+    memory.required.clear()
 
     def observe(progress: Any) -> None:
         nonlocal seconds, levels
@@ -164,11 +167,13 @@ def expected(make: Callable[..., Any], device: str | None) -> str:
 
     seconds, levels = observed(make, device)
     machine = open_machine(device)
-    needed = [sum(part) / 2**20 for part in zip(*memory.required.values(), strict=True)]
-    where = f" and {needed[0]:.0f} MiB of the device's" if needed and not memory.shared(machine) else ""
-    total = f"{sum(needed) if not where else needed[1]:.0f} MiB of memory{where}"
-    parts = [f"{levels} levels"] * (levels > 1) + [total, f"about {duration_text(seconds)} on {machine.name}"]
-    return ", ".join(parts)
+    host, on_device = (
+        sum(size for (where, _), size in memory.required.items() if where == here) / 2**20
+        for here in ("host", "device")
+    )
+    parts = [f"{levels} levels"] * (levels > 1) + [f"{host:.0f} MiB of memory"]
+    parts += [] if memory.shared(machine) else [f"{on_device:.0f} MiB on the device"]
+    return ", ".join([*parts, f"about {duration_text(seconds)} on {machine.name}"])
 
 
 def _device(device: str | None, profile: bool) -> Any:

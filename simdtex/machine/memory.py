@@ -23,8 +23,8 @@ TEMPORARY = 2**26
 """Bytes of the host's memory that a machine takes at any size: scratch memory, sorting, its pool."""
 
 
-required: dict[int, tuple[int, int]] = {}
-"""The most bytes on the device and on the host that runs of this process required, by the `id` of the machine."""
+required: dict[tuple[str, int], int] = {}
+"""The most bytes that runs of this process required of the ``"device"`` and of the ``"host"``, by machine."""
 
 
 def shared(machine: Machine) -> bool:
@@ -38,18 +38,18 @@ def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER)
     ``device`` and ``host`` are the most bytes of the run in arrays of the machine, and in other arrays on
     the host; ``remedy`` is the end of the error message.
     """
-    before = required.get(id(machine), (0, 0))
-    required[id(machine)] = (max(before[0], device), max(before[1], host))
+    required["device", id(machine)] = max(device, required.get(("device", id(machine)), 0))
     if device > machine.memory:
         raise DeviceError(
             f"this needs about {device / 2**20:.0f} MiB and {machine.name} has {machine.memory / 2**20:.0f}; "
             "give a smaller size or another --device"
         )
-    require_host(host + (device + TEMPORARY) * shared(machine), remedy)
+    require_host(host + (device + TEMPORARY) * shared(machine), remedy, id(machine))
 
 
-def require_host(wanted: int, remedy: str = SMALLER) -> None:
-    """Raise DeviceError if ``wanted`` bytes exceed the available memory of the host."""
+def require_host(wanted: int, remedy: str = SMALLER, of: int = 0) -> None:
+    """Raise DeviceError if ``wanted`` bytes, for the machine with the `id` ``of``, exceed the host's available memory."""
+    required["host", of] = max(wanted, required.get(("host", of), 0))
     there = available()
     if wanted > there:
         raise DeviceError(
