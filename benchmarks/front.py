@@ -4,11 +4,11 @@
     python benchmarks/front.py [--out docs/_static/front.jpg] [--device TEXT]
     python benchmarks/front.py --times [--runs 5] [--methods multires pyramid] [--device TEXT]
 
-The picture has gravel and tissue beside their samples, brick with its normal map carried over, and a hole in grass
-before and after; all of it at 1:1, with the default options and seed 1. ``--times`` runs ``simdtex synth`` as a
-process of its own for each method, on three colour samples of 128x128, for outputs of 256x256; it prints the user CPU
-seconds of the whole process and its wall seconds, least to most of the samples, each the median of the runs after the
-first. "start-up" is a process that makes one pixel.
+The picture has wood, tissue and stars below their samples, a photograph before and after a mast is removed, and a
+normal map of the wood, arranged like its texture; all of it at 1:1, with the default options and seed 1. ``--times``
+runs ``simdtex synth`` as a process of its own for each method, on three colour samples of 128x128, for outputs of
+256x256; it prints the user CPU seconds of the whole process and its wall seconds, least to most of the samples, each
+the median of the runs after the first. "start-up" is a process that makes one pixel.
 """
 
 import argparse
@@ -27,13 +27,12 @@ import PIL.ImageFont
 from skimage import data, filters
 
 import simdtex
-from simdtex.io.examples import example
 from simdtex.io.image import write
 from simdtex.model.source_map import apply_source_map
 
-SIDE = 156  # of a sample, pixels
+SIDE = 162  # of a sample, pixels
 SEED = 1  # of every picture
-GAP, TEXT = 12, 15  # between pictures, and the height of letters, pixels
+GAP, TEXT = 14, 15  # between pictures, and the height of letters, pixels
 METHODS = {
     "start-up": ["--size", "1x1", "--levels", "1", "--order", "1"],
     "mrf": [],
@@ -51,22 +50,20 @@ def normals(height, strength=0.06):
     return np.rint((across + 1) * 127.5).astype(np.uint8)
 
 
-def scribble(side):
-    """A hole as a thick stroke, in a square of that side."""
-    hole = PIL.Image.new("L", (side, side))
-    points = [(0.2, 0.3), (0.45, 0.2), (0.3, 0.55), (0.75, 0.4), (0.45, 0.8), (0.8, 0.75)]
-    path = [(x * side, y * side) for x, y in points]
-    pen = PIL.ImageDraw.Draw(hole)
-    pen.line(path, fill=255, width=max(3, side // 11), joint="curve")
-    return np.array(hole) > 0
+def mast(side):
+    """A photograph of that side, and the place of a mast in it."""
+    photo, hole = data.rocket()[60 : 60 + side, 190 : 190 + side], PIL.Image.new("L", (side, side))
+    outline = [(250, 52), (260, 52), (288, 322), (240, 322)]
+    PIL.ImageDraw.Draw(hole).polygon([(x * side // 324, y * side // 324) for x, y in outline], fill=255)
+    return photo, np.array(hole) > 0
 
 
 def samples(side):
-    """Gravel, tissue and brick, seen from the front."""
+    """Wood, tissue and stars."""
     return {
-        "gravel": data.gravel()[200 : 200 + side, 200 : 200 + side],
+        "wood": data.coffee()[400 - side * 4 // 5 :, 600 - side * 4 // 5 :],  # the rest is the saucer
         "tissue": data.immunohistochemistry()[300 : 300 + side, 290 - side + 128 : 418],
-        "brick": example("brick")[:side, :side],
+        "stars": data.hubble_deep_field()[346 : 346 + side, 166 : 166 + side],
     }
 
 
@@ -83,32 +80,28 @@ def placed(parts, size):
 
 
 def front(machine, side=SIDE):
-    """The picture: three samples above their results, and a row with a filled hole and a carried map."""
-    made, options = {}, {"device": machine, "full_output": True}
-    for name, sample in samples(side).items():
-        axis = -1 if sample.ndim == 3 else None
-        made[name] = simdtex.synthesize(sample, (2 * side, 2 * side), rng=SEED, channel_axis=axis, **options)
+    """The picture: three samples above their results, and a row with a removed mast and a map arranged alike."""
+    made, options = {}, {"device": machine, "full_output": True, "channel_axis": -1}
     given = samples(side)
-    relief = normals(-given["brick"].astype(float))
-    carried = apply_source_map(made["brick"][1].source, relief)
-    grass, hole = data.grass()[100 : 100 + 2 * side, 60 : 60 + 2 * side], scribble(2 * side)
-    filled = simdtex.fill(grass, hole, rng=SEED, device=machine)
+    for name, sample in given.items():
+        made[name] = simdtex.synthesize(sample, (2 * side, 2 * side), rng=SEED, **options)
+    relief = normals(given["wood"].mean(axis=2))
+    photo, hole = mast(2 * side)
+    filled = simdtex.fill(photo, hole, channel_axis=-1, rng=SEED, device=machine)
     wide, line = 2 * side + GAP, TEXT + 8
     results = line + side + GAP
     below = results + 2 * side + GAP
     parts = [
-        *((i * wide, line, given[name]) for i, name in enumerate(given)),
+        *((i * wide, line + side - len(given[name]), given[name]) for i, name in enumerate(given)),
         *((i * wide, results, made[name][0]) for i, name in enumerate(given)),
-        *((i * wide, 0, f"{name}: the sample") for i, name in enumerate(("gravel", "tissue"))),
-        (2 * wide, 0, "brick: the sample and its normal map"),
-        (2 * wide + side, line, relief),
-        *((i * wide + side + GAP, line + side - 3 * line, "below: more\nof it, without\na seam") for i in (0, 1)),
-        (0, below, "grass with a hole"),
-        (wide, below, "the hole filled"),
-        (2 * wide, below, "the normal map, carried along"),
-        (0, below + line, np.where(hole, np.uint8(255), grass)),
+        *((i * wide, 0, f"{name}: the sample") for i, name in enumerate(given)),
+        *((i * wide + side + GAP, line + side - 3 * line, "below: more\nof it, without\na seam") for i in range(3)),
+        (0, below, "a photograph"),
+        (wide, below, "the right mast removed"),
+        (2 * wide, below, "a normal map, arranged like the wood"),
+        (0, below + line, photo),
         (wide, below + line, filled),
-        (2 * wide, below + line, carried),
+        (2 * wide, below + line, apply_source_map(made["wood"][1].source, relief)),
     ]
     return placed(parts, (3 * wide - GAP, below + line + 2 * side))
 

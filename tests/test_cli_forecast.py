@@ -17,7 +17,7 @@ JOBS = {
     "pyramid": (["a.png", "--size", "64", "--method", "pyramid"], "64x64 from 24x20"),
     "tile": (["a.png", "--order", 2], "24x20 from 24x20, 2 levels"),
     "extend": (["a.png", "--size", "150%", "--order", 2], "36x30 from 24x20, 2 levels"),
-    "fill": (["a.png", "--mask", "hole.png", "--order", 2], "16 of 480 pixels filled"),
+    "fill": (["a.png", "--mask", "hole.png", "--order", 2], "16 of 480 pixels filled, 2 levels"),
     "mix": (["a.png", "b.png", "--size", "40x30"], "40x30 from 2 samples"),
     "solid": (["a.png", "--size", "16"], "16x16x16 from 24x20"),
     "simulate": (["a.png", "--known", "w.csv", "-n", 2, "--order", 2], "2 realisations of 24x20, 2 levels"),

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from skimage import data
 
 import simdtex
 from simdtex.io.examples import example
@@ -30,29 +29,28 @@ def test_a_slope_that_rises_to_the_right_faces_left(front):
     assert slope[0] < 128 and slope[1] == 128
 
 
-def test_the_hole_is_neither_empty_nor_the_whole(front):
-    assert 0.05 < front.scribble(312).mean() < 0.3
+def test_the_mast_is_in_the_hole(front):
+    photo, hole = front.mast(324)
+    assert photo.shape == (324, 324, 3) and 0.05 < hole.mean() < 0.3
+    assert photo[hole].max() > 50 + photo[:250, 200:235].max(), "it is lighter than the sky beside it"
 
 
 def test_samples_are_pieces_of_one_size(front):
-    given = front.samples(front.SIDE)
-    assert {sample.shape[:2] for sample in given.values()} == {(front.SIDE, front.SIDE)}
-    assert given["tissue"].shape[2] == 3
+    sides = {name: sample.shape for name, sample in front.samples(front.SIDE).items()}
+    assert sides == {"wood": (129, 129, 3), "tissue": (162, 162, 3), "stars": (162, 162, 3)}
 
 
 @pytest.mark.slow
 def test_the_picture_has_samples_results_and_the_hole(front, any_device):
-    side = 40
+    side = 100
     sheet = np.array(front.front(simdtex.open_machine(str(any_device.index)), side))
     line, wide = front.TEXT + 8, 2 * side + front.GAP
-    gravel = front.samples(side)["gravel"]
-    assert np.array_equal(sheet[line : line + side, :side, 0], gravel)
+    assert np.array_equal(sheet[line : line + side, wide : wide + side], front.samples(side)["tissue"])
     below = line + side + front.GAP + 2 * side + front.GAP + line
-    given, filled = (sheet[below : below + 2 * side, left : left + 2 * side, 0] for left in (0, wide))
-    hole, grass = front.scribble(2 * side), data.grass()[100 : 100 + 2 * side, 60 : 60 + 2 * side]
-    assert (given[hole] == 255).all()
-    assert np.array_equal(filled[~hole], grass[~hole])
-    assert (filled[hole] != 255).mean() > 0.9
+    given, filled = (sheet[below : below + 2 * side, left : left + 2 * side] for left in (0, wide))
+    photo, hole = front.mast(2 * side)
+    assert np.array_equal(given, photo) and np.array_equal(filled[~hole], photo[~hole])
+    assert (filled[hole] != photo[hole]).mean() > 0.9
 
 
 def test_the_picture_of_the_readme_is_light():

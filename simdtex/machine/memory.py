@@ -48,7 +48,10 @@ def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER)
 
 
 def require_host(wanted: int, remedy: str = SMALLER, of: int = 0) -> None:
-    """Raise DeviceError if ``wanted`` bytes, for the machine with the `id` ``of``, exceed the host's available memory."""
+    """Raise DeviceError if ``wanted`` bytes exceed the available memory of the host.
+
+    They are for the machine with the `id` ``of``, or for none.
+    """
     required["host", of] = max(wanted, required.get(("host", of), 0))
     there = available()
     if wanted > there:
