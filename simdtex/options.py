@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from importlib.util import find_spec
+from inspect import Parameter, signature
 from math import isfinite, prod
 from numbers import Integral, Real
 from textwrap import wrap
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 MOST = 2**31 - 1
 """The default maximum of an integer option, since kernels count in 32 bits."""
@@ -265,6 +267,33 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     values |= {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     values.pop("preset", None)
     return options(**values)
+
+
+def lists_options(job: str, *methods: Any, without: str = "") -> Callable[[F], F]:
+    """Return a decorator that lists the options of methods in a function's signature, in place of ``**options``.
+
+    ``methods`` are classes of options. An option has its default in the job, that of the first class which has it, and
+    the types of all; the option ``without`` is left out.
+    """
+    declared = [("preset", PRESET, "str")] * any(has_presets(table(one)) for one in methods)
+    declared += [(one.name, one.metadata["option"], str(one.type)) for each in methods for one in fields(each)]
+    found: dict[str, Parameter] = {}
+    for name, one, written in declared:
+        type_ = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, Choice) else written
+        first = found.setdefault(
+            name, Parameter(name, Parameter.KEYWORD_ONLY, default=one.default_of(job), annotation=type_)
+        )
+        if type_ not in first.annotation:
+            found[name] = first.replace(annotation=f"{first.annotation} | {type_}")
+    found.pop(without, None)
+
+    def decorate(function: F) -> F:
+        own = signature(function)
+        written = [one for one in own.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+        vars(function)["__signature__"] = own.replace(parameters=[*written, *found.values()])
+        return function
+
+    return decorate
 
 
 INDENTED: dict[str, Any] = {"initial_indent": " " * 8, "subsequent_indent": " " * 8, "break_on_hyphens": False}

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from importlib import import_module
-from inspect import Parameter, signature
 from pathlib import Path
 
 import click
@@ -13,6 +12,7 @@ import simdtex
 from simdtex.cli.job import Task, job
 from simdtex.methods.typed_options import Common
 from simdtex.options import (
+    PRESET,
     Choice,
     Number,
     Numbers,
@@ -22,19 +22,21 @@ from simdtex.options import (
     documented,
     has_presets,
     option,
+    quoted,
     resolve,
     table,
 )
+from simdtex.schedules import SCHEDULES
 
 FILE = Path(simdtex.__file__).with_name("methods") / "typed_options.py"
-SHARED = {*Common.__annotations__, "full_output"}
+OVERLOADED = {"full_output", "source"}
 
 TABLES = {
-    "MrfOptions": ("mrf", "Common"),
-    "MultiresOptions": ("multires", "Common"),
-    "PyramidOptions": ("pyramid", "Common"),
-    "SolidOptions": ("pyramid.solid", "PyramidOptions"),
-    "ClassifierOptions": ("classifier", "Common"),
+    "MrfOptions": ("mrf", "TypedDict"),
+    "MultiresOptions": ("multires", "TypedDict"),
+    "PyramidOptions": ("pyramid", "TypedDict"),
+    "SolidOptions": ("pyramid.solid", "Common, PyramidOptions"),
+    "ClassifierOptions": ("classifier", "TypedDict"),
 }
 """The method and the base of each class."""
 
@@ -48,7 +50,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, Literal, Required, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +60,11 @@ from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine
 from simdtex.run import Callback
 from simdtex.schedules import Schedule
+
+ScheduleName = Literal[
+    NAMES,
+]
+"""The names of schedules without a parameter."""
 
 
 class Common(TypedDict, total=False):
@@ -70,22 +77,34 @@ class Common(TypedDict, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 '''
 FUNCTIONS = {
-    "SynthOptions": (simdtex.synthesize, "MrfOptions, MultiresOptions, PyramidOptions"),
-    "FillOptions": (simdtex.fill, "MrfOptions"),
-    "ExtendOptions": (simdtex.extend, "MrfOptions"),
-    "MixOptions": (simdtex.mix, "PyramidOptions"),
-    "ClassifyOptions": (simdtex.classify, "ClassifierOptions"),
+    "MrfSynth": (simdtex.synthesize, "Common, MrfOptions"),
+    "MultiresSynth": (simdtex.synthesize, "Common, MultiresOptions"),
+    "PyramidSynth": (simdtex.synthesize, "Common, PyramidOptions"),
+    "FillOptions": (simdtex.fill, "Common, MrfOptions"),
+    "ExtendOptions": (simdtex.extend, "Common, MrfOptions"),
+    "SimulateOptions": (simdtex.simulate, "MrfOptions"),
+    "MixOptions": (simdtex.mix, "Common, PyramidOptions"),
+    "ClassifyOptions": (simdtex.classify, "Common, ClassifierOptions"),
 }
 """The functions that have further arguments, which are given by name, and the options that they take."""
 
 
+def words(valid):
+    return f"Literal[{', '.join(map(quoted, valid))}]"
+
+
 def type_of(one):
-    kinds = {Choice: "str", Whole: "int", Switch: "bool", Numbers: "tuple[float, ...] | list[float]"}
+    kinds = {Whole: "int", Switch: "bool", Numbers: "tuple[float, ...] | list[float]"}
     if isinstance(one.kind, Number):
         found = "float"
+    elif isinstance(one.kind, Choice):
+        found = words(one.kind.valid)
     elif isinstance(one.kind, Other):
-        says = one.kind.says.replace("simdtex.schedules.", "").replace("tuple of int", "tuple[int, ...]")
-        says = says.replace("two vectors", "tuple[tuple[float, float], tuple[float, float]]")
+        says = one.kind.says.replace("str or simdtex.schedules.", "ScheduleName | ").replace(
+            "tuple of int", "tuple[int, ...]"
+        )
+        vectors = f"{words(one.kind.valid)} | tuple[tuple[float, float], tuple[float, float]]"
+        says = says.replace("str or two vectors", vectors)
         found = says.replace("array", "ArrayLike").replace(" or ", " | ")
     else:
         found = kinds[type(one.kind)]
@@ -93,21 +112,26 @@ def type_of(one):
 
 
 def typed():
-    lines = [HEAD]
+    lines = [HEAD.replace("NAMES", ",\n    ".join(map(quoted, SCHEDULES)))]
     for name, (method, base) in TABLES.items():
         found = table(import_module(f"simdtex.methods.{method}").Options)
-        known = table(import_module("simdtex.methods.pyramid").Options) if base == "PyramidOptions" else {}
+        known = table(import_module("simdtex.methods.pyramid").Options) if "PyramidOptions" in base else {}
         lines += [f"\nclass {name}({base}, total=False):", f'    """The options of the method ``{method}``."""', ""]
-        lines += ["    preset: str"] if has_presets(found) and not known else []
+        lines += [f"    preset: {type_of(PRESET)}"] if has_presets(found) and not known else []
         lines += [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known] + [""]
     for name, (function, bases) in FUNCTIONS.items():
-        own = [one for one in signature(function).parameters.values() if one.kind is Parameter.KEYWORD_ONLY]
+        known = OVERLOADED | Common.__annotations__.keys() if "Common" in bases else OVERLOADED
+        own = {one: function.__annotations__[one] for one in function.__kwdefaults__ if one not in known}
+        if name == "MrfSynth":
+            own["method"] = words(["mrf"])
+        elif "method" in own:
+            own = {"method": f"Required[{words([name.removesuffix('Synth').lower()])}]"}
         lines += [
             f"\nclass {name}({bases}, total=False):",
             f'    """The options of `simdtex.{function.__name__}`."""',
             "",
         ]
-        lines += [f"    {one.name}: {one.annotation}" for one in own if one.name not in SHARED] + [""]
+        lines += [f"    {one}: {written}".replace("'", '"') for one, written in own.items()] + [""]
     return "\n".join(lines)
 
 

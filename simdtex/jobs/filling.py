@@ -24,8 +24,8 @@ from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, check_alike
-from simdtex.options import resolve, whole, within_32_bits
-from simdtex.run import Callback, Output
+from simdtex.options import lists_options, resolve, whole, within_32_bits
+from simdtex.run import Callback, Output, OutputWithSource
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -86,15 +86,12 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 @overload
 def fill(
     image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillOptions]
-) -> tuple[NDArray[Any], Output]: ...
-
-
+) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
 def fill(
     image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillOptions]
 ) -> NDArray[Any]: ...
-
-
+@lists_options("fill", Options)
 def fill(
     image: ArrayLike,
     mask: ArrayLike | None = None,
@@ -179,15 +176,12 @@ def fill(
 @overload
 def extend(
     image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendOptions]
-) -> tuple[NDArray[Any], Output]: ...
-
-
+) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
 def extend(
     image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendOptions]
 ) -> NDArray[Any]: ...
-
-
+@lists_options("extend", Options, without="boundary")
 def extend(
     image: ArrayLike,
     *,
@@ -195,7 +189,7 @@ def extend(
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
-    seamless: bool | str = False,
+    seamless: bool | Literal["x", "y"] = False,
     band: int | None = None,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
@@ -386,7 +380,7 @@ class Filling:
         statistics = {name: runs[0][name] for name in ("device", "seed", "options", "levels")}
         statistics |= {"seconds": sum(run["seconds"] for run in runs), "windows": runs}
         statistics["device_seconds"] = None if None in seconds else sum(seconds)
-        return whole.image, Output(whole.source, whole.temperature, [], statistics)
+        return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
         self, callback: Callback, whole: Whole, window: Window, around: Around, number: int, count: int, progress: Any

@@ -28,32 +28,37 @@ from simdtex.methods import mrf
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 from simdtex.model.soft import Soft
-from simdtex.options import require, resolve, whole, within_32_bits
+from simdtex.options import lists_options, require, resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import xarray
+
+    from simdtex.methods.typed_options import SimulateOptions
 
 AT_ONCE = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""
 
 
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[True], **options: Any) -> xarray.Dataset: ...
-
-
+def simulate(
+    training: ArrayLike, n: int, *, source: Literal[True], **options: Unpack[SimulateOptions]
+) -> xarray.Dataset: ...
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Any) -> xarray.DataArray: ...
-
-
+def simulate(
+    training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Unpack[SimulateOptions]
+) -> xarray.DataArray: ...
+@lists_options("simulate", mrf.Options)
 def simulate(
     training: ArrayLike,
     n: int,
     *,
     shape: tuple[int, ...] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
-    several: str = "refuse",
-    outside: str = "refuse",
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,

@@ -23,7 +23,7 @@ from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
-from simdtex.options import real, resolve, whole
+from simdtex.options import lists_options, real, resolve, whole
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 def mix(
     samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixOptions]
 ) -> tuple[NDArray[Any], Output]: ...
-
-
 @overload
 def mix(
     samples: Sequence[ArrayLike],
@@ -46,8 +44,7 @@ def mix(
     full_output: Literal[False] = ...,
     **options: Unpack[MixOptions],
 ) -> NDArray[Any]: ...
-
-
+@lists_options("mix", Options)
 def mix(
     samples: Sequence[ArrayLike],
     shape: tuple[int, int],
