@@ -270,27 +270,24 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
 
 
 def lists_options(job: str, *methods: Any, without: str = "") -> Callable[[F], F]:
-    """Return a decorator that lists the options of methods in a function's signature, in place of ``**options``.
+    """Return a decorator that lists options, but the one `without`, in a function's signature for ``**options``.
 
-    ``methods`` are classes of options. An option has its default in the job, that of the first class which has it, and
-    the types of all; the option ``without`` is left out.
+    ``methods`` are classes of options. An option has the default of the first class that has it, and the types of all.
     """
     declared = [("preset", PRESET, "str")] * any(has_presets(table(one)) for one in methods)
     declared += [(one.name, one.metadata["option"], str(one.type)) for each in methods for one in fields(each)]
     found: dict[str, Parameter] = {}
-    for name, one, written in declared:
-        type_ = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, Choice) else written
-        first = found.setdefault(
-            name, Parameter(name, Parameter.KEYWORD_ONLY, default=one.default_of(job), annotation=type_)
-        )
-        if type_ not in first.annotation:
-            found[name] = first.replace(annotation=f"{first.annotation} | {type_}")
+    for name, one, type_ in declared:
+        type_ = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, Choice) else type_
+        new = Parameter(name, Parameter.KEYWORD_ONLY, default=one.default_of(job), annotation=type_)
+        old = found.setdefault(name, new)
+        found[name] = old.replace(annotation=" | ".join(dict.fromkeys([old.annotation, type_])))
     found.pop(without, None)
 
     def decorate(function: F) -> F:
-        own = signature(function)
-        written = [one for one in own.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-        vars(function)["__signature__"] = own.replace(parameters=[*written, *found.values()])
+        written = signature(function)
+        own = [one for one in written.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+        vars(function)["__signature__"] = written.replace(parameters=[*own, *found.values()])
         return function
 
     return decorate

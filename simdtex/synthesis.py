@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from math import isqrt
 from operator import index
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,17 +24,13 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.mrf.replay import Replay
 from simdtex.methods.pyramid import solid
+from simdtex.methods.typed_options import MrfOptions, MrfSynth, MultiresSynth, PyramidSynth, SolidSynth
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.options import SMALLER, lists_options, one_of, real, resolve, unmasked, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output, OutputWithSource
-
-if TYPE_CHECKING:
-    from typing import Unpack
-
-    from simdtex.methods.typed_options import MrfOptions, MrfSynth, MultiresSynth, PyramidSynth, SolidOptions
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
@@ -185,15 +181,11 @@ def synthesize(
 
 @overload
 def synthesize_solid(
-    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SolidOptions]
+    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SolidSynth]
 ) -> tuple[NDArray[Any], Output]: ...
 @overload
 def synthesize_solid(
-    sample: ArrayLike,
-    shape: tuple[int, int, int],
-    *,
-    full_output: Literal[False] = ...,
-    **options: Unpack[SolidOptions],
+    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[False] = ..., **options: Unpack[SolidSynth]
 ) -> NDArray[Any]: ...
 @lists_options("solid", solid.Options)
 def synthesize_solid(
@@ -296,10 +288,8 @@ def explain(
         0 is the finest.
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
-    channel_axis, mask, known, known_source, guide, device
-        As in `synthesize`.
-    rng : int or numpy.random.Generator, optional
-        The seed of the run to explain.
+    channel_axis, mask, known, known_source, guide, rng, device
+        As in `synthesize`; give the seed of the run to explain.
     **options
         See `simdtex.methods.mrf.Options`.
 

@@ -307,14 +307,6 @@ def test_options_for_research_lead_to_a_page():
         assert "``--" in line and ":doc:" in line
 
 
-def test_signature_of_synthesize_is_the_documented_one():
-    page = (ROOT / "docs" / "reference" / "functions.rst").read_text(encoding="utf-8")
-    shown = re.search(r"autofunction:: synthesize\((.*)\)", page).group(1)
-    real = [str(p.replace(annotation=p.empty)) for p in inspect.signature(simdtex.synthesize).parameters.values()]
-    written, rest = shown.replace("*, ", "").replace('"', "'").split("**")
-    assert (", ".join(real).partition("preset")[0], rest) == (written, "options")
-
-
 def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
     """Except for options that only concern files and messages."""
     page = (ROOT / "docs" / "reference" / "functions.rst").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +19,11 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
 from simdtex.methods.classifier.options import Options
+from simdtex.methods.typed_options import ClassifierOptions, ClassifyOptions
 from simdtex.model.pictures import Mask, check_alike, completed
 from simdtex.options import lists_options, real_array, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
-
-if TYPE_CHECKING:
-    from typing import Self, Unpack
-
-    from simdtex.methods.typed_options import ClassifierOptions, ClassifyOptions
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 

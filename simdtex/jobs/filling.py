@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log2, prod
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,17 +20,13 @@ from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, few
+from simdtex.methods.typed_options import ExtendOptions, FillOptions
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, check_alike
 from simdtex.options import lists_options, resolve, whole, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource
-
-if TYPE_CHECKING:
-    from typing import Unpack
-
-    from simdtex.methods.typed_options import ExtendOptions, FillOptions
 
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""

@@ -12,7 +12,7 @@ from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,7 @@ from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.methods.typed_options import SimulateOptions
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 from simdtex.model.soft import Soft
@@ -32,11 +33,7 @@ from simdtex.options import lists_options, require, resolve, whole, within_32_bi
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
-    from typing import Unpack
-
     import xarray
-
-    from simdtex.methods.typed_options import SimulateOptions
 
 AT_ONCE = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""

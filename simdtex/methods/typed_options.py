@@ -20,17 +20,9 @@ from simdtex.run import Callback
 from simdtex.schedules import Schedule
 
 ScheduleName = Literal[
-    "coloring",
-    "coloring-fixed",
-    "luby",
-    "checkerboard",
-    "synchronous",
-    "random-subset",
-    "raster",
-    "random-scan",
-    "block",
-]
-"""The names of schedules without a parameter."""
+    "coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "raster", "random-scan",
+    "block"
+]  # fmt: skip
 
 
 class Common(TypedDict, total=False):
@@ -79,9 +71,10 @@ class MrfOptions(TypedDict, total=False):
     labels: bool | None
 
 
-class MultiresOptions(TypedDict, total=False):
+class MultiresSynth(Common, total=False):
     """The options of the method ``multires``."""
 
+    method: Required[Literal["multires"]]
     preset: Literal["default", "paper"]
     alpha: float
     beta: float
@@ -107,7 +100,13 @@ class PyramidOptions(TypedDict, total=False):
     orientations: int
 
 
-class SolidOptions(Common, PyramidOptions, total=False):
+class PyramidSynth(Common, PyramidOptions, total=False):
+    """The options of the method ``pyramid``."""
+
+    method: Required[Literal["pyramid"]]
+
+
+class SolidSynth(Common, PyramidOptions, total=False):
     """The options of the method ``pyramid.solid``."""
 
     solids: Literal["turns", "average"]
@@ -137,18 +136,6 @@ class MrfSynth(Common, MrfOptions, total=False):
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     known_source: ArrayLike | None
     guide: tuple[Any, Any] | None
-
-
-class MultiresSynth(Common, MultiresOptions, total=False):
-    """The options of `simdtex.synthesize`."""
-
-    method: Required[Literal["multires"]]
-
-
-class PyramidSynth(Common, PyramidOptions, total=False):
-    """The options of `simdtex.synthesize`."""
-
-    method: Required[Literal["pyramid"]]
 
 
 class FillOptions(Common, MrfOptions, total=False):
