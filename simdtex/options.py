@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from importlib.util import find_spec
+from inspect import Parameter, signature
 from math import isfinite, prod
 from numbers import Integral, Real
 from textwrap import wrap
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 MOST = 2**31 - 1
 """The default maximum of an integer option, since kernels count in 32 bits."""
@@ -265,6 +267,30 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     values |= {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     values.pop("preset", None)
     return options(**values)
+
+
+def lists_options(job: str, *methods: Any, without: str = "") -> Callable[[F], F]:
+    """Return a decorator that lists options, but the one `without`, in a function's signature for ``**options``.
+
+    ``methods`` are classes of options. An option has the default of the first class that has it, and the types of all.
+    """
+    declared = [("preset", PRESET, "str")] * any(has_presets(table(one)) for one in methods)
+    declared += [(one.name, one.metadata["option"], str(one.type)) for each in methods for one in fields(each)]
+    found: dict[str, Parameter] = {}
+    for name, one, type_ in declared:
+        type_ = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, Choice) else type_
+        new = Parameter(name, Parameter.KEYWORD_ONLY, default=one.default_of(job), annotation=type_)
+        old = found.setdefault(name, new)
+        found[name] = old.replace(annotation=" | ".join(dict.fromkeys([old.annotation, type_])))
+    found.pop(without, None)
+
+    def decorate(function: F) -> F:
+        written = signature(function)
+        own = [one for one in written.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+        vars(function)["__signature__"] = written.replace(parameters=[*own, *found.values()])
+        return function
+
+    return decorate
 
 
 INDENTED: dict[str, Any] = {"initial_indent": " " * 8, "subsequent_indent": " " * 8, "break_on_hyphens": False}

@@ -350,6 +350,13 @@ class Output:
         return as_html(self.made, self.source, self.statistics)
 
 
+@dataclass(frozen=True, repr=False)
+class OutputWithSource(Output):
+    """An `Output` whose ``source`` is an array: that of ``mrf`` and ``multires``."""
+
+    source: NDArray[Any]
+
+
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
     """Yield ranges (first, end) that cover first..count; the loop's body takes about 0.1 s for each.
 

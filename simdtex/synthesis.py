@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from math import isqrt
 from operator import index
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,47 +21,54 @@ from simdtex.io.hard_data import HardData
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf
+from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.mrf.replay import Replay
+from simdtex.methods.pyramid import solid
+from simdtex.methods.typed_options import MrfOptions, MrfSynth, MultiresSynth, PyramidSynth, SolidSynth
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
-from simdtex.options import SMALLER, one_of, real, resolve, unmasked, whole
+from simdtex.options import SMALLER, lists_options, one_of, real, resolve, unmasked, whole
 from simdtex.random import as_seed
-from simdtex.run import Callback, Output
-
-if TYPE_CHECKING:
-    from typing import Unpack
-
-    from simdtex.methods.typed_options import SolidOptions, SynthOptions
-
-GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
-"""The parameters of a synthesis, other than sample and shape, that ``check_inputs`` takes."""
+from simdtex.run import Callback, Output, OutputWithSource
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
 
 METHODS = ("mrf", "multires", "pyramid")
-"""The packages of `simdtex.methods` for synthesis; each is loaded at its first use."""
+"""The packages of `simdtex.methods` for synthesis; the algorithm of each is loaded at its first use."""
 
 
 @overload
 def synthesize(
-    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthOptions]
-) -> tuple[NDArray[Any], Output]: ...
-
-
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MrfSynth]
+) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
 def synthesize(
-    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthOptions]
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[MrfSynth]
 ) -> NDArray[Any]: ...
-
-
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MultiresSynth]
+) -> tuple[NDArray[Any], OutputWithSource]: ...
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[MultiresSynth]
+) -> NDArray[Any]: ...
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[PyramidSynth]
+) -> tuple[NDArray[Any], Output]: ...
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[PyramidSynth]
+) -> NDArray[Any]: ...
+@lists_options("synth", mrf.Options, multires.Options, pyramid.Options)
 def synthesize(
     sample: ArrayLike,
     shape: tuple[int, int],
     *,
-    method: str = "mrf",
+    method: Literal["mrf", "multires", "pyramid"] = "mrf",
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
@@ -115,7 +122,7 @@ def synthesize(
         run continues from it, to the same bytes. The file is removed when the function returns.
     **options
         Options of the method, and ``preset``: see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.Options` and
-        `simdtex.methods.pyramid.Options`.
+        `simdtex.methods.pyramid.Options`. The signature shows the defaults of ``mrf`` where methods share a name.
 
     Returns
     -------
@@ -174,20 +181,13 @@ def synthesize(
 
 @overload
 def synthesize_solid(
-    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SolidOptions]
+    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SolidSynth]
 ) -> tuple[NDArray[Any], Output]: ...
-
-
 @overload
 def synthesize_solid(
-    sample: ArrayLike,
-    shape: tuple[int, int, int],
-    *,
-    full_output: Literal[False] = ...,
-    **options: Unpack[SolidOptions],
+    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[False] = ..., **options: Unpack[SolidSynth]
 ) -> NDArray[Any]: ...
-
-
+@lists_options("solid", solid.Options)
 def synthesize_solid(
     sample: ArrayLike,
     shape: tuple[int, int, int],
@@ -248,8 +248,6 @@ def synthesize_solid(
     >>> block.shape
     (16, 24, 32)
     """
-    from simdtex.methods.pyramid import solid
-
     pixels = check_sample(sample, channel_axis)
     size: Any = check_sides(shape, ("depth", "rows", "columns"))
     chosen = resolve(solid.Options, "solid", options)
@@ -258,6 +256,7 @@ def synthesize_solid(
     return execute("synthesize_solid", run, lambda: inputs, axis, rng, device, callback, full_output, checkpoint)
 
 
+@lists_options("synth", mrf.Options)
 def explain(
     sample: ArrayLike,
     shape: tuple[int, int],
@@ -265,9 +264,14 @@ def explain(
     *,
     level: int = 0,
     sweep: int | None = None,
+    channel_axis: int | None = None,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
-    **arguments: Any,
+    **options: Unpack[MrfOptions],
 ) -> Explanation:
     """Return an explanation of why a site takes its candidate, in a synthesis by the method ``mrf``.
 
@@ -284,11 +288,10 @@ def explain(
         0 is the finest.
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
-    rng, device
+    channel_axis, mask, known, known_source, guide, rng, device
         As in `synthesize`; give the seed of the run to explain.
-    **arguments
-        ``channel_axis``, ``mask``, ``known``, ``known_source`` and ``guide`` as in `synthesize`, and the options of
-        `simdtex.methods.mrf.Options`.
+    **options
+        See `simdtex.methods.mrf.Options`.
 
     Returns
     -------
@@ -320,22 +323,30 @@ def explain(
         row, col = map(index, site)
     except (TypeError, ValueError):
         raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
-    return replay(sample, shape, rng=rng, device=device, **arguments).explain((row, col), level, sweep)
+    given: Any = {"channel_axis": channel_axis, "mask": mask, "known": known, "known_source": known_source}
+    given |= {"guide": guide, "rng": rng, "device": device}
+    return replay(sample, shape, **given, **options).explain((row, col), level, sweep)
 
 
+@lists_options("synth", mrf.Options)
 def replay(
     sample: ArrayLike,
     shape: tuple[int, int],
     *,
+    channel_axis: int | None = None,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
-    **arguments: Any,
+    **options: Unpack[MrfOptions],
 ) -> Replay:
     """Return a replay of a synthesis by the method ``mrf``, with its field after any set of sites that relax together.
 
     Parameters
     ----------
-    sample, shape, rng, device, **arguments
+    sample, shape, channel_axis, mask, known, known_source, guide, rng, device, **options
         As in `explain`.
 
     Returns
@@ -363,9 +374,8 @@ def replay(
     (32, 32, 1)
     """
     size = check_shape(shape)
-    given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
-    inputs = check_inputs(sample, size, **given)
-    chosen: Any = resolve(mrf.Options, "synth", arguments)
+    inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
+    chosen: Any = resolve(mrf.Options, "synth", options)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     return Replay(plan, open_machine(device), as_seed(rng))
 
@@ -375,12 +385,12 @@ def lcpdf(
     sample: ArrayLike,
     sites: ArrayLike,
     *,
-    order: int,
+    order: int = mrf.Options.order,
     bandwidth: float = 1.0,
     temperature: ArrayLike | None = None,
     greys: int = 256,
-    estimator: str = "parzen",
-    boundary: str = "torus",
+    estimator: Literal["parzen", "histogram"] = "parzen",
+    boundary: Literal["torus", "open"] = "torus",
     device: str | Machine | None = None,
 ) -> NDArray[np.float64]:
     """Return the local conditional probability density function of a nonparametric MRF.
@@ -394,7 +404,7 @@ def lcpdf(
     sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int
-        The order o of the neighbourhood, equation (3).
+        The order o of the neighbourhood, equation (3); by default that of `synthesize`.
     bandwidth : float
         h in units of h_opt, equation (8). 1.0 is the paper's.
     temperature : (rows, cols) array, 0 to 1, optional

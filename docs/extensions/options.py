@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The options of commands and methods as reStructuredText, from where they are declared.
 
+A function's signature has ``**options`` in place of them.
+
 ``.. command-options:: synth`` lists the options of ``simdtex synth``. A definition list below it adds to some of them
 what a page has to say beside their help::
 
@@ -10,6 +12,7 @@ what a page has to say beside their help::
 
 import re
 from importlib import import_module
+from inspect import isfunction
 from textwrap import dedent, indent
 
 import click
@@ -59,6 +62,12 @@ def paper_values(method):
     return rows
 
 
+def as_written(app, function, bound):
+    """Leave the signature as it is written: `inspect` shows all options, which have tables of their own here."""
+    if isfunction(function):
+        vars(function).pop("__signature__", None)
+
+
 def setup(app):
     from docutils import nodes
     from docutils.parsers.rst import Directive
@@ -76,6 +85,7 @@ def setup(app):
             self.state.nested_parse(written, self.content_offset, node)
             return node.children
 
+    app.connect("autodoc-before-process-signature", as_written)
     for name, write in (("command-options", command_options), ("paper-values", paper_values)):
         app.add_directive(name, type(name, (Listing,), {"write": staticmethod(write)}))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

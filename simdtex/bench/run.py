@@ -162,6 +162,6 @@ def once(machine: Machine, case: Case) -> tuple[float, float]:
     if case.method == "solid":
         _, output = simdtex.synthesize_solid(sample, (case.output,) * 3, **given)
     else:
-        given |= {"order": case.order, "search": case.search} if case.order else {}
-        _, output = simdtex.synthesize(sample, (case.output, case.output), method=case.method, **given)
+        given |= {"method": case.method, **({"order": case.order, "search": case.search} if case.order else {})}
+        _, output = simdtex.synthesize(sample, (case.output, case.output), **given)
     return perf_counter() - began, output.statistics["device_seconds"] or 0.0

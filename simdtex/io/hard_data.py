@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from math import isnan, prod
 from operator import index
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -295,8 +295,8 @@ def place_hard_data(
     *,
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
-    several: str = "refuse",
-    outside: str = "refuse",
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
 ) -> np.ma.MaskedArray:
     """Return known values placed in the cells of a grid, or in the pixels of a picture.
 

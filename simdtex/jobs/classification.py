@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +19,11 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
 from simdtex.methods.classifier.options import Options
+from simdtex.methods.typed_options import ClassifierOptions, ClassifyOptions
 from simdtex.model.pictures import Mask, check_alike, completed
-from simdtex.options import real_array, resolve, table
+from simdtex.options import lists_options, real_array, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
-
-if TYPE_CHECKING:
-    from typing import Self, Unpack
-
-    from simdtex.methods.typed_options import ClassifyOptions
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
@@ -36,8 +32,6 @@ Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 def classify(
     image: ArrayLike, textures: Textures | ArrayLike, *, full_output: Literal[True], **options: Unpack[ClassifyOptions]
 ) -> tuple[NDArray[np.uint8], Output]: ...
-
-
 @overload
 def classify(
     image: ArrayLike,
@@ -46,8 +40,7 @@ def classify(
     full_output: Literal[False] = ...,
     **options: Unpack[ClassifyOptions],
 ) -> NDArray[np.uint8]: ...
-
-
+@lists_options("classify", Options)
 def classify(
     image: ArrayLike,
     textures: Textures | ArrayLike,
@@ -253,16 +246,17 @@ class TextureClassifier:
 
     _machine: Machine | None = None
 
+    @lists_options("classify", Options)
     def __init__(
         self,
         *,
         channel_axis: int | None = None,
         rng: int | np.random.Generator | None = 0,
         device: str | Machine | None = None,
-        **options: Any,
+        **options: Unpack[ClassifierOptions],
     ) -> None:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
-        self.set_params(**vars(resolve(Options, "classify", {})) | options)
+        self.set_params(**{**vars(resolve(Options, "classify", {})), **options})
 
     def __getstate__(self) -> dict[str, Any]:
         device: Any = self.device

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,8 +35,8 @@ def estimate(
     *,
     known: ArrayLike | HardData | str | os.PathLike[str],
     shape: tuple[int, int] | None = None,
-    several: str = "refuse",
-    outside: str = "refuse",
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     mask: ArrayLike | None = None,

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log2, prod
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,17 +20,13 @@ from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, few
+from simdtex.methods.typed_options import ExtendOptions, FillOptions
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, check_alike
-from simdtex.options import resolve, whole, within_32_bits
-from simdtex.run import Callback, Output
-
-if TYPE_CHECKING:
-    from typing import Unpack
-
-    from simdtex.methods.typed_options import ExtendOptions, FillOptions
+from simdtex.options import lists_options, resolve, whole, within_32_bits
+from simdtex.run import Callback, Output, OutputWithSource
 
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""
@@ -86,15 +82,12 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 @overload
 def fill(
     image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillOptions]
-) -> tuple[NDArray[Any], Output]: ...
-
-
+) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
 def fill(
     image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillOptions]
 ) -> NDArray[Any]: ...
-
-
+@lists_options("fill", Options)
 def fill(
     image: ArrayLike,
     mask: ArrayLike | None = None,
@@ -179,15 +172,12 @@ def fill(
 @overload
 def extend(
     image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendOptions]
-) -> tuple[NDArray[Any], Output]: ...
-
-
+) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
 def extend(
     image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendOptions]
 ) -> NDArray[Any]: ...
-
-
+@lists_options("extend", Options, without="boundary")
 def extend(
     image: ArrayLike,
     *,
@@ -195,7 +185,7 @@ def extend(
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
-    seamless: bool | str = False,
+    seamless: bool | Literal["x", "y"] = False,
     band: int | None = None,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
@@ -386,7 +376,7 @@ class Filling:
         statistics = {name: runs[0][name] for name in ("device", "seed", "options", "levels")}
         statistics |= {"seconds": sum(run["seconds"] for run in runs), "windows": runs}
         statistics["device_seconds"] = None if None in seconds else sum(seconds)
-        return whole.image, Output(whole.source, whole.temperature, [], statistics)
+        return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
         self, callback: Callback, whole: Whole, window: Window, around: Around, number: int, count: int, progress: Any

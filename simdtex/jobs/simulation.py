@@ -12,7 +12,7 @@ from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,10 +25,11 @@ from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.methods.typed_options import SimulateOptions
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 from simdtex.model.soft import Soft
-from simdtex.options import require, resolve, whole, within_32_bits
+from simdtex.options import lists_options, require, resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
@@ -39,21 +40,22 @@ AT_ONCE = 4
 
 
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[True], **options: Any) -> xarray.Dataset: ...
-
-
+def simulate(
+    training: ArrayLike, n: int, *, source: Literal[True], **options: Unpack[SimulateOptions]
+) -> xarray.Dataset: ...
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Any) -> xarray.DataArray: ...
-
-
+def simulate(
+    training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Unpack[SimulateOptions]
+) -> xarray.DataArray: ...
+@lists_options("simulate", mrf.Options)
 def simulate(
     training: ArrayLike,
     n: int,
     *,
     shape: tuple[int, ...] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
-    several: str = "refuse",
-    outside: str = "refuse",
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
     origin: Sequence[float] | None = None,
     cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,

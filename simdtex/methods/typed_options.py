@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, Literal, Required, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,11 @@ from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine
 from simdtex.run import Callback
 from simdtex.schedules import Schedule
+
+ScheduleName = Literal[
+    "coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "raster", "random-scan",
+    "block"
+]  # fmt: skip
 
 
 class Common(TypedDict, total=False):
@@ -30,31 +35,31 @@ class Common(TypedDict, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 
-class MrfOptions(Common, total=False):
+class MrfOptions(TypedDict, total=False):
     """The options of the method ``mrf``."""
 
-    preset: str
+    preset: Literal["default", "paper"]
     order: int
     structure: float
-    lattice: str | tuple[tuple[float, float], tuple[float, float]]
+    lattice: Literal["auto", "none"] | tuple[tuple[float, float], tuple[float, float]]
     coherence: float
     balance: float
     novelty: float
     finish: float | None
     overview: int
     levels: int | None
-    boundary: str
-    edges: str
-    phases: str
-    search: str
+    boundary: Literal["torus", "open"]
+    edges: Literal["auto", "reflect", "whole"]
+    phases: Literal["all", "decimated"]
+    search: Literal["auto", "exact", "coherent"]
     chance: int
     coarse_chance: int
-    relaxation: str
+    relaxation: Literal["icm", "gibbs"]
     bandwidth: float
     xi: float
     free_sweeps: int
-    pixel: str
-    schedule: str | Schedule
+    pixel: Literal["source", "density"]
+    schedule: ScheduleName | Schedule
     array: str | None
     categorical: bool | tuple[int, ...]
     weights: tuple[float, ...] | list[float] | None
@@ -66,42 +71,49 @@ class MrfOptions(Common, total=False):
     labels: bool | None
 
 
-class MultiresOptions(Common, total=False):
+class MultiresSynth(Common, total=False):
     """The options of the method ``multires``."""
 
-    preset: str
+    method: Required[Literal["multires"]]
+    preset: Literal["default", "paper"]
     alpha: float
     beta: float
-    seams: str
-    parity: str
+    seams: Literal["blend", "cut"]
+    parity: Literal["match", "free"]
     levels: int | None
-    boundary: str
-    edges: str
+    boundary: Literal["torus", "open"]
+    edges: Literal["mend", "keep"]
     orientations: int
 
 
-class PyramidOptions(Common, total=False):
+class PyramidOptions(TypedDict, total=False):
     """The options of the method ``pyramid``."""
 
-    preset: str
-    pyramid: str
+    preset: Literal["default", "paper"]
+    pyramid: Literal["steerable", "laplacian"]
     iterations: int
-    match: str
-    color: str
+    match: Literal["rank", "lookup"]
+    color: Literal["decorrelate", "channels"]
     start: ArrayLike | None
     levels: int | None
-    edges: str
+    edges: Literal["reflect", "wrap"]
     orientations: int
 
 
-class SolidOptions(PyramidOptions, total=False):
+class PyramidSynth(Common, PyramidOptions, total=False):
+    """The options of the method ``pyramid``."""
+
+    method: Required[Literal["pyramid"]]
+
+
+class SolidSynth(Common, PyramidOptions, total=False):
     """The options of the method ``pyramid.solid``."""
 
-    solids: str
-    slices: str
+    solids: Literal["turns", "average"]
+    slices: Literal["each", "together"]
 
 
-class ClassifierOptions(Common, total=False):
+class ClassifierOptions(TypedDict, total=False):
     """The options of the method ``classifier``."""
 
     order: int
@@ -111,22 +123,22 @@ class ClassifierOptions(Common, total=False):
     coupling: float
     weight: float
     sweeps: int
-    schedule: str | Schedule
+    schedule: ScheduleName | Schedule
     unknown: float
     window: float
 
 
-class SynthOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
+class MrfSynth(Common, MrfOptions, total=False):
     """The options of `simdtex.synthesize`."""
 
-    method: str
+    method: Literal["mrf"]
     mask: ArrayLike | Sequence[ArrayLike] | None
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     known_source: ArrayLike | None
     guide: tuple[Any, Any] | None
 
 
-class FillOptions(MrfOptions, total=False):
+class FillOptions(Common, MrfOptions, total=False):
     """The options of `simdtex.fill`."""
 
     sample: ArrayLike | None
@@ -135,18 +147,43 @@ class FillOptions(MrfOptions, total=False):
     feather: int
 
 
-class ExtendOptions(MrfOptions, total=False):
+class ExtendOptions(Common, MrfOptions, total=False):
     """The options of `simdtex.extend`."""
 
     top: int
     bottom: int
     left: int
     right: int
-    seamless: bool | str
+    seamless: bool | Literal["x", "y"]
     band: int | None
 
 
-class MixOptions(PyramidOptions, total=False):
+class SimulateOptions(MrfOptions, total=False):
+    """The options of `simdtex.simulate`."""
+
+    shape: tuple[int, ...] | None
+    known: ArrayLike | HardData | str | os.PathLike[str] | None
+    several: Literal["refuse", "mean", "most"]
+    outside: Literal["refuse", "skip"]
+    origin: Sequence[float] | None
+    cell: Sequence[float] | None
+    guide: tuple[Any, Any] | None
+    mask: ArrayLike | None
+    region: ArrayLike | None
+    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None
+    image_map: ArrayLike | None
+    rotation: ArrayLike | None
+    scale: ArrayLike | None
+    first: int
+    jobs: int | None
+    channel_axis: int | None
+    rng: int | np.random.Generator | None
+    device: str | None
+    callback: Callback | None
+    checkpoint: str | os.PathLike[str] | Checkpoint | None
+
+
+class MixOptions(Common, PyramidOptions, total=False):
     """The options of `simdtex.mix`."""
 
     palette: int | None
@@ -157,7 +194,7 @@ class MixOptions(PyramidOptions, total=False):
     split: int | None
 
 
-class ClassifyOptions(ClassifierOptions, total=False):
+class ClassifyOptions(Common, ClassifierOptions, total=False):
     """The options of `simdtex.classify`."""
 
     masks: Mapping[str, Any] | None

@@ -275,6 +275,7 @@ class Options:
         Other(schedules.get, "str or simdtex.schedules.Schedule", valid=tuple(schedules.SCHEDULES)),
         "Relax sites by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
         "random-subset[:P], raster, random-scan or block[:ROWSxCOLS]",
+        more='Type checkers require ``simdtex.schedules.get("block:8x8")`` for a name with a parameter.',
         symbol="equation (14)",
     )
     array: str | None = parallel(

@@ -21,7 +21,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.use import effective_use
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Listed, most_listed
-from simdtex.run import Callback, Output, Relaxing, Stage
+from simdtex.run import Callback, OutputWithSource, Relaxing, Stage
 
 STEP, LISTED = 200_000, 16
 """What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
@@ -167,7 +167,7 @@ class Record:
             self.account.total.update(saved["account"])
 
 
-def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> Output:
+def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> OutputWithSource:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
     place, t = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
     statistics = known_before(run) | {"levels": record.reports, "use": None}
@@ -180,7 +180,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
     given = run.plan.given
     if given and given.place is not None:
         place = np.where(given.data[..., None], given.place, place)
-    return Output(place, t / 1024, record.stages, statistics)
+    return OutputWithSource(place, t / 1024, record.stages, statistics)
 
 
 def known_before(run: Lattices) -> dict[str, Any]:

@@ -33,7 +33,7 @@ from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, candidates
 from simdtex.ops.laplacian import laplacian_collapse
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Output, Sampling, Stage, paced
+from simdtex.run import Callback, Output, OutputWithSource, Sampling, Stage, paced
 
 VALUES = 4
 """The most values per output pixel that kernels index: two counts, with all levels together."""
@@ -170,7 +170,7 @@ class Run:
             "levels": observer.reports,
             "use": effective_use(finest.source, self.analysis.shapes[0]).as_dict(),
         }
-        return finest.image, Output(finest.source, None, observer.stages, statistics)
+        return finest.image, OutputWithSource(finest.source, None, observer.stages, statistics)
 
     def save(self, state: State) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,22 +22,16 @@ from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, his
 from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
+from simdtex.methods.typed_options import MixOptions
 from simdtex.model.stretched import Stretched
-from simdtex.options import real, resolve, whole
+from simdtex.options import lists_options, real, resolve, whole
 from simdtex.run import Callback, Output
-
-if TYPE_CHECKING:
-    from typing import Unpack
-
-    from simdtex.methods.typed_options import MixOptions
 
 
 @overload
 def mix(
     samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixOptions]
 ) -> tuple[NDArray[Any], Output]: ...
-
-
 @overload
 def mix(
     samples: Sequence[ArrayLike],
@@ -46,8 +40,7 @@ def mix(
     full_output: Literal[False] = ...,
     **options: Unpack[MixOptions],
 ) -> NDArray[Any]: ...
-
-
+@lists_options("mix", Options)
 def mix(
     samples: Sequence[ArrayLike],
     shape: tuple[int, int],
