@@ -143,6 +143,7 @@ simdtex.replay(sample, size, relaxation="icn")  # wrong
 """
 
 
+@pytest.mark.slow
 def test_type_checkers_find_wrong_uses(tmp_path):
     (tmp_path / "uses.py").write_text(USES)
     command = [sys.executable, "-m", "mypy", "--strict", tmp_path / "uses.py"]
