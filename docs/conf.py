@@ -65,14 +65,3 @@ for study in ("mrf", "exact", "multires", "pyramid"):
         caption = picture.stem.removeprefix(f"{study}-")
         results.append(f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {caption}\n")
     (HERE / "generated" / f"study-{study}.txt").write_text("\n".join(results), encoding="utf-8")
-
-# The first page shows the comparison of README.md: its table, and the notes below it.
-readme = (HERE.parent / "README.md").read_text(encoding="utf-8")
-part = re.search(r"^## Comparison.*?\n\n(.*?)^## ", readme, re.MULTILINE | re.DOTALL)[1]
-part = re.sub(r"`([^`]+)`", r"``\1``", part)
-part = re.sub(r"\[([^]]+)\]\(docs/([^)]+)\.rst\)", r":doc:`\1 </\2>`", part)
-rows = [re.split(r" *\| *", line.strip("| ")) for line in part.splitlines() if line.startswith("| ")]
-lines = [".. list-table::", "   :header-rows: 1", ""]
-lines += [f"   {'  -' if column else '* -'} {text}" for row in rows for column, text in enumerate(row)]
-notes = [line for line in part.splitlines() if not line.startswith("|")]
-(HERE / "generated" / "comparison.txt").write_text("\n".join([*lines, *notes]) + "\n", encoding="utf-8")

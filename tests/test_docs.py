@@ -141,15 +141,15 @@ def quick(line):
     """The words of a command that makes a small thing soon."""
     words = shlex.split(small(line))
     words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
-    words += ["--order", "8"] if {"fill", "extend"} & set(words) else []
-    words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
+    words += ["--order", "8"] if {"fill", "extend", "tile"} & set(words) else []
+    words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # there is not more room on so small a picture
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
     return words + (["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else [])
 
 
 def check_outputs(words, folder):
     """What the words say is written is there."""
-    if {"synth", "fill", "extend", "simulate", "solid", "mix"} & set(words):
+    if {"synth", "fill", "extend", "tile", "simulate", "solid", "mix"} & set(words):
         outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
         outputs += [word.partition("=")[2] for word in words if "=" in word]
         made = "--dry-run" not in words
