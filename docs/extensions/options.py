@@ -18,6 +18,7 @@ from textwrap import dedent, indent
 import click
 
 from simdtex.cli import load
+from simdtex.cli.command import entries_of
 from simdtex.options import UNSET, quoted, table
 
 
@@ -39,7 +40,10 @@ def command_options(name, lines=()):
         context = click.Context(load(name))
         value = "" if one.is_flag else f" {one.make_metavar(context)}"
         names = ", ".join(f"{flag}{value}" for flag in (*one.opts, *one.secondary_opts))
-        text = re.sub(r"  \[(?:default: )?(.*?)\]", r" Default: \1.", one.get_help_record(context)[1])
+        entries = [(title, text) for title, (_, text) in entries_of(one, context)]
+        of_methods = [f"{title.split()[1]} {text}" for title, text in entries if title.startswith("Method ")]
+        text = "\n".join(f"- {text}" for text in of_methods) if of_methods else entries[0][1]
+        text = re.sub(r"  \[(?:default: )?(.*?)\]", r" Default: \1.", text)
         text = re.sub(
             r"(?<=[\s.])(--[\w-]+)", r"``\1``", text.replace("Default: required.", "Required.").replace("`", "``")
         )
