@@ -176,7 +176,7 @@ def simulate(
     {'realisation': 2, 'y': 32, 'x': 40}
     """
     require("simulate", "xarray")
-    import xarray as xr
+    from simdtex.model.plotted import Realisations, Results, described
 
     whole("n", n, 1)
     whole("first", first, 0)
@@ -273,15 +273,14 @@ def simulate(
     if inputs.given and inputs.given.outside is not None:
         coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
         attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
-    attributes |= sides_of_cells
-    result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+    attributes |= sides_of_cells | described(training)
+    result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
     names = (*(("layer",) if axes > 2 else ()), "row", "column", "image")
     lattice = dims[: 1 + axes]
     places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
-    both: xarray.Dataset = xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
-    return both
+    return Results({"simulation": result, **places}, attrs=attributes)
 
 
 def check_several(several: str, known: Any, pictures: Pictures) -> None:
