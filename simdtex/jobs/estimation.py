@@ -75,6 +75,7 @@ def estimate(
         Dimensions ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the variables
         ``probability`` (category, y, x), float64, which adds up to 1, and ``entropy`` (y, x) in bits; else ``mean`` and
         ``variance`` (y, x) in the units of the training image. A cell with a datum has its value with certainty.
+        ``plot()`` draws the maps.
 
     Raises
     ------

@@ -146,8 +146,9 @@ def simulate(
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
         with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
-        ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
-        unless values are floats, the attribute ``missing``.
+        ``to_netcdf`` and ``to_zarr`` of xarray write them; ``units`` and ``long_name`` are those of a training image of
+        xarray. With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute
+        ``missing``. ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
         With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
         x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume

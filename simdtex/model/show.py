@@ -84,8 +84,9 @@ def show(
     >>> import simdtex
     >>> simdtex.show(data.brick()[:64, :64], titles=["brick"]).savefig("brick.png")
     """
-    if len(pictures) == 1 and hasattr(pictures[0], "coords"):
-        return draw(pictures[0])
+    made: Any = pictures[0] if len(pictures) == 1 else None
+    if hasattr(made, "data_vars") or "realisation" in getattr(made, "coords", ()):
+        return draw(made)
     if not pictures or len(titles or pictures) != len(pictures):
         raise ValueError(
             f"there are {len(pictures)} pictures and {len(titles)} titles; give pictures, and as many titles"
@@ -133,9 +134,9 @@ def draw(made: Any, number: int = 8) -> Figure:
     if "variance" in maps:
         both = [made[name] for name in ("mean", "variance")]
         return _figure(made, [_label(one) for one in both], [one.values for one in both], [{}, {}])[0]
-    if "realisation" in made.coords and {"y", "x"} <= set(getattr(made, "dims", ())):
+    if "realisation" in made.coords and not maps and {"y", "x"} <= set(made.dims):
         return _realisations(made, number)
-    raise ValueError("these are no realisations and no estimate; draw them by plot.imshow of xarray")
+    raise ValueError("there are no realisations and no estimate to draw; use plot.imshow of xarray")
 
 
 def _realisations(made: Any, number: int) -> Figure:
