@@ -21,6 +21,7 @@ from simdtex.io.image import Image, Metadata, read, write
 from simdtex.machine.devices import DeviceInfo
 from simdtex.model.colours import category_colours
 from simdtex.report.sheet import GAP, STRIP
+from simdtex.report.volumes import write_volumes
 from simdtex.run import Progress, Stage
 
 BRICK = data.brick()[:40, :60]
@@ -121,6 +122,11 @@ def test_maps_have_north_up_in_plots_and_reports_and_pictures_their_first_row(tm
     sheet = read("page/realisations.png").pixels[GAP + STRIP :, GAP : GAP + 20]
     inside = sheet[: int(np.flatnonzero((sheet == 255).all((1, 2)))[0])]
     assert (inside[0] == first).all() and (inside[-1] == last).all()
+    column = read("page/maps.png").pixels[:, 150].tolist()  # of viridis: yellow where all realisations have 7
+    assert (column.index([253, 231, 36]) < column.index([68, 1, 84])) == ground
+    cube = np.indices((4, 5, 6))[1]
+    write_volumes("cube", cube, cube[None], False, upward=ground)
+    assert (read("cube/slices.png").pixels[GAP + STRIP, GAP] == (255 if ground else 0)).all()
     options = {"origin": (5, 5), "cell": (10, 10)} if ground else {}
     figure = simdtex.simulate(HALVES, 1, known=known, categorical=True, **OPTIONS, **options).plot()
     assert figure.axes[-1].get_yticklabels()[0].get_text().startswith("3: ")
