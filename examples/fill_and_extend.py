@@ -18,7 +18,6 @@ from skimage import data, draw
 
 import simdtex
 from simdtex.io.image import write
-from simdtex.report.sheet import contact_sheet
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
@@ -44,13 +43,8 @@ write(folder / "filled.png", filled)
 write(folder / "wider.png", wider)
 write(folder / "tile.png", tile)
 shown = np.where(hole, 255, gravel).astype(np.uint8)
-contact_sheet(
-    [("holes", shown), ("filled", filled), ("continued to the right", wider)],
-    folder / "sheet.png",
-    columns=3,
-)
-twice = [
-    (label, np.tile(picture, (2, 2))) for label, picture in (("as it is, 2 x 2", gravel), ("seamless, 2 x 2", tile))
-]
-contact_sheet(twice, folder / "tile-sheet.png", columns=2)
+sheet = simdtex.show(shown, filled, wider, titles=["holes", "filled", "continued to the right"])
+sheet.savefig(folder / "sheet.png")
+sheet = simdtex.show(gravel, tile, titles=["as it is, 3 x 3", "seamless, 3 x 3"], tiled=True)
+sheet.savefig(folder / "tile-sheet.png")
 print(f"filled.png, wider.png, tile.png and two sheets are in {folder}")

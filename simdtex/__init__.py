@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from simdtex.machine.devices import DeviceError as DeviceError
     from simdtex.machine.devices import devices as devices
     from simdtex.methods.pyramid.mixtures import mix as mix
+    from simdtex.model.show import show as show
     from simdtex.run import Output as Output
     from simdtex.run import Progress as Progress
     from simdtex.synthesis import explain as explain
@@ -47,6 +48,7 @@ _NAMES = {
     "simdtex.machine": ("open_machine",),
     "simdtex.machine.devices": ("DeviceError", "devices"),
     "simdtex.methods.pyramid.mixtures": ("mix",),
+    "simdtex.model.show": ("show",),
     "simdtex.run": ("Output", "Progress"),
     "simdtex.synthesis": ("explain", "lcpdf", "replay", "synthesize", "synthesize_solid"),
 }

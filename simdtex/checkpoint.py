@@ -106,6 +106,9 @@ class Checkpoint:
         self._about: dict[str, Any] = {}
         self._next = time.perf_counter() + (FIRST if every is None else every)
 
+    def __repr__(self) -> str:
+        return f"Checkpoint({str(self.path)!r})"
+
     def stop(self) -> None:
         """Write the state after the current step, and raise KeyboardInterrupt there.
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.io.brief import Brief
 from simdtex.model.explanation import Explanation
 
 
-@dataclass(frozen=True, kw_only=True)
-class Progress:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Progress(Brief):
     """The progress of a run; a callback receives it several times a second.
 
     Attributes
@@ -56,7 +57,7 @@ class Progress:
         return {}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Relaxing(Progress):
     """The progress of the method ``mrf``, after every part of a step.
 
@@ -106,7 +107,7 @@ class Relaxing(Progress):
         return {"temperature": self.temperature()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Sampling(Progress):
     """The progress of the method ``multires``, after every part of a level.
 
@@ -132,7 +133,7 @@ class Sampling(Progress):
         return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Iterating(Progress):
     """The progress of the method ``pyramid``, after every channel or, for a solid, after every part of a channel.
 
@@ -168,7 +169,7 @@ class Iterating(Progress):
         return image[len(image) // 2] if self.solid else image
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Simulating(Progress):
     """The progress of `simdtex.simulate`, after every part of a step of a realisation, and at its end.
 
@@ -196,7 +197,7 @@ class Simulating(Progress):
         return f"realisation{self.realisation:04d}" if self.complete else None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Tiling(Progress):
     """The progress of `simdtex.distributed.synthesize`, after every tile.
 
@@ -225,7 +226,7 @@ class Tiling(Progress):
         return f"{what}, tile {self.tile} of {self.tiles}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Labelling(Progress):
     """The progress of `simdtex.classify`, after every step.
 
@@ -247,8 +248,8 @@ class Labelling(Progress):
 Callback = Callable[[Any], Any]
 
 
-@dataclass(frozen=True)
-class Stage:
+@dataclass(frozen=True, repr=False)
+class Stage(Brief):
     """The result of a level.
 
     Attributes
@@ -339,7 +340,8 @@ class Output:
         rows_cols = "x".join(map(str, self.made.shape[:-1])) if self.made is not None else ""
         has = [name for name in ("source", "temperature") if getattr(self, name) is not None]
         has += [f"{len(self.stages)} stages"] if self.stages else []
-        has += [f"{name} {self.statistics[name]}" for name in ("seed", "device") if name in self.statistics]
+        told = {name: str(self.statistics[name]) for name in ("seed", "device") if name in self.statistics}
+        has += [f"{name} {text.partition(' (')[0]}" for name, text in told.items()]
         has += [f"{self.statistics['seconds']:.2f} s"] if "seconds" in self.statistics else []
         return f"Output({', '.join([rows_cols] * bool(rows_cols) + has)})"
 

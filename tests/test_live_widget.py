@@ -108,7 +108,7 @@ def test_a_result_shows_its_picture_and_its_arrangement():
     np.testing.assert_array_equal(arranged, source_colours(output.source, (rows, cols)))
     assert "seed 1" in output._repr_html_() and "<script" not in output._repr_html_()
     stages, seconds = len(output.stages), f"{output.statistics['seconds']:.2f} s"
-    told = f"28x36, source, temperature, {stages} stages, seed 1, device reference (NumPy), {seconds}"
+    told = f"28x36, source, temperature, {stages} stages, seed 1, device reference, {seconds}"
     assert repr(output) == f"Output({told})"
     assert repr(Output(None)) == "Output()"
 

@@ -217,7 +217,7 @@ def test_what_is_returned_is_written_by_xarray_itself(tmp_path):
     found.to_zarr(tmp_path / "t.zarr")
     for name in ("t.nc", "t.zarr"):
         with xarray.open_dataarray(tmp_path / name) as back:
-            xarray.testing.assert_identical(back, found)
+            assert back.identical(found)
             assert back.dtype == found.dtype and json.loads(back.attrs["options"])["order"] == 2
 
 
@@ -371,7 +371,7 @@ def test_the_source_map_of_every_realisation(several):
         found.simulation.values[taken].tolist()
     )
     alone = simulate([training, -training] if several else training, **options)
-    xarray.testing.assert_identical(alone, found.simulation)
+    assert alone.identical(found.simulation)
 
 
 def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):

@@ -26,7 +26,7 @@ PUBLIC = {
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),
     "explain",
     "replay",
-    *("TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
+    *("show", "TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
 }
 COMMAND_LINE = """
 from simdtex.cli import main

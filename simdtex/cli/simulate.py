@@ -178,8 +178,9 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
     from simdtex.report.volumes import write_volumes
 
     pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
+    shown: dict[str, Any] = {"command": command_line(), "upward": "cell_y" in made.attrs}
     if material.deep:
-        write_volumes(folder, pixels, made.values, categorical, command_line())
+        write_volumes(folder, pixels, made.values, categorical, **shown)
         return
     data = None
     if known is not None:
@@ -188,7 +189,7 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
         row, col = np.nonzero(~np.ma.getmaskarray(known))
         data = np.stack([col, row, known.data[row, col].astype(np.float64)], -1)
     categories: list[Any] | None = None if categorical else []
-    write_ensemble(folder, pixels, made.values, data=data, categories=categories, command=command_line())
+    write_ensemble(folder, pixels, made.values, data=data, categories=categories, **shown)
 
 
 def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
+from simdtex.io.brief import Brief
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, check_size, explained, reading
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
@@ -64,8 +65,8 @@ class Frame(NamedTuple):
     cell: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CartesianGrid:
+@dataclass(frozen=True, eq=False, repr=False)
+class CartesianGrid(Brief):
     """A grid of cells with its variables.
 
     Attributes

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io.brief import Brief
 from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
@@ -44,8 +45,8 @@ _UNKNOWN = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-")
 """Cells of an unknown value, in lower case."""
 
 
-@dataclass(frozen=True, eq=False)
-class HardData:
+@dataclass(frozen=True, eq=False, repr=False)
+class HardData(Brief):
     """A table of known values with a row for each datum; `len` is the number of data.
 
     Attributes

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import rasters
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
+from simdtex.io.brief import Brief
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.limits import Refused, explained, max_pixels_or_default, reading
 from simdtex.options import check_real, require, unmasked
@@ -33,8 +34,8 @@ Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
 
-@dataclass(frozen=True, eq=False)
-class Image:
+@dataclass(frozen=True, eq=False, repr=False)
+class Image(Brief):
     """A picture and its channel axis.
 
     Attributes

@@ -258,6 +258,11 @@ class TextureClassifier:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
         self.set_params(**{**vars(resolve(Options, "classify", {})), **options})
 
+    def __repr__(self) -> str:
+        usual = type(self)().get_params()
+        changed = [f"{name}={one!r}" for name, one in self.get_params().items() if repr(one) != repr(usual[name])]
+        return f"{type(self).__name__}({', '.join(changed)})"
+
     def __getstate__(self) -> dict[str, Any]:
         device: Any = self.device
         if kind := getattr(device, "kind", None):

@@ -75,6 +75,7 @@ def estimate(
         Dimensions ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the variables
         ``probability`` (category, y, x), float64, which adds up to 1, and ``entropy`` (y, x) in bits; else ``mean`` and
         ``variance`` (y, x) in the units of the training image. A cell with a datum has its value with certainty.
+        ``plot()`` draws the maps.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def estimate(
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     require("simulate", "xarray")
-    import xarray as xr
+    from simdtex.model.plotted import Results, described
 
     whole("nearest", nearest, 0, MOST)
     real("bandwidth", bandwidth, 0, above=True)
@@ -132,7 +133,11 @@ def estimate(
     found[:, certain] = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])
     dims = ("y", "x")
     maps = found.reshape(-1, *size)
-    variables: dict[str, Any] = {"mean": (dims, maps[0]), "variance": (dims, maps[1])}
+    units = {"units": about["units"]} if "units" in (about := described(training)) else {}
+    variables: dict[str, Any] = {
+        "mean": (dims, maps[0], units),
+        "variance": (dims, maps[1], {name: f"({unit})\u00b2" for name, unit in units.items()}),
+    }
     if categorical:
         entropy = 0 - (maps * np.log2(np.where(maps > 0, maps, 1))).cumsum(0)[-1]
         variables = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
@@ -141,8 +146,7 @@ def estimate(
         **{"version": version("simdtex"), "device": machine.name, "nearest": nearest, "reach": reach},
         **{"bandwidth": bandwidth, **digests(pictures, given), **sides_of_cells},
     }
-    result: xarray.Dataset = xr.Dataset(variables, along, attributes)
-    return result
+    return Results(variables, along, attributes)
 
 
 def _moments(

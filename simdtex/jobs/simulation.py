@@ -148,8 +148,9 @@ def simulate(
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
         with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
-        ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
-        unless values are floats, the attribute ``missing``.
+        ``to_netcdf`` and ``to_zarr`` of xarray write them; ``units`` and ``long_name`` are those of a training image of
+        xarray. With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute
+        ``missing``. ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
         With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
         x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume
@@ -178,7 +179,7 @@ def simulate(
     {'realisation': 2, 'y': 32, 'x': 40}
     """
     require("simulate", "xarray")
-    import xarray as xr
+    from simdtex.model.plotted import Realisations, Results, described
 
     whole("n", n, 1)
     whole("first", first, 0)
@@ -286,15 +287,14 @@ def simulate(
     if inputs.given and inputs.given.outside is not None:
         coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
         attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
-    attributes |= sides_of_cells
-    result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+    attributes |= sides_of_cells | described(training)
+    result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
     names = (*(("layer",) if axes > 2 else ()), "row", "column", "image")
     lattice = dims[: 1 + axes]
     places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
-    both: xarray.Dataset = xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
-    return both
+    return Results({"simulation": result, **places}, attrs=attributes)
 
 
 def check_several(several: str, known: Any, pictures: Pictures) -> None:

@@ -35,7 +35,7 @@ _KIND_ORDER = {"gpu": 0, "cpu": 1, "accelerator": 2, "other": 3}
 _NOT_PROBED = "not probed"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DeviceInfo:
     """One line of the listing of devices.
 
@@ -78,6 +78,9 @@ class DeviceInfo:
         """Whether the name is that of a simulator or a software rasteriser."""
         words = f"{self.platform} {self.name}".lower()
         return any(word in words for word in _SIMULATORS)
+
+    def __repr__(self) -> str:
+        return f"<{self.index}: {self}, {self.kind}, {'usable' if self.usable else self.reason}>"
 
     def __str__(self) -> str:
         """Return the name and the platform, as messages give them."""

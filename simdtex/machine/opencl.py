@@ -151,6 +151,9 @@ class OpenCL:
         self._constants: dict[tuple[str, bytes], DeviceArray] = {}
         self._kernels: dict[tuple[tuple[str, ...], str], dict[str, Any]] = {}
 
+    def __repr__(self) -> str:
+        return f"<OpenCL device {self.info.name.strip()} ({self.kind})>"
+
     @contextmanager
     def running(self) -> Iterator[OpenCL]:
         """Let an operation launch its kernels while no other thread launches kernels."""

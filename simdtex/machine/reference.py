@@ -27,6 +27,9 @@ class Reference:
         self.scratch = scratch
         self.launches = 0
 
+    def __repr__(self) -> str:
+        return "<NumPy reference>"
+
     @contextmanager
     def running(self) -> Iterator[None]:
         """Let an operation compute in NumPy."""

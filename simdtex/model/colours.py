@@ -17,6 +17,9 @@ OKABE_ITO = (
 )
 """Black and seven colours that colour-blind people can distinguish, sRGB."""
 
+# From light to dark in turn, so that neighbours differ in grey too; later categories begin again.
+_CATEGORIES = ("#f2ead3", "#1f4e79", "#8fbf9f", "#d08c3a", "#7a5195", "#4a4a4a", "#b8d4e8", "#5c7a29")
+
 
 def temperature_colours(temperature: ArrayLike) -> Picture:
     """Return temperatures as colours from near black (0, cold) to pale yellow (1, hot), sRGB in a last axis of 3.
@@ -71,6 +74,12 @@ def label_colours(count: int) -> Picture:
     lightness = 0.62 + 0.16 * (number % 3 - 1)
     more = _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))
     return np.concatenate([np.array(OKABE_ITO, np.uint8), more])[:count]
+
+
+def category_colours(count: int) -> Picture:
+    """Return the colours of the categories of a training image, (count, 3) uint8."""
+    table = np.array([list(bytes.fromhex(colour[1:])) for colour in _CATEGORIES], np.uint8)
+    return table[np.arange(count) % len(table)]
 
 
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.io.brief import Brief
+
 SHOWN = 8
 """Number of candidates that a table or a notebook shows, in addition to the taken one."""
 
 
-@dataclass(frozen=True, eq=False)
-class Neighbours:
+@dataclass(frozen=True, eq=False, repr=False)
+class Neighbours(Brief):
     """The neighbourhood of a site: N neighbours in canonical order, with guides also the site itself.
 
     Attributes
@@ -43,8 +45,8 @@ class Neighbours:
     pixels: NDArray[Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Ranked:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ranked(Brief):
     """The candidates of a site with the least total costs, and the taken one.
 
     Attributes

@@ -11,14 +11,13 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.experiments.ensemble import Summary, copies, summary
 from simdtex.experiments.ensemble.copies import WINDOW
 from simdtex.io.image import to_display
-from simdtex.model.colours import source_colours
+from simdtex.model.colours import category_colours, source_colours
 from simdtex.report.page import Figure, Part, Section, check_folder, write_report
 from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
@@ -32,8 +31,6 @@ MOST_PANELS = 6  # categories drawn, those with the largest shares of the traini
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 SIDE = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
-# From light to dark in turn, so that neighbours differ in grey too; later categories begin again.
-_COLOURS = ["#f2ead3", "#1f4e79", "#8fbf9f", "#d08c3a", "#7a5195", "#4a4a4a", "#b8d4e8", "#5c7a29"]
 
 
 def write_ensemble(
@@ -44,6 +41,7 @@ def write_ensemble(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
     command: str = "",
+    upward: bool = False,
 ) -> None:
     """Write the report of an ensemble: ``index.html``, PNG pictures, ``results.json``.
 
@@ -61,6 +59,8 @@ def write_ensemble(
         empty sequence means continuous values.
     command : str
         The command line, if there is one.
+    upward : bool
+        Draw row 0 at the bottom, as of a map, whose rows ascend to the north.
 
     Raises
     ------
@@ -75,13 +75,16 @@ def write_ensemble(
     found = summary(ensemble, training, data=data, categories=categories)
     images, own = np.asarray(ensemble), np.asarray(training)
     categorical = len(found.categories) > 0
+    shown = (images[:, ::-1], own[::-1]) if upward else (images, own)
+    with matplotlib.rc_context({"image.origin": "lower" if upward else "upper"}):
+        uncertainty = _uncertainty(found)
     sections = [
-        Section("The realisations", [_realisations(images, own, found)]),
-        Section("Uncertainty", _uncertainty(found)),
+        Section("The realisations", [_realisations(*shown, found)]),
+        Section("Uncertainty", uncertainty),
         Section("Variograms", [_variograms(found)]),
         *([Section("Connectivity of the categories", _connectivity(found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
-        Section("Copies", _copies(images, own, found)),
+        Section("Copies", _copies(*shown, found)),
     ]
     kind = f"{len(found.categories)} categories" if categorical else "continuous values"
     lead = (
@@ -127,14 +130,13 @@ def _mapped(found: Summary) -> list[int]:
 def _realisations(images: Array, own: Array, found: Summary) -> Figure:
     """Return the training image and some realisations, in one scale."""
     number = min(SHOWN, len(images))
-    limits, palette = (float(own.min()), float(own.max())), np.array([to_rgb(colour) for colour in _COLOURS])
+    limits, palette = (float(own.min()), float(own.max())), category_colours(len(found.categories))
     shown = []
     for label, image in [("the training image", own), *((f"realisation {i}", images[i]) for i in range(number))]:
         if len(found.categories) == 0:
             picture = to_display(image.astype(np.float64), limits)
         else:
-            place = (image[..., np.newaxis] == found.categories).argmax(axis=-1)
-            picture = np.rint(palette[place % len(_COLOURS)] * 255).astype(np.uint8)
+            picture = palette[(image[..., np.newaxis] == found.categories).argmax(axis=-1)]
         shown.append((label, picture))
     return Figure(
         "realisations.png",

@@ -25,7 +25,12 @@ AXES = ("z", "y", "x")
 
 
 def write_volumes(
-    folder: str | os.PathLike[str], training: NDArray[Any], ensemble: NDArray[Any], categorical: bool, command: str = ""
+    folder: str | os.PathLike[str],
+    training: NDArray[Any],
+    ensemble: NDArray[Any],
+    categorical: bool,
+    command: str = "",
+    upward: bool = False,
 ) -> None:
     """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
 
@@ -39,6 +44,8 @@ def write_volumes(
         Whether values are categories, of which the last one is drawn.
     command : str
         The command line, if there is one.
+    upward : bool
+        Draw y, or z, upward, as of a map.
 
     Notes
     -----
@@ -52,7 +59,7 @@ def write_volumes(
     what = f"category {last}" if categorical else "the values"
     limits = (float(own.min()), float(own.max()))
     sheet = [
-        (f"{name}, {AXES[axis]} = {n // 2}", to_display(one.take(n // 2, axis), limits))
+        (f"{name}, {AXES[axis]} = {n // 2}", to_display(one.take(n // 2, axis)[:: -1 if upward else 1], limits))
         for name, one in (
             ("training image", own),
             (f"mean of {len(theirs)}", mean),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
+from simdtex.io.brief import Brief
 from simdtex.machine import Machine
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.algorithm import exchanged, relaxed
@@ -48,8 +49,8 @@ class Sweep(NamedTuple):
     temperature: float
 
 
-@dataclass(frozen=True, eq=False)
-class Instant:
+@dataclass(frozen=True, eq=False, repr=False)
+class Instant(Brief):
     """The field of a run between two sets of sites.
 
     Attributes
@@ -101,6 +102,9 @@ class Replay:
         self._states: dict[int, dict[str, Any]] = {}  # before a sweep
         self._room = kept
         self._state = self._sweeping(self._run.begin())
+
+    def __repr__(self) -> str:
+        return f"<Replay of {self._run.levels} levels, {len(self._sweeps)} sweeps run so far>"
 
     @property
     def sweeps(self) -> list[Sweep]:
