@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds, or while a page is read."""
 
-import re
 import sys
 from pathlib import Path
 

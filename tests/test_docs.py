@@ -133,7 +133,7 @@ def test_story_runs(any_device, page, tmp_path, monkeypatch):
             continue
         words = shlex.split(small(text))[1:]
         words += ["--order", "8"] if {"synth", "fill", "extend", "simulate"} & set(words) else []  # quicker
-        words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
+        words += ["--band", "3"] if "extend" in words else []  # no more fits a small picture
         assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
@@ -142,7 +142,7 @@ def quick(line):
     words = shlex.split(small(line))
     words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
     words += ["--order", "8"] if {"fill", "extend", "tile"} & set(words) else []
-    words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # there is not more room on so small a picture
+    words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
     return words + (["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else [])
 
