@@ -317,7 +317,9 @@ def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
         function = getattr(simdtex, functions.get(name, name))
         options = {max(p.opts, key=len) for p in cli.load(name).params if isinstance(p, click.Option)}
         others |= options - {f"--{one.replace('_', '-')}" for one in inspect.signature(function).parameters}
-    assert others - {"--report", "--view", "--truth", "--quiet", "--help-all"} == set(re.findall(r"--[\w-]+", "\n".join(rows)))
+    assert others - {"--report", "--view", "--truth", "--quiet", "--help-all"} == set(
+        re.findall(r"--[\w-]+", "\n".join(rows))
+    )
 
 
 def test_public_names_are_in_the_reference():

@@ -542,6 +542,20 @@ def test_parse_size(width, height):
     assert image.parse_size(str(width)) == (width, width)
 
 
+@pytest.mark.parametrize(
+    ("text", "sides"),
+    [("2x", (42, 10)), ("150%", (32, 8)), ("0.5 X", (10, 2)), ("1.×", (21, 5)), ("2x3", (2, 3)), ("200", (200, 200))],
+)
+def test_a_size_may_be_a_multiple_of_the_sample(text, sides):
+    assert image.parse_sides(text, "WIDTHxHEIGHT", (21, 5)) == sides
+
+
+@pytest.mark.parametrize("text", ["0x", "0.01x", "-1x", "x", "2y", "1e3%", "99999999x"])
+def test_a_multiple_must_leave_pixels(text):
+    with pytest.raises(ValueError, match="or 2x or 200% of the sample"):
+        image.parse_sides(text, "WIDTHxHEIGHT", (21, 5))
+
+
 @pytest.mark.parametrize("text", ["", "0", "0x5", "5x0", "-3x4", "3x", "x3", "1x2x3", "a", "1.5", "9" * 9])
 def test_parse_size_errors(text):
     with pytest.raises(ValueError, match="WIDTHxHEIGHT"):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -51,6 +52,15 @@ def test_the_command_line_answers_without_numpy(words):
 
 def test_the_package_is_imported_without_numpy():
     assert not imported("import simdtex; dir(simdtex); simdtex.__version__") & {*HEAVY, "numpy", "PIL"}
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours"), [("synthesise", "synthesize"), ("inpaint", "fill"), ("seamless", "extend"), ("nonsense", None)]
+)
+def test_a_name_of_another_program_names_ours(theirs, ours):
+    meant = f"; did you mean '{ours}'?" if ours else ""
+    with pytest.raises(AttributeError, match=f"module 'simdtex' has no attribute '{theirs}'{re.escape(meant)}$"):
+        getattr(simdtex, theirs)
 
 
 @pytest.mark.parametrize("command", ["synth", "solid", "mix", "schedules"])
