@@ -544,7 +544,14 @@ def test_parse_size(width, height):
 
 @pytest.mark.parametrize(
     ("text", "sides"),
-    [("2x", (42, 10)), ("150%", (32, 8)), ("0.5 X", (10, 2)), ("1.×", (21, 5)), ("2x3", (2, 3)), ("200", (200, 200))],
+    [
+        ("2x", (42, 10)),
+        ("150%", (32, 8)),
+        ("0.5 X", (10, 2)),
+        ("1.\u00d7", (21, 5)),
+        ("2x3", (2, 3)),
+        ("200", (200, 200)),
+    ],
 )
 def test_a_size_may_be_a_multiple_of_the_sample(text, sides):
     assert image.parse_sides(text, "WIDTHxHEIGHT", (21, 5)) == sides
