@@ -3,26 +3,27 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import click
 
-from simdtex.cli.command import DATA, command
+from simdtex.cli.command import DATA
 from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import output_shape, read_material, take_reading
-from simdtex.cli.options import CHANNELS, DEVICE, SAMPLE_MASK, data_options, given, option, places, size_option
+from simdtex.cli.job import Task, job
+from simdtex.cli.options import CHANNELS, SAMPLE_MASK, data_options, given, option, places, size_option
 from simdtex.cli.places import EITHER, ENTER
 from simdtex.cli.simulate import georeferenced, read_place
 
 
-@command(
+@job(
     (
         "estimate facies.png -o probabilities.nc --known wells.csv --categorical",
         "Estimate the probability of each category, and the entropy.",
     ),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
+    random=False,
 )
 @click.argument("training_image", nargs=-1, required=True, type=ENTER)
 @click.option(
@@ -49,23 +50,16 @@ from simdtex.cli.simulate import georeferenced, read_place
     type=float,
     help="Set the width of the Parzen kernel, in units of h_opt.",
 )
-@DEVICE
-@click.option("-q", "--quiet", is_flag=True, help="Show no summary.")
-def estimate(
-    training_image: tuple[Path, ...],
-    output: Path,
-    size: str | None,
-    quiet: bool,
-    **options: Any,
-) -> None:
+def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
 
     It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex import estimate
     from simdtex.io.realisations import write_realisations
+    from simdtex.run import Output
 
-    began, how = time.perf_counter(), take_reading(options, deep=True)
+    how = take_reading(options, deep=True)
     material = read_material(training_image, how)
     if material.deep:
         raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
@@ -77,8 +71,9 @@ def estimate(
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
     inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | lies
-    made = georeferenced(estimate(material.array, shape=(height, width), **inputs), material.crs)
-    write_realisations(output, made)
-    if not quiet:
-        seconds = time.perf_counter() - began
-        click.echo(f"{output}: maps of {width}x{height} in {seconds:.1f} s on {made.attrs['device']}")
+
+    def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
+        made = estimate(material.array, shape=(height, width), device=device, callback=callback, **inputs)
+        return georeferenced(made, material.crs), Output(None, statistics=made.attrs)
+
+    return Task(make, f"maps of {width}x{height}", str(output), [lambda made, run: write_realisations(output, made)])

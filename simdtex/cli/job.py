@@ -58,24 +58,30 @@ class Task(NamedTuple):
 
 
 def job(
-    *examples: tuple[str, str], usual: str = "", of: str = "", stages: str = "", profile: bool = False
+    *examples: tuple[str, str],
+    usual: str = "",
+    of: str = "",
+    stages: str = "",
+    profile: bool = False,
+    random: bool = True,
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
     The command has the options of its methods, ``--seed``, ``--dry-run``, ``--device``, ``--checkpoint`` and
     ``--quiet`` beside those of the function, and ``--stages`` and ``--profile`` if it is said what stages are, and that
     kernels are timed. ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the
-    command has, by default that of its name.
+    command has, by default that of its name. A command that is not ``random`` has none of these, no ``--seed`` and no
+    ``--checkpoint``.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
         @functools.wraps(plan)
         def planned(
-            seed: int | None,
             device: str | None,
-            checkpoint: Path | None,
             quiet: bool,
             dry_run: bool,
+            seed: int | None = None,
+            checkpoint: Path | None = None,
             stages: Path | None = None,
             profile: bool = False,
             **own: Any,
@@ -101,8 +107,9 @@ def job(
                 kept.remove()
             statistics = output.statistics
             if not quiet:
-                seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}, seed {statistics['seed']}"
-                click.echo(f"{task.names}: {task.summary} {seconds}")
+                seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
+                drawn = f", seed {statistics['seed']}" if random else ""
+                click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
                 if task.more:
                     task.more(made, statistics)
             if profile:
@@ -111,7 +118,9 @@ def job(
                 print_profile(statistics)
 
         own = planned.__dict__.pop("__click_params__", [])
-        shared: list[Callable[..., Any]] = [SEED, DEVICE, job_options(of or plan.__name__), CHECKPOINT, DRY_RUN, QUIET]
+        shared: list[Callable[..., Any]] = [DEVICE, DRY_RUN, QUIET]
+        if random:
+            shared = [SEED, DEVICE, job_options(of or plan.__name__), CHECKPOINT, DRY_RUN, QUIET]
         shared += [stages_option(stages)] * bool(stages) + [PROFILE] * profile
         function: Any = planned
         for add in reversed(shared):
