@@ -168,8 +168,7 @@ def test_resume_writes_what_the_command_writes(folder):
     assert run(*args).exit_code == 0
     wanted = (folder / "labels.png").read_bytes()
     (folder / "labels.png").unlink()
-    line = {"name": "classify", "arguments": ["picture.png"], "folder": str(folder)}
-    line["options"] = [*map(str, [*SAMPLES, "-o", "labels.png", *WORDS])]
+    line = {"name": "classify", "words": [*map(str, [*args, *WORDS])], "folder": str(folder)}
     kept = Checkpoint("state", every=0, command=line)
     with pytest.raises(KeyboardInterrupt):
         simdtex.classify(

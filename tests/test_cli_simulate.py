@@ -259,7 +259,7 @@ BAD = {
         "several is 'mean', which invents categories; give 'most'",
     ),
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
-    "an origin of one number": ([*GREY, "--origin", "1"], "origin is [1.0]; give (x, y) or (x, y, z)"),
+    "an origin of one number": ([*GREY, "--origin", "1"], "origin is (1.0,); give (x, y) or (x, y, z)"),
     "no origin": ([*GREY, "--origin", ""], "must be numbers"),
     "a negative cell": ([*GREY, "--cell", "1,-1"], "give sizes above 0"),
     "an unknown rule": ([*FACIES, "--known", "facies.csv", "--several", "least"], "choose one of: refuse, mean, most"),

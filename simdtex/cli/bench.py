@@ -10,6 +10,7 @@ import click
 
 from simdtex.cli.command import command
 from simdtex.cli.ending import afterwards
+from simdtex.cli.options import QUIET
 from simdtex.cli.places import WRITE
 
 
@@ -28,7 +29,7 @@ from simdtex.cli.places import WRITE
     help="Use small sizes, which take a quarter of a minute for each device instead of two minutes.",
 )
 @click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all measurements.")
-@click.option("-q", "--quiet", is_flag=True, help="Print no progress and no tables.")
+@QUIET
 def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> None:
     """Measure the time of each method on each device, and compare with NumPy.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from simdtex.cli.command import DATA, OUTPUTS
 from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option, reads, report_option
+from simdtex.cli.options import given, option, output_option, reads
 from simdtex.cli.places import READ, READ_NAMED, WRITE
 from simdtex.model.pictures import check_alike
 
@@ -33,9 +33,10 @@ UNLABELLED = 255
     ("classify photo.png --strokes strokes.png -o labels.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
     profile=True,
+    report="labels, fits and, with --truth, the confusion matrix",
 )
 @click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write the labels: 1, 2..., and 0 for unknown.")
+@output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
 @option(
     "--texture",
     "textures",
@@ -65,7 +66,6 @@ UNLABELLED = 255
     group=OUTPUTS,
     help="Write the fit of each class at each pixel, 0 to 1, one band for each class: .tif or .npy.",
 )
-@report_option("labels, fits and, with --truth, the confusion matrix")
 def classify(
     picture: Path,
     output: Path,
@@ -74,7 +74,6 @@ def classify(
     validation: tuple[str, ...],
     truth: Path | None,
     confidence: Path | None,
-    report: Path | None,
     **options: Any,
 ) -> Task:
     """Label each pixel of PICTURE with the texture around it, or as unknown.
@@ -111,15 +110,17 @@ def classify(
     writers: list[Any] = [lambda made, run: write_labels(output, made)]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
-    if report:
-        from simdtex.report.classification import write_classification
-        from simdtex.report.page import check_folder
 
-        check_folder(report)
-        writers.append(lambda made, run: write_classification(report, pixels, made, run, true, command_line()))
+    def report(folder: Path, made: Any, run: Any) -> None:
+        from simdtex.report.classification import write_classification
+
+        write_classification(folder, pixels, made, run, true, command_line())
+
     run = partial(classify, pixels, known, **more, **given(options))
     summary = f"{size(pixels)}, {len(names)} classes"
-    return Task(run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)))
+    return Task(
+        run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)), report=report
+    )
 
 
 def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:

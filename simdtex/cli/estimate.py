@@ -6,14 +6,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
-
 from simdtex.cli.command import DATA
 from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import output_shape, read_material, take_reading
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import CHANNELS, SAMPLE_MASK, data_options, given, option, places, size_option
-from simdtex.cli.places import EITHER, ENTER
+from simdtex.cli.options import given, option, output_option, size_option, training_options
 from simdtex.cli.simulate import georeferenced, read_place
 
 
@@ -25,19 +22,9 @@ from simdtex.cli.simulate import georeferenced, read_place
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
     random=False,
 )
-@click.argument("training_image", nargs=-1, required=True, type=ENTER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=EITHER,
-    help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.",
-)
-@CHANNELS
+@training_options
+@output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")
 @size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
-@data_options
-@places
-@SAMPLE_MASK
 @option("--categorical", is_flag=True, group=DATA, help="Treat values as categories.")
 @option("--nearest", default=8, show_default=True, type=int, help="Use this many data for each cell, the nearest.")
 @option(

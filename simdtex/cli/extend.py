@@ -9,14 +9,25 @@ from typing import Any
 
 import click
 
-from simdtex.cli.inputs import Reading, check_source_map, read_material
-from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import arranged, folder_of
-from simdtex.cli.options import ALSO, BAND, MAP, OUTPUT, PREVIEW, SOURCE_MAP, given, option, report_option, size_option
+from simdtex.cli.inputs import Reading
+from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.maps import arranged, read_lead
+from simdtex.cli.options import (
+    ALSO,
+    BAND,
+    DIRECTION,
+    DIRECTIONS,
+    MAP,
+    OUTPUT,
+    PREVIEW,
+    SOURCE_MAP,
+    given,
+    option,
+    size_option,
+)
 from simdtex.cli.places import ENTER
 
 SIDES = ("top", "bottom", "left", "right")
-DIRECTIONS = ("both", "x", "y")
 REPORTED = "its pictures, and how evenly it uses the picture"
 """What the page of a run shows."""
 
@@ -27,6 +38,7 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     ("extend brick -o larger --right 512", "Extend all maps in the folder brick: albedo, normal, roughness..."),
     usual="output left right top bottom size seamless seed also preview dry_run device quiet",
     stages="every level and sweep",
+    report=REPORTED,
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
@@ -40,6 +52,7 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     is_flag=False,
     flag_value="both",
     metavar="[x|y|both]",
+    type=DIRECTION,
     words=DIRECTIONS,
     help="Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`.  [both, if no "
     "direction is given]",
@@ -49,8 +62,7 @@ REPORTED = "its pictures, and how evenly it uses the picture"
 @ALSO
 @SOURCE_MAP
 @PREVIEW
-@report_option(REPORTED)
-def extend(size: str | None, seamless: str | None, **options: Any) -> Task:
+def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
     PICTURE may be a folder with the maps of a material, as in `simdtex tile`.
@@ -58,55 +70,39 @@ def extend(size: str | None, seamless: str | None, **options: Any) -> Task:
     if seamless is None and options["band"] is not None:
         raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
     sides = {name: options.pop(name) for name in SIDES}
-    if seamless is None and size is None and not any(sides.values()):
-        raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
-    return continued("--seamless", seamless, sides, size, **options)
+    return continued(seamless or False, sides, size, **options)
 
 
 def continued(
-    option: str,
-    direction: str | None,
+    seamless: Any,
     sides: dict[str, int],
     size: str | None,
     *,
     picture: Path,
     output: Path,
     roles: tuple[str, ...],
-    also: tuple[str, ...],
-    source_map: Path | None,
-    report: Path | None,
-    preview: bool,
     **options: Any,
 ) -> Task:
-    """Return the task that continues a picture, or a folder of maps; it tiles in the direction of an option."""
+    """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
     from simdtex import extend
 
-    if direction not in (None, *DIRECTIONS):
-        raise ValueError(f"{option} {direction} is not a direction; give x, y or both")
-    folder = folder_of([picture], output, roles)
-    whole = read_material([folder.lead if folder else picture], Reading(palette=bool(options["categorical"])))
+    target, whole = read_lead([picture], output, roles, Reading(palette=bool(options["categorical"])))
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     if size is not None:
         sides = _sides(size, sides, (rows, cols))
-    tiling: Any = direction if direction in ("x", "y") else direction is not None
-    check_source_map(source_map, whole)
     metadata = whole.metadata
     if metadata and metadata.geo:
         metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
-    writers = arranged(folder or output, whole, also, source_map, metadata, kept=True, preview=preview)
-    if report:
-        from simdtex.report.page import check_folder
-        from simdtex.report.synthesis import write_synthesis
-
-        check_folder(report)
-        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line(), continued=True))
+    outputs = {name: options.pop(name) for name in ("also", "source_map", "preview")}
+    writers = arranged(target, whole, metadata, **outputs)
     width, height = cols + sides["left"] + sides["right"], rows + sides["top"] + sides["bottom"]
     return Task(
-        partial(extend, pixels, seamless=tiling, channel_axis=whole.channel_axis, **sides, **given(options)),
+        partial(extend, pixels, seamless=seamless, channel_axis=whole.channel_axis, **sides, **given(options)),
         f"{width}x{height} from {cols}x{rows}",
-        str(folder or output),
+        str(target),
         writers,
         whole.limits,
+        report=partial(write_page, pixels, continued=True),
     )
 
 

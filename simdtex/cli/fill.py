@@ -11,9 +11,9 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Reading, check_profiles, check_source_map, parted, planes, read_material
+from simdtex.cli.inputs import Reading, check_profiles, parted, planes, read_material
 from simdtex.cli.job import Task, job
-from simdtex.cli.maps import arranged, folder_of
+from simdtex.cli.maps import arranged, read_lead
 from simdtex.cli.options import ALSO, MAP, OUTPUT, SOURCE_MAP, given
 from simdtex.cli.places import ENTER, READ
 from simdtex.model.pictures import unknown_in
@@ -78,26 +78,22 @@ def fill(
     from simdtex import fill
     from simdtex.jobs.filling import widened
 
-    folder = folder_of([picture], output, roles)
     how = Reading(palette=bool(options["categorical"]))
-    whole = read_material([folder.lead if folder else picture], how)
+    target, whole = read_lead([picture], output, roles, how)
     pixels, hole = _hole(whole.pixels[0], mask, invert)
     whole = whole._replace(pixels=[pixels])
     texture = read_material(samples, how) if samples else None
     if texture:
         check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
-    if texture and (also or folder):
-        what = "give one picture" if folder else "leave --also out"
-        raise ValueError(f"maps cannot be filled with --sample, since no pixel comes from the picture; {what}")
-    check_source_map(source_map, texture or whole, everywhere=not texture)
-    writers = arranged(folder or output, whole, also, source_map, whole.metadata, kept=True)
+    foreign = "maps cannot be filled with --sample, since no pixel comes from the picture" if texture else ""
+    writers = arranged(target, whole, whole.metadata, also=also, source_map=source_map, foreign=foreign)
     sample = texture and texture.array
     filled = np.count_nonzero(widened(hole, options["grow"], options["feather"]))
     axis = None if pixels.ndim == 2 else -1
     return Task(
         partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
         f"{filled} of {hole.size} pixels filled",
-        str(folder or output),
+        str(target),
         writers,
     )
 

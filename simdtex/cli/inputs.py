@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -280,28 +280,6 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
     return found
 
 
-def write_arranged(
-    output: Path | Callable[..., object], others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
-) -> list[Callable[[Any, Any], object]]:
-    """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
-
-    ``metadata`` is written with the picture; ``output`` is its file, or ``output(made, run, metadata)`` writes it.
-    """
-    from simdtex.io import image
-    from simdtex.model.source_map import save_source_map
-
-    def write(made: NDArray[Any], run: Any) -> None:
-        if isinstance(output, Path):
-            image.write(output, made, metadata)
-        else:
-            output(made, run, metadata)
-
-    writers: list[Callable[[Any, Any], object]] = [write, *(one.write for one in others)]
-    if source_map:
-        writers.append(lambda made, run: save_source_map(source_map, run.source))
-    return writers
-
-
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
     """Return the sides of ``--size``, rows and columns or, with 3 ``axes``, layers, rows and columns.
 
@@ -389,9 +367,8 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
 def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     """Return how files are read, by the options about tables and grids, which are taken out."""
     columns: dict[str, list[str]] = {}
-    for part in _pairs("--columns", options.pop("columns")):
-        columns.setdefault(part[0], []).append(part[1])
-    pairs = _pairs("--categories", options.pop("categories"))
+    for axis, name in options.pop("columns") or ():
+        columns.setdefault(axis, []).append(name)
     return Reading(
         deep,
         bool(options.get("categorical")),
@@ -399,21 +376,5 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
         options.pop("variables", ()),
         options.pop("missing"),
         columns=columns or None,
-        categories={name: number_of_option("--categories", value) for name, value in pairs} or None,
+        categories=options.pop("categories"),
     )
-
-
-def _pairs(option: str, text: str | None) -> list[tuple[str, str]]:
-    """Return the pairs of ``A=B,C=D``."""
-    parts = [part.partition("=") for part in (text or "").split(",") if part]
-    if any(not (sign and left.strip() and right.strip()) for left, sign, right in parts):
-        raise ValueError(f"{option} {text} is not NAME=NAME,...")
-    return [(left.strip(), right.strip()) for left, _, right in parts]
-
-
-def number_of_option(option: str, text: str) -> float:
-    """Return the number that an option gives; raise if it is none."""
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"{option} has {text!r}, which is no number") from None

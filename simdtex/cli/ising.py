@@ -11,7 +11,7 @@ import click
 
 from simdtex.cli.command import command
 from simdtex.cli.job import command_line, progress_bar
-from simdtex.cli.options import DEVICE
+from simdtex.cli.options import DEVICE, QUIET
 from simdtex.cli.places import FOLDER
 
 SCHEDULES = (
@@ -55,7 +55,7 @@ PICTURE_SWEEPS = 50
 )
 @DEVICE
 @click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report into this folder.")
-@click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
+@QUIET
 def ising(
     names: str,
     temperatures: tuple[float, ...],

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
-from simdtex.cli.inputs import Also, Material, channels, note_lossy, read_also, read_material, size, write_arranged
+from simdtex.cli.inputs import (
+    Also,
+    Material,
+    Reading,
+    channels,
+    check_source_map,
+    note_lossy,
+    read_also,
+    read_material,
+    size,
+)
 from simdtex.cli.places import Named, check_input, preview_of
 
 if TYPE_CHECKING:
@@ -54,7 +65,7 @@ class Folder:
         if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
             note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
 
-    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
+    def write(self, metadata: Metadata | None, made: NDArray[Any], run: Any) -> None:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
         from simdtex.io import image
         from simdtex.io.atomic import atomic_folder
@@ -75,29 +86,38 @@ class Folder:
 def arranged(
     output: Folder | Path,
     samples: Material,
-    also: Sequence[str],
-    source_map: Path | None,
     metadata: Metadata | None,
     *,
-    kept: bool,
+    also: Sequence[str],
+    source_map: Path | None,
     preview: bool = False,
+    kept: bool = True,
+    foreign: str = "",
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture or all maps of a folder, ``--also``, ``--source-map`` and ``--preview``.
 
     Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to stay as they are, and its
-    ``metadata`` holds for the output; a format that loses them is noted.
+    ``metadata`` holds for the output; a format that loses them is noted. ``foreign``: why pixels are not from the
+    sample, so that other maps have none for them.
     """
     from simdtex.io import image
+    from simdtex.model.source_map import save_source_map
 
+    if foreign and (also or isinstance(output, Folder)):
+        raise ValueError(f"{foreign}; {'leave --also out' if also else 'give one picture'}")
+    check_source_map(source_map, samples, everywhere=not foreign)
     others, pixels = read_also(also, samples), samples.pixels[0]
     if isinstance(output, Folder):
         output.read(samples)
+        writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
     else:
         image.check_writable(output, pixels.dtype, channels(pixels))
         if kept:
             note_lossy(output, pixels, metadata)
-    write = output.write if isinstance(output, Folder) else output
-    writers = write_arranged(write, others, source_map, metadata)
+        writers = [lambda made, run: image.write(output, made, metadata)]
+    writers += [one.write for one in others]
+    if source_map:
+        writers.append(lambda made, run: save_source_map(source_map, run.source))
     if preview:
         path = preview_of(output.output if isinstance(output, Folder) else output)
         palette = metadata and metadata.palette
@@ -111,6 +131,14 @@ def _write_copies(path: Path, made: NDArray[Any]) -> None:
     from simdtex.report.sheet import fitted, rgb
 
     image.write(path, fitted(np.tile(rgb(made), (3, 3, 1)), SHEET))
+
+
+def read_lead(
+    pictures: Sequence[Path], output: Path, roles: Sequence[str], how: Reading
+) -> tuple[Folder | Path, Material]:
+    """Return the output, as `folder_of` if it is of a folder, and the pictures that decide the arrangement."""
+    folder = folder_of(pictures, output, roles)
+    return folder or output, read_material([folder.lead] if folder else pictures, how)
 
 
 def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> Folder | None:

@@ -11,7 +11,7 @@ import click
 
 from simdtex.cli.inputs import channels, check_profiles, last_iteration, output_shape, read_picture
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import given, numbers, size_option
+from simdtex.cli.options import NUMBERS, given, output_option, size_option
 from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
@@ -26,14 +26,16 @@ CHOSEN = ("palette", "pattern", "low", "high")
     profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@output_option("Write this picture.", WRITE)
 @size_option("twice the first sample", base="the first sample")
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
-@click.option("--average", metavar="W,W,...", help="Average the patterns with these weights, one for each sample.")
+@click.option(
+    "--average", metavar="W,W,...", type=NUMBERS, help="Average the patterns with these weights, one for each sample."
+)
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
-def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str | None, **options: Any) -> Task:
+def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Mix the textures SAMPLE... into one picture.
 
     Options name a sample by its path as in the command, or by its number from 1. The method is Heeger and Bergen's
@@ -43,7 +45,6 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
     from simdtex.methods.pyramid.mixtures import mix
 
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
-    weights = None if average is None else numbers("--average", average)
     pictures = [read_picture(path) for path in samples]
     check_profiles(samples, [picture.metadata for picture in pictures])
     arrays = [picture.pixels for picture in pictures]
@@ -51,7 +52,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
     axis = -1 if any(picture.channel_axis is not None for picture in pictures) else None
     image.check_writable(output, arrays[0].dtype, max(map(channels, arrays)))
     return Task(
-        partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen | {"average": weights})),
+        partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen)),
         f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
         str(output),
         [lambda made, run: image.write(output, made, pictures[0].metadata._replace(exif=None))],

@@ -13,7 +13,7 @@ from simdtex.cli.command import command
 from simdtex.cli.ending import afterwards
 from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import command_line, progress_bar
-from simdtex.cli.options import DEVICE, given, job_options
+from simdtex.cli.options import DEVICE, QUIET, given, job_options, output_option
 from simdtex.cli.places import FOLDER, READ
 from simdtex.schedules import TOGETHER
 
@@ -26,14 +26,7 @@ from simdtex.schedules import TOGETHER
     ),
 )
 @click.argument("sample", required=False, type=READ)
-@click.option(
-    "-o",
-    "--output",
-    default="schedules-report",
-    show_default=True,
-    type=FOLDER,
-    help="Write the report into this folder.",
-)
+@output_option("Write the report into this folder.", FOLDER, default="schedules-report", show_default=True)
 @click.option(
     "--schedule",
     "names",
@@ -42,10 +35,7 @@ from simdtex.schedules import TOGETHER
     help="Compare these schedules.  [those that relax many sites in a step]",
 )
 @click.option(
-    "--seeds",
-    default=3,
-    show_default=True,
-    help="Run each schedule this many times, with consecutive seeds.",
+    "--seeds", default=3, show_default=True, help="Run each schedule this many times, with consecutive seeds."
 )
 @click.option("--seed", default=1, show_default=True, help="Start with this seed.")
 @click.option(
@@ -53,7 +43,7 @@ from simdtex.schedules import TOGETHER
 )
 @job_options("schedules")
 @DEVICE
-@click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
+@QUIET
 def schedules(
     sample: Path | None,
     output: Path,

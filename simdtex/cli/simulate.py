@@ -15,19 +15,14 @@ from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import (
-    CHANNELS,
     GUIDE,
-    SAMPLE_MASK,
-    data_options,
     given,
-    numbers,
     option,
-    places,
+    output_option,
     reads,
-    report_option,
     size_option,
+    training_options,
 )
-from simdtex.cli.places import EITHER, ENTER
 
 
 @job(
@@ -44,22 +39,13 @@ from simdtex.cli.places import EITHER, ENTER
         "Read a grid, and write a grid.",
     ),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
+    report="realisations, shares, entropy, variograms, connectivity, variety",
 )
-@click.argument("training_image", nargs=-1, required=True, type=ENTER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=EITHER,
-    help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.",
-)
+@training_options
+@output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
-@CHANNELS
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations", "TRAINING_IMAGE")
-@places
-@data_options
-@SAMPLE_MASK
 @GUIDE
 @reads(
     "--region",
@@ -95,13 +81,11 @@ from simdtex.cli.places import EITHER, ENTER
     type=int,
     help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
 )
-@report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
     training_image: tuple[Path, ...],
     output: Path,
     number: int,
     size: str | None,
-    report: Path | None,
     source: bool,
     **options: Any,
 ) -> Task:
@@ -124,12 +108,10 @@ def simulate(
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     place = lies | given({name: options.pop(name) for name in ("several", "outside")})
-    writers: list[Any] = [lambda made, run: write_realisations(output, made)]
-    if report:
+    if click.get_current_context().params["report"]:
         if source or "region" in maps:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
-        _check_report(report, material, shape, getattr(known, "values", known))
-        writers.append(lambda made, run: _report(report, material, made, known, place))
+        _check_report(material, shape, getattr(known, "values", known))
     inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -140,7 +122,8 @@ def simulate(
         make,
         f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
         str(output),
-        writers,
+        [lambda made, run: write_realisations(output, made)],
+        report=lambda folder, made, run: _report(folder, material, made, known, place),
     )
 
 
@@ -152,8 +135,7 @@ def read_place(material: Material, output: Path, options: dict[str, Any], source
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.realisations import check_realisations_path
 
-    told = {name: options.pop(name) for name in ("origin", "cell")}
-    lies: dict[str, Any] = {name: None if text is None else numbers(f"--{name}", text) for name, text in told.items()}
+    lies: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
     if material.lies:  # whose z is left out if that of the other option is
         axes = min((len(one) for one in lies.values() if one), default=3)
         lies = {name: one or getattr(material.lies, name)[:axes] for name, one in lies.items()}
@@ -192,11 +174,10 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
     write_ensemble(folder, pixels, made.values, data=data, categories=categories, **shown)
 
 
-def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:
+def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
     from simdtex.experiments.ensemble.summary import LEAST
     from simdtex.options import LARGEST
-    from simdtex.report.page import check_folder
 
     if material.several or material.channel_axis is not None:
         raise ValueError("--report requires one training image of one variable; leave it out")
@@ -207,4 +188,3 @@ def _check_report(folder: Path, material: Material, shape: tuple[int, ...], know
         raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
-    check_folder(folder)

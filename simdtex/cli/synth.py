@@ -10,9 +10,9 @@ from typing import Any
 import click
 
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import check_source_map, last_iteration, output_shape, read_also, read_material, take_reading
-from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import arranged, folder_of
+from simdtex.cli.inputs import last_iteration, output_shape, read_also, take_reading
+from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.maps import Folder, arranged, read_lead
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
@@ -24,10 +24,10 @@ from simdtex.cli.options import (
     data_options,
     given,
     option,
-    report_option,
+    output_option,
     size_option,
 )
-from simdtex.cli.places import EITHER, ENTER
+from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
@@ -41,16 +41,11 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     usual="output size seed method order also guide preview report dry_run device quiet",
     stages="every level, sweep or iteration",
+    report="its pictures, how evenly it uses the sample, and how much it copies",
     profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=EITHER,
-    help="Write this picture, or a folder of maps; with --tiles a .zarr store.",
-)
+@output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
 @size_option("that of --known or of the output guide, else twice the first sample")
 @option(
     "--method",
@@ -66,7 +61,6 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @SOURCE_MAP
 @ALSO
 @PREVIEW
-@report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @tiles_options
 def synth(
     samples: tuple[Path, ...],
@@ -76,7 +70,6 @@ def synth(
     source_map: Path | None,
     roles: tuple[str, ...],
     also: tuple[str, ...],
-    report: Path | None,
     preview: bool,
     **options: Any,
 ) -> Task | None:
@@ -89,37 +82,26 @@ def synth(
 
     context = click.get_current_context()
     check_tiles(context)
-    folder = folder_of(samples if options["tiles"] is None else (), output, roles)
-    if method == "pyramid" and (source_map or also or folder):
-        what = "give one picture" if folder else "leave --source-map and --also out"
-        raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
     how = take_reading(options)
-    material = read_material([folder.lead] if folder else samples, how)
+    target, material = read_lead(samples, output, roles, how)
+    if method == "pyramid" and (source_map or also or isinstance(target, Folder)):
+        remedy = "give one picture, without --source-map and --also"
+        raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
     pixels = material.pixels[0]
     data = read_data(material, options, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
     inputs = data | given(options, without=("tiles", "workers"))
-    if report:
-        from simdtex.report.page import check_folder
-
-        if material.several or known is not None or not material.known:
-            raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
-        check_folder(report)
+    if context.params["report"] and (material.several or known is not None or not material.known):
+        raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
     if options["tiles"] is not None:
         others = read_also(also, material, files=False)
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
         return None
-    check_source_map(source_map, material, everywhere=known is None)
-    if (also or folder) and known is not None:
-        what = "give one picture" if folder else "leave --also out"
-        raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
     like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
-    writers = arranged(folder or output, material, also, source_map, like, kept=known is not None, preview=preview)
-    if report:
-        from simdtex.report.synthesis import write_synthesis
-
-        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
+    foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
+    outputs: dict[str, Any] = {"also": also, "source_map": source_map, "preview": preview}
+    writers = arranged(target, material, like, **outputs, kept=known is not None, foreign=foreign)
 
     def more(made: Any, statistics: dict[str, Any]) -> None:
         if method == "multires":
@@ -142,8 +124,9 @@ def synth(
     return Task(
         partial(synthesize, material.array, shape, method=method, **inputs),
         f"{shape[1]}x{shape[0]} from {by}",
-        str(folder or output),
+        str(target),
         writers,
         material.limits,
         more,
+        partial(write_page, pixels),
     )

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from simdtex.cli.extend import DIRECTIONS, REPORTED, SIDES, continued
+from simdtex.cli.extend import REPORTED, SIDES, continued
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import ALSO, BAND, MAP, OUTPUT, PREVIEW, SOURCE_MAP, option, report_option
+from simdtex.cli.options import ALSO, BAND, DIRECTION, DIRECTIONS, MAP, OUTPUT, PREVIEW, SOURCE_MAP, option
 from simdtex.cli.places import ENTER
 
 
@@ -20,11 +20,13 @@ from simdtex.cli.places import ENTER
     usual="output direction band seed also roles preview report dry_run device quiet",
     of="extend",
     stages="every level and sweep",
+    report=REPORTED,
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
 @option(
     "--direction",
+    type=DIRECTION,
     words=DIRECTIONS,
     default="both",
     show_default=True,
@@ -35,12 +37,11 @@ from simdtex.cli.places import ENTER
 @ALSO
 @SOURCE_MAP
 @PREVIEW
-@report_option(REPORTED)
-def tile(direction: str, **options: Any) -> Task:
+def tile(direction: Any, **options: Any) -> Task:
     """Make PICTURE tile, or all maps of a material.
 
     A band along the edges is replaced; the rest does not change. PICTURE may be a folder with the maps of a material,
     whose names end in their kind, such as brick_albedo.png and brick_normal.png; the output is then a folder too. The
     albedo decides the arrangement. To let another map decide, give its path instead of the folder's.
     """
-    return continued("--direction", direction, dict.fromkeys(SIDES, 0), None, **options)
+    return continued(direction, dict.fromkeys(SIDES, 0), None, **options)
