@@ -17,7 +17,7 @@ from simdtex.cli.places import FOLDER
 @command(
     ("demo", "Make three textures, and a sheet of them, in the folder demo."),
 )
-@output_option("Write into this folder, which is new or empty.", FOLDER, default="demo", show_default=True)
+@output_option("Write into this folder.", FOLDER, default="demo", show_default=True)
 @click.option(
     "--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
 )
@@ -33,7 +33,9 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     from simdtex.synthesis import synthesize
 
     shape = image.parse_size(size)
-    earlier_files(output, "the pictures", lambda name: False)
+    names = [f"{name}.png" for name in (*EXAMPLES, "sheet")]
+    earlier = all((output / name).is_file() for name in names)
+    earlier_files(output, "the pictures", lambda name: earlier and name in names)
     machine = open_machine(device)
     click.echo(f"device: {machine.name}")
     output.mkdir(exist_ok=True)

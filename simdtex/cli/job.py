@@ -296,7 +296,10 @@ def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def watching(
-    quiet: bool, stages: Path | None, limits: tuple[float, float], checkpoint: Checkpoint | None
+    quiet: bool = False,
+    stages: Path | None = None,
+    limits: tuple[float, float] = (0.0, 1.0),
+    checkpoint: Checkpoint | None = None,
 ) -> Iterator[Callable[[Any], None]]:
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None

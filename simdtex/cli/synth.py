@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import last_iteration, output_shape, read_also, take_reading
+from simdtex.cli.inputs import last_iteration, output_shape, read_also, read_data, take_reading
 from simdtex.cli.job import Task, job, write_page
 from simdtex.cli.maps import Folder, arranged, read_lead
 from simdtex.cli.options import (

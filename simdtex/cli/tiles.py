@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 from math import prod
 from pathlib import Path
@@ -17,7 +16,7 @@ import click
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
-from simdtex.cli.job import command_line, observed, progress_bar
+from simdtex.cli.job import command_line, observed, watching
 from simdtex.cli.options import Parsed, option, together
 
 ALONE = ("stages", "profile", "array", "preview", "checkpoint")
@@ -95,7 +94,8 @@ def synthesize_in_tiles(
     options |= {"rng": given["seed"], "device": given["device"], "ended": _write_report}
     if given["report"]:
         options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
-    with _progress(output, given["quiet"]) as callback:
+    context.meta[RESUME] = output
+    with watching(given["quiet"]) as callback:
         distributed.synthesize(
             sample,
             shape,
@@ -114,7 +114,8 @@ def resume_tiles(store: Path, workers: int | str | None, device: str | None, qui
     from simdtex import distributed
 
     began, finished = time.perf_counter(), distributed.finished(store)
-    with _progress(store, quiet) as callback:
+    click.get_current_context().meta[RESUME] = store
+    with watching(quiet) as callback:
         distributed.resume(store, workers=workers, device=device, callback=callback, note=note, ended=_write_report)
     if finished:
         click.echo(f"{store} is finished already")
@@ -135,14 +136,6 @@ def _write_report(samples: list[Any], image: Any, output: Any, command: dict[str
         store = click.get_current_context().meta[RESUME]
         raise ValueError(f"{error}; then go on with: simdtex resume {store}") from None
     write_synthesis(command["report"], samples[0], image, output, command["line"])
-
-
-@contextmanager
-def _progress(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """Yield a callback that moves a progress bar; if the command is stopped, it says how to go on with the store."""
-    click.get_current_context().meta[RESUME] = store
-    with progress_bar(quiet) as show:
-        yield lambda progress: show(progress.fraction, progress.doing)
 
 
 def _done(store: Path, quiet: bool, began: float) -> None:
