@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
+from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import given, option, output_option, reads
 from simdtex.cli.places import READ, READ_NAMED, WRITE
@@ -26,11 +26,8 @@ UNLABELLED = 255
 
 
 @job(
-    (
-        "classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png",
-        "Label pixels as one of two classes, or as unknown.",
-    ),
-    ("classify photo.png --strokes strokes.png -o labels.png", "Learn the classes from strokes on the picture."),
+    ("classify a.png --texture brick=brick.png --texture grass=grass.png -o b.png", "Tell brick from grass."),
+    ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
     profile=True,
     report="labels, fits and, with --truth, the confusion matrix",
@@ -134,10 +131,9 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
         for file in files.split(","):
-            pixels = read_pixels(Path(file))[0]
-            pixels, gone = without_alpha(pixels, channels(picture.array))
+            pixels = without_alpha(read_pixels(Path(file)).pixels, channels(picture.array))
             check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
-            found[name].append(masked(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]), gone))
+            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
 
 

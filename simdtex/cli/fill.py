@@ -11,7 +11,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Reading, check_profiles, parted, planes, read_material
+from simdtex.cli.inputs import Reading, check_profiles, planes, read_material
 from simdtex.cli.job import Task, job
 from simdtex.cli.maps import arranged, read_lead
 from simdtex.cli.options import ALSO, MAP, OUTPUT, SOURCE_MAP, given
@@ -102,7 +102,7 @@ def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool) -> tuple[NDArra
     """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
-    pixels, gone = parted(pixels)
+    pixels, gone = np.ma.getdata(pixels), planes(np.ma.getmaskarray(pixels)).any(-1)
     if mask:
         hole = read_mask(mask, pixels.shape) != invert
     elif invert:

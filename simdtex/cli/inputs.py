@@ -128,23 +128,16 @@ def size(pixels: NDArray[Any]) -> str:
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def without_alpha(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return a picture without the alpha that pictures of so many channels lack, and where it is transparent."""
+def without_alpha(pixels: NDArray[Any], count: int) -> np.ma.MaskedArray[Any, Any]:
+    """Return a picture without the alpha that pictures of so many channels lack, masked where it is transparent."""
     from simdtex.io.image import split_alpha
 
-    return split_alpha(pixels) if channels(pixels) == count + 1 else (pixels, np.zeros(pixels.shape[:2], bool))
-
-
-def parted(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return a picture without the mask of a raster, and where a channel is masked."""
-    gone: NDArray[np.bool_] = np.asarray(np.ma.getmaskarray(pixels).reshape(*pixels.shape[:2], -1).any(-1))
-    return np.ma.getdata(pixels), gone
-
-
-def masked(pixels: NDArray[Any], gone: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
-    """Return a picture that is masked in all channels where it is gone."""
-    hidden = gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2))
-    return np.ma.MaskedArray(pixels, np.broadcast_to(hidden, pixels.shape))
+    found: NDArray[Any] = np.ma.getdata(pixels)
+    gone: NDArray[np.bool_] = np.asarray(planes(np.ma.getmaskarray(pixels)).any(-1))
+    if channels(found) == count + 1:
+        found, clear = split_alpha(found)
+        gone = gone | clear
+    return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
 
 
 def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = None) -> None:
@@ -359,9 +352,8 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    values, gone = parted(values)
-    values, clear = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
-    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone | clear)
+    found = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    return found.reshape(found.shape[:2]) if channels(found) == 1 else found
 
 
 def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
@@ -387,13 +379,11 @@ def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[
     """
     from simdtex.io.grids import kind_of
 
-    if samples.deep and (options["sample_mask"] or options["guide"]):
-        raise ValueError("--sample-mask and --guide take no volumes; use simdtex.simulate in Python")
-    if how.deep and kind_of(samples.paths[0]) == "raster" and (options["sample_mask"] or options.get("guide")):
-        raise ValueError(
-            f"{samples.paths[0]} is a raster, whose rows are counted from the south, and --sample-mask and --guide are "
-            "pictures; set no-data in the raster, or use simdtex.simulate in Python"
-        )
+    upward = how.deep and kind_of(samples.paths[0]) == "raster"
+    if (samples.deep or upward) and (options["sample_mask"] or options.get("guide")):
+        what = "a volume" if samples.deep else "a raster, whose rows are counted from the south"
+        remedy = "use simdtex.simulate in Python"
+        raise ValueError(f"{samples.paths[0]} is {what}, and --sample-mask and --guide are pictures; {remedy}")
     masks = read_masks(options.pop("sample_mask"), samples)
     file, guide = options.pop("known"), options.pop("guide", None)
     found: dict[str, Any] = {
@@ -427,8 +417,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
     if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
         pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
     *own, wanted = pictures
-    wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
-    free = free | unknown_in(planes(wanted))
+    shown = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
+    wanted, free = shown.data, planes(np.ma.getmaskarray(shown)).any(-1) | unknown_in(planes(shown.data))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or are_few):

@@ -44,12 +44,6 @@ class Pair(click.types.StringParamType):
     def __init__(self, role: str, named: bool = False) -> None:
         self.role, self.named = role, named
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the text itself, which its reader takes apart; fail if it is empty."""
-        if not value:
-            self.fail("it is empty; give two files with = between them, or leave the option out", param, ctx)
-        return str(value)
-
 
 READ, ENTER, WRITE, FOLDER, EITHER = (Place(role) for role in ("read", "enter", "write", "folder", "either"))
 READING = ("read", "enter")

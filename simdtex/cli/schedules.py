@@ -20,10 +20,7 @@ from simdtex.schedules import TOGETHER
 
 @command(
     ("schedules", "Compare schedules on a picture of brick, in the folder schedules-report."),
-    (
-        "schedules gravel.png -o page --schedule coloring,synchronous --seeds 5",
-        "Compare two schedules with five seeds.",
-    ),
+    ("schedules gravel.png -o page --schedule coloring,synchronous", "Compare two schedules."),
 )
 @click.argument("sample", required=False, type=READ)
 @output_option("Write the report into this folder.", FOLDER, default="schedules-report", show_default=True)

@@ -13,30 +13,13 @@ import numpy as np
 from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
 from simdtex.cli.inputs import MAPS, Material, output_shape, read_data, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import (
-    GUIDE,
-    given,
-    option,
-    output_option,
-    reads,
-    size_option,
-    training_options,
-)
+from simdtex.cli.options import GUIDE, given, option, output_option, reads, size_option, training_options
 
 
 @job(
-    (
-        "simulate facies.png -o many.nc --number 50 --categorical --known wells.csv",
-        "Simulate 50 realisations that honour the data of wells.",
-    ),
-    (
-        "simulate facies.png -o many.zarr --number 10 --size 500x500 --report page",
-        "Set the size, and write a page of statistics.",
-    ),
-    (
-        "simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10",
-        "Read a grid, and write a grid.",
-    ),
+    ("simulate facies.png -o many.nc -n 50 --categorical --known wells.csv", "Make 50 realisations that honour wells."),
+    ("simulate facies.png -o many.zarr -n 10 --size 500x500 --report page", "Set the size, and write a page."),
+    ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
     report="realisations, shares, entropy, variograms, connectivity, variety",
 )
@@ -127,10 +110,7 @@ def simulate(
 
 
 @job(
-    (
-        "estimate facies.png -o probabilities.nc --known wells.csv --categorical",
-        "Estimate the probability of each category, and the entropy.",
-    ),
+    ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Estimate the probabilities."),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
     random=False,
 )

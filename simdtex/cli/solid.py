@@ -22,10 +22,7 @@ SIDE = 128
 
 
 @job(
-    (
-        "solid marble.png -o block.npz --size 64 --view block.png",
-        "Make a cube of 64^3 voxels, and a picture of it.",
-    ),
+    ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
     usual="outputs size picture seed iterations pyramid dry_run device quiet",
     stages="the middle slice of every iteration",
