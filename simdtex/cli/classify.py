@@ -66,9 +66,9 @@ UNLABELLED = 255
 def classify(
     picture: Path,
     output: Path,
-    textures: tuple[str, ...],
+    textures: tuple[tuple[str, list[Path]], ...],
     strokes: Path | None,
-    validation: tuple[str, ...],
+    validation: tuple[tuple[str, list[Path]], ...],
     truth: Path | None,
     confidence: Path | None,
     **options: Any,
@@ -120,19 +120,18 @@ def classify(
     )
 
 
-def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
+def _read_samples(
+    flag: str, named: Sequence[tuple[str, list[Path]]], picture: Material
+) -> dict[str, list[NDArray[Any]]]:
     """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
     found: dict[str, list[NDArray[Any]]] = {}
-    for text in texts:
-        name, equals, files = text.partition("=")
-        if not (equals and name and files):
-            raise ValueError(f"{flag} {text} must be NAME=FILE")
+    for name, files in named:
         if name in found:
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
-        for file in files.split(","):
-            pixels = without_alpha(read_pixels(Path(file)).pixels, channels(picture.array))
-            check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
+        for file in files:
+            pixels = without_alpha(read_pixels(file).pixels, channels(picture.array))
+            check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
             found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
 

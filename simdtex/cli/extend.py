@@ -13,15 +13,13 @@ from simdtex.cli.inputs import Reading
 from simdtex.cli.job import Task, job, write_page
 from simdtex.cli.maps import arranged, read_lead
 from simdtex.cli.options import (
-    ALSO,
     BAND,
     DIRECTION,
     DIRECTIONS,
-    MAP,
     OUTPUT,
     PREVIEW,
-    SOURCE_MAP,
     given,
+    material_options,
     option,
     size_option,
 )
@@ -58,9 +56,7 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     "direction is given]",
 )
 @BAND
-@MAP
-@ALSO
-@SOURCE_MAP
+@material_options
 @PREVIEW
 def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
@@ -93,9 +89,7 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     help="Join left and right (x), top and bottom (y), or both.",
 )
 @BAND
-@MAP
-@ALSO
-@SOURCE_MAP
+@material_options
 @PREVIEW
 def tile(direction: Any, **options: Any) -> Task:
     """Make PICTURE tile, or all maps of a material.
@@ -114,7 +108,7 @@ def continued(
     *,
     picture: Path,
     output: Path,
-    roles: tuple[str, ...],
+    roles: tuple[Any, ...],
     **options: Any,
 ) -> Task:
     """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from simdtex.cli.inputs import Reading, check_profiles, planes, read_material
 from simdtex.cli.job import Task, job
 from simdtex.cli.maps import arranged, read_lead
-from simdtex.cli.options import ALSO, MAP, OUTPUT, SOURCE_MAP, given
+from simdtex.cli.options import OUTPUT, given, material_options
 from simdtex.cli.places import ENTER, READ
 from simdtex.model.pictures import unknown_in
 
@@ -56,17 +56,15 @@ from simdtex.model.pictures import unknown_in
     type=int,
     help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
 )
-@MAP
-@ALSO
-@SOURCE_MAP
+@material_options
 def fill(
     picture: Path,
     output: Path,
     mask: Path | None,
     invert: bool,
     samples: tuple[Path, ...],
-    roles: tuple[str, ...],
-    also: tuple[str, ...],
+    roles: tuple[Any, ...],
+    also: tuple[Any, ...],
     source_map: Path | None,
     **options: Any,
 ) -> Task:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
-from simdtex.cli.places import split_pair
 from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
@@ -224,42 +223,20 @@ def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0], crs[0])
 
 
-def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
-    """Read the masks of ``--sample-mask``, one for each sample, True where pixels may be taken from; or None."""
-    from simdtex.io import image
-
-    if not paths:
-        return None
+def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
+    """Raise unless an option names one file for each sample."""
     if len(paths) != len(samples.pixels):
-        raise ValueError(
-            f"there are {len(paths)} --sample-mask and {len(samples.pixels)} samples; give one for each sample"
-        )
-    return [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
+        counts = f"{len(paths)} files and there are {len(samples.pixels)} samples"
+        raise ValueError(f"{option} names {counts}; give one for each sample")
 
 
-def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[list[Path], Path]:
-    """Return the files that ``A=OUT`` names or, of several samples, ``A0,A1=OUT``: one for each sample, and OUT."""
-    (name, out), *others = split_pair(text)
-    if others:
-        raise ValueError(f"{option} {text} has two meanings, since {name} and {others[0][0]} exist: rename one of them")
-    names = [part.strip() for part in name.split(",")] if samples.several else [name]
-    if not (out and all(names)):
-        raise ValueError(f"{option} {text} must be {form}, two files")
-    if len(names) != len(samples.pixels):
-        raise ValueError(
-            f"{option} {text} names {len(names)} files and there are {len(samples.pixels)} samples; "
-            f"give one for each, separated by commas"
-        )
-    return [Path(one) for one in names], Path(out)
-
-
-def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) -> list[Also]:
+def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
     """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
     from simdtex.io import image
 
     found = []
-    for text in texts:
-        paths, out = read_pair("--also", "MAP=OUT", text, samples)
+    for paths, out in pairs:
+        check_each("--also", paths, samples)
         maps = read_material(paths)
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
             check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
@@ -377,6 +354,7 @@ def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[
 
     These options are taken out; ``labels`` is set if the guides decide it.
     """
+    from simdtex.io import image
     from simdtex.io.grids import kind_of
 
     upward = how.deep and kind_of(samples.paths[0]) == "raster"
@@ -384,7 +362,10 @@ def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[
         what = "a volume" if samples.deep else "a raster, whose rows are counted from the south"
         remedy = "use simdtex.simulate in Python"
         raise ValueError(f"{samples.paths[0]} is {what}, and --sample-mask and --guide are pictures; {remedy}")
-    masks = read_masks(options.pop("sample_mask"), samples)
+    masks = None
+    if paths := options.pop("sample_mask"):
+        check_each("--sample-mask", paths, samples)
+        masks = [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
     file, guide = options.pop("known"), options.pop("guide", None)
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
@@ -397,10 +378,10 @@ def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[
     return found
 
 
-def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tuple[Any, NDArray[Any]], bool | None]:
+def read_guides(
+    pair: tuple[list[Path], Path], samples: Material, labels: bool | None
+) -> tuple[tuple[Any, NDArray[Any]], bool | None]:
     """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and whether it is of labels; None: as it looks.
-
-    The guides of several samples are parted by commas.
 
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
     palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
@@ -410,7 +391,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
     from simdtex.methods.mrf.options import CATEGORIES, few
     from simdtex.methods.mrf.plan import LABELS
 
-    paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
+    paths, out = pair
+    check_each("--guide", paths, samples)
     found = [read_pixels(path, Reading(palette=True)) for path in (*paths, out)]
     pictures, lies = tuple(one.pixels for one in found), found[-1].lies
     palettes = [one.metadata and one.metadata.palette for one in found]

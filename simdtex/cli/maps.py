@@ -88,7 +88,7 @@ def arranged(
     samples: Material,
     metadata: Metadata | None,
     *,
-    also: Sequence[str],
+    also: Sequence[tuple[list[Path], Path]],
     source_map: Path | None,
     preview: bool = False,
     kept: bool = True,
@@ -134,17 +134,17 @@ def _write_copies(path: Path, made: NDArray[Any]) -> None:
 
 
 def read_lead(
-    pictures: Sequence[Path], output: Path, roles: Sequence[str], how: Reading
+    pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str, list[Path]]], how: Reading
 ) -> tuple[Folder | Path, Material]:
     """Return the output, as `folder_of` if it is of a folder, and the pictures that decide the arrangement."""
     folder = folder_of(pictures, output, roles)
     return folder or output, read_material([folder.lead] if folder else pictures, how)
 
 
-def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> Folder | None:
+def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str, list[Path]]]) -> Folder | None:
     """Return the maps of a folder, if it is the only one of `pictures`, or a map in it is and `output` is a folder.
 
-    Else None. ``roles`` are the texts of ``--map``.
+    Else None. ``roles`` are those of ``--map``, with their files.
     """
     from simdtex.model.material import READABLE, ROLES, find_maps
 
@@ -152,11 +152,10 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[str]) -> F
     whole = picture.is_dir()
     folder = picture if whole else picture.parent
     named, found = {}, None
-    for text in roles:
-        role, _, name = text.partition("=")
-        if role not in ROLES or not name:
-            raise ValueError(f"--map {text} must be ROLE=FILE, with one of the roles {', '.join(ROLES)}")
-        named[folder / name if name == Path(name).name else Path(name)] = role
+    for role, (path, *_) in roles:
+        if role not in ROLES:
+            raise ValueError(f"--map names the role {role}; give one of the roles {', '.join(ROLES)}")
+        named[path if path.parent.parts else folder / path] = role
     if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
         lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
         found = find_maps(folder, lead)

@@ -31,7 +31,7 @@ class Option(click.Option):
     """An option in a ``group`` of the help.
 
     The shell completes ``words``, which are the metavar if they are few. ``methods`` are the helps of those methods, of
-    several, that have the option; of one of them, ``method``. In a command with tiles the help ends in ``with_tiles``.
+    several, that have the option; of one of them, ``method``.
     """
 
     def __init__(
@@ -41,23 +41,16 @@ class Option(click.Option):
         words: Iterable[str] = (),
         method: str = "",
         methods: dict[str, str] | None = None,
-        with_tiles: str = "",
         **given: Any,
     ) -> None:
         super().__init__(*names, **given)
         self.group, self.words = group, list(dict.fromkeys(words))
-        self.methods, self.with_tiles = methods or ({method: str(self.help)} if method else {}), with_tiles
+        self.methods = methods or ({method: str(self.help)} if method else {})
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
         found = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
         return found or super().shell_complete(ctx, incomplete)
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """Return the names and the help in this command."""
-        found = super().get_help_record(ctx)
-        tiles = self.with_tiles if any(one.name == "tiles" for one in ctx.command.params) else ""
-        return found and (found[0], f"{found[1]} {tiles}".rstrip())
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -309,32 +302,33 @@ BAND = option(
     help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  "
     "[an eighth of the shorter side, 8 to 64]",
 )
-SOURCE_MAP = option(
-    "--source-map",
-    group=OUTPUTS,
-    type=WRITE,
-    metavar="FILE",
-    help="Write the position in the sample of each pixel: .npz, .npy or .png.",
-    with_tiles="With --tiles FILE is STORE/source.",
+material_options = together(
+    option(
+        "--map",
+        "roles",
+        group=DATA,
+        multiple=True,
+        type=READ_NAMED,
+        metavar="ROLE=FILE",
+        help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
+    ),
+    option(
+        "--also",
+        group=OUTPUTS,
+        multiple=True,
+        type=WRITE_PAIR,
+        metavar="MAP=OUT",
+        help="Arrange another map of the material (normal, height) like the output; may be repeated.",
+    ),
+    option(
+        "--source-map",
+        group=OUTPUTS,
+        type=WRITE,
+        metavar="FILE",
+        help="Write the position in the sample of each pixel: .npz, .npy or .png.",
+    ),
 )
-ALSO = option(
-    "--also",
-    group=OUTPUTS,
-    multiple=True,
-    type=WRITE_PAIR,
-    metavar="MAP=OUT",
-    help="Arrange another map of the material (normal, height) like the output; may be repeated.",
-    with_tiles="Give MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
-)
-MAP = option(
-    "--map",
-    "roles",
-    group=DATA,
-    multiple=True,
-    type=READ_NAMED,
-    metavar="ROLE=FILE",
-    help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
-)
+"""The maps of a material, and where the pixels are from."""
 
 
 def report_option(what: str) -> Callable[[Command], Command]:

@@ -13,15 +13,13 @@ from simdtex.cli.inputs import last_iteration, output_shape, read_also, read_dat
 from simdtex.cli.job import Task, job, write_page
 from simdtex.cli.maps import Folder, arranged, read_lead
 from simdtex.cli.options import (
-    ALSO,
     GUIDE,
-    MAP,
     METHODS,
     PREVIEW,
     SAMPLE_MASK,
-    SOURCE_MAP,
     data_options,
     given,
+    material_options,
     option,
     output_option,
     size_option,
@@ -53,9 +51,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @SAMPLE_MASK
 @data_options
 @GUIDE
-@MAP
-@SOURCE_MAP
-@ALSO
+@material_options
 @PREVIEW
 @tiles_options
 def synth(
@@ -64,15 +60,15 @@ def synth(
     size: str | None,
     method: str,
     source_map: Path | None,
-    roles: tuple[str, ...],
-    also: tuple[str, ...],
+    roles: tuple[Any, ...],
+    also: tuple[Any, ...],
     preview: bool,
     **options: Any,
 ) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
-    The method mrf takes several samples of one type; unknown pixels may be NaN. SAMPLE may be a folder with the maps
-    of a material, as in `simdtex tile`.
+    The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
     """
     from simdtex.synthesis import synthesize
 
@@ -81,7 +77,7 @@ def synth(
     how = take_reading(options)
     target, material = read_lead(samples, output, roles, how)
     if method == "pyramid" and (source_map or also or isinstance(target, Folder)):
-        remedy = "give one picture, without --source-map and --also"
+        remedy = "give one picture, and leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
     pixels = material.pixels[0]
     data = read_data(material, options, how)

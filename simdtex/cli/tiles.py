@@ -40,7 +40,7 @@ tiles_options = together(
         type=int,
         metavar="SIDE",
         help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
-        "one machine. The pixels are the same.",
+        "one machine. The pixels are the same. Then --source-map is STORE/source, and --also MAP=STORE/NAME.",
     ),
     workers_option,
 )
