@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from simdtex.cli.command import DATA, OUTPUTS
 from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option, output_option, reads
+from simdtex.cli.options import PROFILE, given, option, output_option, reads, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
 from simdtex.model.pictures import check_alike
 
@@ -29,9 +29,9 @@ UNLABELLED = 255
     ("classify a.png --texture brick=brick.png --texture grass=grass.png -o b.png", "Tell brick from grass."),
     ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
-    profile=True,
-    report="labels, fits and, with --truth, the confusion matrix",
 )
+@report_option("labels, fits and, with --truth, the confusion matrix")
+@PROFILE
 @click.argument("picture", type=READ)
 @output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
 @option(

@@ -19,17 +19,7 @@ import click
 
 from simdtex.cli.command import WORDS, command
 from simdtex.cli.ending import RESUME, afterwards, note, settle
-from simdtex.cli.options import (
-    CHECKPOINT,
-    DEVICE,
-    DRY_RUN,
-    PROFILE,
-    QUIET,
-    SEED,
-    job_options,
-    report_option,
-    stages_option,
-)
+from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, QUIET, SEED, job_options, together
 
 if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
@@ -68,21 +58,14 @@ class Task(NamedTuple):
 
 
 def job(
-    *examples: tuple[str, str],
-    usual: str = "",
-    of: str = "",
-    stages: str = "",
-    profile: bool = False,
-    report: str = "",
-    random: bool = True,
+    *examples: tuple[str, str], usual: str = "", of: str | None = ""
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
     The command has the options of its methods, ``--seed``, ``--dry-run``, ``--device``, ``--checkpoint`` and
-    ``--quiet`` beside those of the function, and ``--stages``, ``--report`` and ``--profile`` if it is said what these
-    show, and that kernels are timed. ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job
-    whose options the command has, by default that of its name. A command that is not ``random`` has no such options, no
-    ``--seed`` and no ``--checkpoint``.
+    ``--quiet`` beside those of the function, of which ``--stages``, ``--report`` and ``--profile`` are followed here.
+    ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the command has, by
+    default that of its name. With None it has no such options, no ``--seed`` and no ``--checkpoint``.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
@@ -94,14 +77,14 @@ def job(
             seed: int | None = None,
             checkpoint: Path | None = None,
             stages: Path | None = None,
+            report: Path | None = None,
             profile: bool = False,
             **own: Any,
         ) -> None:
-            page: Path | None = own.pop("report", None)
-            if page:
+            if report:
                 from simdtex.report.page import check_folder
 
-                check_folder(page)
+                check_folder(report)
             task = plan(**own)
             if task is None:
                 return
@@ -115,8 +98,8 @@ def job(
             with watching(quiet, stages, task.limits, kept) as callback:
                 given = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
                 made, output = task.make(full_output=True, **given)
-            if page and task.report:
-                task.outputs.append(partial(task.report, page))
+            if report and task.report:
+                task.outputs.append(partial(task.report, report))
             for write in task.outputs:
                 with afterwards():
                     write(made, output)
@@ -126,7 +109,7 @@ def job(
             statistics = output.statistics
             if not quiet:
                 seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
-                drawn = f", seed {statistics['seed']}" if random else ""
+                drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
                 click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
                 if task.more:
                     task.more(made, statistics)
@@ -136,13 +119,8 @@ def job(
                 print_profile(statistics)
 
         own = planned.__dict__.pop("__click_params__", [])
-        shared: list[Callable[..., Any]] = [DEVICE, DRY_RUN, QUIET]
-        if random:
-            shared = [SEED, DEVICE, job_options(of or plan.__name__), CHECKPOINT, DRY_RUN, QUIET]
-        shared += [stages_option(stages)] * bool(stages) + [PROFILE] * profile + [report_option(report)] * bool(report)
-        function: Any = planned
-        for add in reversed(shared):
-            function = add(function)
+        drawn = () if of is None else (SEED, job_options(of or plan.__name__), CHECKPOINT)
+        function: Any = together(*drawn, DEVICE, DRY_RUN, QUIET)(planned)
         function.__click_params__ += own
         return command(*examples, usual=usual)(function)
 

@@ -11,7 +11,7 @@ import click
 
 from simdtex.cli.inputs import channels, check_profiles, last_iteration, output_shape, read_picture
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import NUMBERS, given, output_option, size_option
+from simdtex.cli.options import NUMBERS, PROFILE, given, output_option, size_option, stages_option
 from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
@@ -22,9 +22,9 @@ CHOSEN = ("palette", "pattern", "low", "high")
     ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
     usual="output size palette pattern average low high seed dry_run device quiet",
-    stages="every iteration",
-    profile=True,
 )
+@stages_option("every iteration")
+@PROFILE
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @output_option("Write this picture.", WRITE)
 @size_option("twice the first sample", base="the first sample")

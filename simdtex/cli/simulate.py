@@ -13,7 +13,7 @@ import numpy as np
 from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
 from simdtex.cli.inputs import MAPS, Material, output_shape, read_data, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import GUIDE, given, option, output_option, reads, size_option, training_options
+from simdtex.cli.options import GUIDE, given, option, output_option, reads, report_option, size_option, training_options
 
 
 @job(
@@ -21,8 +21,8 @@ from simdtex.cli.options import GUIDE, given, option, output_option, reads, size
     ("simulate facies.png -o many.zarr -n 10 --size 500x500 --report page", "Set the size, and write a page."),
     ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
-    report="realisations, shares, entropy, variograms, connectivity, variety",
 )
+@report_option("realisations, shares, entropy, variograms, connectivity, variety")
 @training_options
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
@@ -112,7 +112,7 @@ def simulate(
 @job(
     ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Estimate the probabilities."),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
-    random=False,
+    of=None,
 )
 @training_options
 @output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")

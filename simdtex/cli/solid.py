@@ -14,7 +14,7 @@ from simdtex.cli.command import OUTPUTS
 from simdtex.cli.inputs import channels, last_iteration, read_material
 from simdtex.cli.inputs import size as size_of
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import given, option
+from simdtex.cli.options import PROFILE, given, option, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
 
 SIDE = 128
@@ -25,9 +25,9 @@ SIDE = 128
     ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
     usual="outputs size picture seed iterations pyramid dry_run device quiet",
-    stages="the middle slice of every iteration",
-    profile=True,
 )
+@stages_option("the middle slice of every iteration")
+@PROFILE
 @click.argument("sample", type=READ)
 @click.option(
     "-o",

@@ -16,13 +16,16 @@ from simdtex.cli.options import (
     GUIDE,
     METHODS,
     PREVIEW,
+    PROFILE,
     SAMPLE_MASK,
     data_options,
     given,
     material_options,
     option,
     output_option,
+    report_option,
     size_option,
+    stages_option,
 )
 from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
@@ -34,10 +37,10 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     ("synth gravel.png -o more.png --size 1024x512 --preview", "Set the size, and see 3x3 copies in more-3x3.png."),
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     usual="output size seed method order also guide preview report dry_run device quiet",
-    stages="every level, sweep or iteration",
-    report="its pictures, how evenly it uses the sample, and how much it copies",
-    profile=True,
 )
+@stages_option("every level, sweep or iteration")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
+@PROFILE
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
 @size_option("that of --known or of the output guide, else twice the first sample")
