@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size, without_alpha
+from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size_text, without_alpha
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import PROFILE, given, option, output_option, reads, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
@@ -114,7 +114,7 @@ def classify(
         write_classification(folder, pixels, made, run, true, command_line())
 
     run = partial(classify, pixels, known, **more, **given(options))
-    summary = f"{size(pixels)}, {len(names)} classes"
+    summary = f"{size_text(pixels)}, {len(names)} classes"
     return Task(
         run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)), report=report
     )
@@ -142,7 +142,9 @@ def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
 
     true, pixels = read_labels(path, UNLABELLED), picture.array
     if true.shape != pixels.shape[:2]:
-        raise ValueError(f"{path} is {size(true)} and {picture.paths[0]} {size(pixels)}; give labels of its size")
+        raise ValueError(
+            f"{path} is {size_text(true)} and {picture.paths[0]} {size_text(pixels)}; give labels of its size"
+        )
     return true
 
 

@@ -122,7 +122,7 @@ def channels(pixels: NDArray[Any]) -> int:
     return int(planes(pixels).shape[2])
 
 
-def size(pixels: NDArray[Any]) -> str:
+def size_text(pixels: NDArray[Any]) -> str:
     """Return width x height as text."""
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
@@ -241,9 +241,8 @@ def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, fi
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
             check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
             if pixels.shape[:2] != sample.shape[:2]:
-                raise ValueError(
-                    f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
-                )
+                sizes = f"{path} is {size_text(pixels)} and {of} {size_text(sample)}"
+                raise ValueError(f"{sizes}; give --also a map of the sample's size")
         if files:
             image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
         found.append(Also(maps, out))

@@ -22,7 +22,7 @@ from simdtex.cli.inputs import (
     note_lossy,
     read_also,
     read_material,
-    size,
+    size_text,
 )
 from simdtex.cli.places import Named, check_input, preview_of
 
@@ -53,10 +53,8 @@ class Folder:
         for path in sorted(self.found.files, key=lambda path: path != self.lead):
             maps = read_material([path]) if self.maps else lead
             if maps.sizes != lead.sizes:
-                raise ValueError(
-                    f"{path} is {size(maps.pixels[0])} and {self.lead.name} {size(lead.pixels[0])}: scale it to that "
-                    "size, or move it out of the folder"
-                )
+                sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
+                raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
             self.maps.append(Also(maps, self.output / _written(path, maps.pixels[0])))
         names = [one.out.name for one in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
@@ -136,15 +134,10 @@ def _write_copies(path: Path, made: NDArray[Any]) -> None:
 def read_lead(
     pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str, list[Path]]], how: Reading
 ) -> tuple[Folder | Path, Material]:
-    """Return the output, as `folder_of` if it is of a folder, and the pictures that decide the arrangement."""
-    folder = folder_of(pictures, output, roles)
-    return folder or output, read_material([folder.lead] if folder else pictures, how)
+    """Return the output, and the pictures that decide its arrangement.
 
-
-def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str, list[Path]]]) -> Folder | None:
-    """Return the maps of a folder, if it is the only one of `pictures`, or a map in it is and `output` is a folder.
-
-    Else None. ``roles`` are those of ``--map``, with their files.
+    The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
+    folder. ``roles`` are those of ``--map``, with their files.
     """
     from simdtex.model.material import READABLE, ROLES, find_maps
 
@@ -163,7 +156,7 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str,
     if found is None or not (whole or picture in found.files):
         if roles:
             raise ValueError("--map requires a folder of maps: give a folder for the sample and for the output")
-        return None
+        return output, read_material(pictures, how)
     albedos = [lead] if lead else [path for path, role in found.files.items() if role == "albedo"]
     if len(albedos) > 1:
         raise ValueError(f"{albedos[0]} and {albedos[1].name} are both albedo maps: give the path of one")
@@ -178,7 +171,7 @@ def folder_of(pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str,
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files:
         check_input(Named(output, "folder"), Named(path, "read"))
-    return Folder(found, albedos[0], output)
+    return Folder(found, albedos[0], output), read_material(albedos[:1], how)
 
 
 def _written(path: Path, pixels: NDArray[Any]) -> str:

@@ -32,6 +32,9 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
 
     FILE is the file of --checkpoint, or the .zarr store of --tiles.
     """
+    from simdtex.checkpoint import read
+    from simdtex.cli import load
+
     if (path / "zarr.json").is_file() or (path / "work").is_dir():
         resume_tiles(path, workers, device, quiet)
         return
@@ -41,15 +44,6 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
         raise ValueError(f"{path} does not exist: check the path (a finished run has no checkpoint)")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; give the file of --checkpoint, or the store of --tiles")
-    given = {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
-    repeat_command(path, {name: value for name, value in given.items() if value})
-
-
-def repeat_command(path: Path, more: dict[str, Any]) -> None:
-    """Run the command of a checkpoint again, with more options, in the folder in which it was given."""
-    from simdtex.checkpoint import read
-    from simdtex.cli import load
-
     command: dict[str, Any] | None = read(path)[0]["command"]
     if command is None:
         raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
@@ -59,7 +53,7 @@ def repeat_command(path: Path, more: dict[str, Any]) -> None:
         raise ValueError(
             f"{command['folder']}, the folder in which the run in {path} was started, does not exist; restore it"
         )
-    again = load(command["name"])
+    again, given = load(command["name"]), {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
     with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
-        context.params |= more
+        context.params |= {name: value for name, value in given.items() if value}
         again.invoke(context)
