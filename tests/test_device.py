@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from simdtex.cli.devices import render
+from simdtex.cli.machine import render
 from simdtex.machine import devices as device
 from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError, DeviceInfo

@@ -45,7 +45,10 @@ GROUPS = {
 
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
-MODULES = {"tile": "extend", "fill": "extend", "estimate": "simulate", "solid": "mix", "ising": "schedules"}
+MODULES = {
+    **{"tile": "extend", "fill": "extend", "estimate": "simulate", "solid": "mix", "ising": "schedules"},
+    **{"demo": "machine", "devices": "machine", "bench": "machine"},
+}
 """The modules of commands that are not in the one of their name."""
 
 WHAT = "Texture synthesis from samples, by parallel relaxation on any OpenCL device."
