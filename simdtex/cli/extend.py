@@ -113,21 +113,19 @@ def continued(
     *,
     picture: Path,
     output: Path,
-    roles: tuple[Any, ...],
     **options: Any,
 ) -> Task:
     """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
     from simdtex import extend
 
-    target, whole = read_lead([picture], output, roles, Reading(palette=bool(options["categorical"])))
+    target, whole = read_lead([picture], output, options, Reading(palette=bool(options["categorical"])))
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     if size is not None:
         sides = _sides(size, sides, (rows, cols))
     metadata = whole.metadata
     if metadata and metadata.geo:
         metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
-    outputs = {name: options.pop(name) for name in ("also", "source_map", "preview")}
-    writers = arranged(target, whole, metadata, **outputs)
+    writers = arranged(target, whole, metadata, options)
     width, height = cols + sides["left"] + sides["right"], rows + sides["top"] + sides["bottom"]
     return Task(
         partial(extend, pixels, seamless=seamless, channel_axis=whole.channel_axis, **sides, **given(options)),
@@ -198,9 +196,6 @@ def fill(
     mask: Path | None,
     invert: bool,
     samples: tuple[Path, ...],
-    roles: tuple[Any, ...],
-    also: tuple[Any, ...],
-    source_map: Path | None,
     **options: Any,
 ) -> Task:
     """Fill the holes of PICTURE with the texture around them.
@@ -212,14 +207,14 @@ def fill(
     from simdtex.jobs.filling import widened
 
     how = Reading(palette=bool(options["categorical"]))
-    target, whole = read_lead([picture], output, roles, how)
+    target, whole = read_lead([picture], output, options, how)
     pixels, hole = _hole(whole.pixels[0], mask, invert)
     whole = whole._replace(pixels=[pixels])
     texture = read_material(samples, how) if samples else None
     if texture:
         check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
     foreign = "maps cannot be filled with --sample, since no pixel comes from the picture" if texture else ""
-    writers = arranged(target, whole, whole.metadata, also=also, source_map=source_map, foreign=foreign)
+    writers = arranged(target, whole, whole.metadata, options, foreign=foreign)
     sample = texture and texture.array
     filled = np.count_nonzero(widened(hole, options["grow"], options["feather"]))
     axis = None if pixels.ndim == 2 else -1

@@ -85,22 +85,21 @@ def arranged(
     output: Folder | Path,
     samples: Material,
     metadata: Metadata | None,
+    options: dict[str, Any],
     *,
-    also: Sequence[tuple[list[Path], Path]],
-    source_map: Path | None,
-    preview: bool = False,
     kept: bool = True,
     foreign: str = "",
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture or all maps of a folder, ``--also``, ``--source-map`` and ``--preview``.
 
-    Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to stay as they are, and its
-    ``metadata`` holds for the output; a format that loses them is noted. ``foreign``: why pixels are not from the
-    sample, so that other maps have none for them.
+    These options are taken out. Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to
+    stay as they are, and its ``metadata`` holds for the output; a format that loses them is noted. ``foreign``: why
+    pixels are not from the sample, so that other maps have none for them.
     """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
+    also, source_map = options.pop("also"), options.pop("source_map")
     if foreign and (also or isinstance(output, Folder)):
         raise ValueError(f"{foreign}; {'leave --also out' if also else 'give one picture'}")
     check_source_map(source_map, samples, everywhere=not foreign)
@@ -116,7 +115,7 @@ def arranged(
     writers += [one.write for one in others]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
-    if preview:
+    if options.pop("preview", False):
         path = preview_of(output.output if isinstance(output, Folder) else output)
         palette = metadata and metadata.palette
         writers.append(lambda made, run: _write_copies(path, image.coloured(made, palette or None)))
@@ -132,12 +131,12 @@ def _write_copies(path: Path, made: NDArray[Any]) -> None:
 
 
 def read_lead(
-    pictures: Sequence[Path], output: Path, roles: Sequence[tuple[str, list[Path]]], how: Reading
+    pictures: Sequence[Path], output: Path, options: dict[str, Any], how: Reading
 ) -> tuple[Folder | Path, Material]:
     """Return the output, and the pictures that decide its arrangement.
 
     The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
-    folder. ``roles`` are those of ``--map``, with their files.
+    folder. The roles of ``--map`` are taken out of the options.
     """
     from simdtex.model.material import READABLE, ROLES, find_maps
 
@@ -145,6 +144,7 @@ def read_lead(
     whole = picture.is_dir()
     folder = picture if whole else picture.parent
     named, found = {}, None
+    roles: Sequence[tuple[str, list[Path]]] = options.pop("roles")
     for role, (path, *_) in roles:
         if role not in ROLES:
             raise ValueError(f"--map names the role {role}; give one of the roles {', '.join(ROLES)}")

@@ -11,15 +11,7 @@ import click
 import numpy as np
 
 from simdtex.cli.command import OUTPUTS
-from simdtex.cli.inputs import (
-    channels,
-    check_profiles,
-    last_iteration,
-    output_shape,
-    read_material,
-    read_picture,
-    size_text,
-)
+from simdtex.cli.inputs import channels, last_iteration, output_shape, read_material, size_text
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import NUMBERS, PROFILE, given, option, output_option, size_option, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
@@ -58,18 +50,17 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
     from simdtex.methods.pyramid.mixtures import mix
 
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
-    pictures = [read_picture(path) for path in samples]
-    check_profiles(samples, [picture.metadata for picture in pictures])
-    arrays = [picture.pixels for picture in pictures]
-    shape = output_shape(size, arrays[0])
-    axis = -1 if any(picture.channel_axis is not None for picture in pictures) else None
-    image.check_writable(output, arrays[0].dtype, max(map(channels, arrays)))
+    material = read_material(samples)
+    pixels, metadata = material.pixels, material.metadata and material.metadata._replace(exif=None)
+    shape = output_shape(size, pixels[0])
+    axis = -1 if any(one.ndim > 2 for one in pixels) else None
+    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)))
     return Task(
-        partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen)),
-        f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
+        partial(mix, pixels, shape, channel_axis=axis, **given(options | chosen)),
+        f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
         str(output),
-        [lambda made, run: image.write(output, made, pictures[0].metadata._replace(exif=None))],
-        (min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)),
+        [lambda made, run: image.write(output, made, metadata)],
+        material.limits,
         lambda made, statistics: click.echo(last_iteration(statistics)),
     )
 

@@ -57,17 +57,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @material_options
 @PREVIEW
 @tiles_options
-def synth(
-    samples: tuple[Path, ...],
-    output: Path,
-    size: str | None,
-    method: str,
-    source_map: Path | None,
-    roles: tuple[Any, ...],
-    also: tuple[Any, ...],
-    preview: bool,
-    **options: Any,
-) -> Task | None:
+def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
@@ -78,25 +68,24 @@ def synth(
     context = click.get_current_context()
     check_tiles(context)
     how = take_reading(options)
-    target, material = read_lead(samples, output, roles, how)
-    if method == "pyramid" and (source_map or also or isinstance(target, Folder)):
+    target, material = read_lead(samples, output, options, how)
+    if method == "pyramid" and (options["source_map"] or options["also"] or isinstance(target, Folder)):
         remedy = "give one picture, and leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
     pixels = material.pixels[0]
     data = read_data(material, options, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
-    inputs = data | given(options, without=("tiles", "workers"))
     if context.params["report"] and (material.several or known is not None or not material.known):
         raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
     if options["tiles"] is not None:
-        others = read_also(also, material, files=False)
-        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
+        others = read_also(options["also"], material, files=False)
+        left_out = ("tiles", "workers", "also", "source_map", "preview")
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
     like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
-    outputs: dict[str, Any] = {"also": also, "source_map": source_map, "preview": preview}
-    writers = arranged(target, material, like, **outputs, kept=known is not None, foreign=foreign)
+    writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
     def more(made: Any, statistics: dict[str, Any]) -> None:
         if method == "multires":
@@ -117,7 +106,7 @@ def synth(
     height, width = material.sizes[0]
     by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
     return Task(
-        partial(synthesize, material.array, shape, method=method, **inputs),
+        partial(synthesize, material.array, shape, method=method, **data | given(options)),
         f"{shape[1]}x{shape[0]} from {by}",
         str(target),
         writers,
