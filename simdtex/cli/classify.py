@@ -82,7 +82,10 @@ def classify(
     from simdtex.model.labels import read_labels, write_labels
 
     whole = read_material([picture])
-    true = None if truth is None else _read_truth(truth, whole)
+    true = None if truth is None else read_labels(truth, UNLABELLED)
+    if true is not None and true.shape != whole.sizes[0]:
+        sizes = f"{truth} is {size_text(true)} and {picture} {size_text(whole.array)}"
+        raise ValueError(f"{sizes}; give labels of its size")
     held = _read_samples("--validation", validation, whole)
     if bool(textures) == bool(strokes):
         raise ValueError("give --texture once for each class, or --strokes")
@@ -134,18 +137,6 @@ def _read_samples(
             check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
             found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
-
-
-def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
-    """Read the labels that are to be found; raise if they have another size."""
-    from simdtex.model.labels import read_labels
-
-    true, pixels = read_labels(path, UNLABELLED), picture.array
-    if true.shape != pixels.shape[:2]:
-        raise ValueError(
-            f"{path} is {size_text(true)} and {picture.paths[0]} {size_text(pixels)}; give labels of its size"
-        )
-    return true
 
 
 def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:

@@ -107,13 +107,7 @@ def tile(direction: Any, **options: Any) -> Task:
 
 
 def continued(
-    seamless: Any,
-    sides: dict[str, int],
-    size: str | None,
-    *,
-    picture: Path,
-    output: Path,
-    **options: Any,
+    seamless: Any, sides: dict[str, int], size: str | None, *, picture: Path, output: Path, **options: Any
 ) -> Task:
     """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
     from simdtex import extend
@@ -191,12 +185,7 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
 )
 @material_options
 def fill(
-    picture: Path,
-    output: Path,
-    mask: Path | None,
-    invert: bool,
-    samples: tuple[Path, ...],
-    **options: Any,
+    picture: Path, output: Path, mask: Path | None, invert: bool, samples: tuple[Path, ...], **options: Any
 ) -> Task:
     """Fill the holes of PICTURE with the texture around them.
 

@@ -274,20 +274,6 @@ def last_iteration(statistics: dict[str, Any]) -> str:
     return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
 
 
-def check_source_map(path: Path | None, samples: Material, *, everywhere: bool = True) -> None:
-    """Raise where a source map cannot be written there; ``everywhere`` says that all pixels are from a sample."""
-    from simdtex.io import image
-    from simdtex.model.source_map import SOURCE_SUFFIXES
-
-    if path is None:
-        return
-    image.check_writable(path, suffixes=SOURCE_SUFFIXES)
-    far = max(max(sides) for sides in samples.sizes) > 2**16
-    if path.suffix.lower() == ".png" and (far or not everywhere):
-        what = "positions over 65535" if far else "pixels that are not from the sample"
-        raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
-
-
 def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
     from simdtex.io import grids, image

@@ -13,17 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
-from simdtex.cli.inputs import (
-    Also,
-    Material,
-    Reading,
-    channels,
-    check_source_map,
-    note_lossy,
-    read_also,
-    read_material,
-    size_text,
-)
+from simdtex.cli.inputs import Also, Material, Reading, channels, note_lossy, read_also, read_material, size_text
 from simdtex.cli.places import Named, check_input, preview_of
 
 if TYPE_CHECKING:
@@ -102,7 +92,8 @@ def arranged(
     also, source_map = options.pop("also"), options.pop("source_map")
     if foreign and (also or isinstance(output, Folder)):
         raise ValueError(f"{foreign}; {'leave --also out' if also else 'give one picture'}")
-    check_source_map(source_map, samples, everywhere=not foreign)
+    if source_map:
+        check_source_map(source_map, samples, everywhere=not foreign)
     others, pixels = read_also(also, samples), samples.pixels[0]
     if isinstance(output, Folder):
         output.read(samples)
@@ -120,6 +111,18 @@ def arranged(
         palette = metadata and metadata.palette
         writers.append(lambda made, run: _write_copies(path, image.coloured(made, palette or None)))
     return writers
+
+
+def check_source_map(path: Path, samples: Material, everywhere: bool) -> None:
+    """Raise where a source map cannot be written there; ``everywhere`` says that all pixels are from a sample."""
+    from simdtex.io import image
+    from simdtex.model.source_map import SOURCE_SUFFIXES
+
+    image.check_writable(path, suffixes=SOURCE_SUFFIXES)
+    far = max(max(sides) for sides in samples.sizes) > 2**16
+    if path.suffix.lower() == ".png" and (far or not everywhere):
+        what = "positions over 65535" if far else "pixels that are not from the sample"
+        raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
 def _write_copies(path: Path, made: NDArray[Any]) -> None:

@@ -19,9 +19,6 @@ from simdtex.cli.places import EITHER, READ, WRITE
 CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""
 
-VOXELS = 128
-"""The default size of a block, voxels a side."""
-
 
 @job(
     ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
@@ -98,8 +95,10 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
 )
 @click.option(
     "--size",
+    default="128",
+    show_default=True,
     metavar="DEPTHxHEIGHTxWIDTH",
-    help=f"Make a block of this many slices, rows and columns; one number makes a cube.  [{VOXELS}]",
+    help="Make a block of this many slices, rows and columns; one number makes a cube.",
 )
 @option(
     "--view",
@@ -109,7 +108,7 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     metavar="PNG",
     help="Write a picture of the block: a cube, a sphere and three slices.",
 )
-def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Path | None, **options: Any) -> Task:
+def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
     """Make a solid block whose slices have the texture of SAMPLE.
 
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
@@ -118,7 +117,7 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Pa
     from simdtex.report.solid import view
     from simdtex.synthesis import synthesize_solid
 
-    shape: Any = image.parse_sides(str(VOXELS) if size is None else size, "DEPTHxHEIGHTxWIDTH")
+    shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")
     material = read_material([sample])
     pixels = material.pixels[0]
     writers: list[Any] = []

@@ -195,13 +195,13 @@ CHECKPOINT = option(
 )
 
 
-SAMPLE_MASK = reads(
-    "--sample-mask",
-    multiple=True,
-    method="mrf",
-    help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
-)
 data_options = together(
+    reads(
+        "--sample-mask",
+        multiple=True,
+        method="mrf",
+        help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
+    ),
     reads(
         "--known",
         method="mrf",
@@ -237,7 +237,7 @@ data_options = together(
         "the values of the sample]",
     ),
 )
-"""``--known`` and the options that say how its table is read."""
+"""``--sample-mask``, ``--known``, and the options that say how its table is read."""
 
 GUIDE = option(
     "--guide",
@@ -292,7 +292,6 @@ training_options = together(
         help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
     ),
     data_options,
-    SAMPLE_MASK,
 )
 """The training image, its data, and where its cells and they lie."""
 

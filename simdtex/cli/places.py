@@ -46,15 +46,12 @@ class Pair(click.types.StringParamType):
         """Return both sides; raise ValueError if one is missing, or if it is not clear where the left one ends."""
         if not isinstance(value, str) or not isinstance(param, click.Option):
             return value
-        left, right = value.partition("=")[::2]
-        if not self.named:
-            ends = [
-                at for at, letter in enumerate(value) if letter == "=" and all(map(os.path.exists, files(value[:at])))
-            ]
-            if len(ends) > 1:
-                two = " and ".join(value[:at] for at in ends[:2])
-                raise ValueError(f"{param.opts[-1]} {value} has two meanings, since {two} exist: rename one of them")
-            left, right = next(((value[:at], value[at + 1 :]) for at in ends), (left, right))
+        cuts = [(value[:at], value[at + 1 :]) for at, letter in enumerate(value) if letter == "="] or [(value, "")]
+        found = [] if self.named else [cut for cut in cuts if all(map(os.path.exists, files(cut[0])))]
+        if len(found) > 1:
+            two = f"{found[0][0]} and {found[1][0]}"
+            raise ValueError(f"{param.opts[-1]} {value} has two meanings, since {two} exist: rename one of them")
+        left, right = (found or cuts)[0]
         if not (left and right):
             raise ValueError(f"{param.opts[-1]} {value!r} must be {param.metavar}")
         return (left, files(right)) if self.named else (files(left), Path(right))

@@ -50,14 +50,7 @@ PICTURE_SWEEPS = 50
 @DEVICE
 @QUIET
 def schedules(
-    sample: Path | None,
-    output: Path,
-    names: str,
-    seeds: int,
-    seed: int,
-    size: str,
-    quiet: bool,
-    **options: Any,
+    sample: Path | None, output: Path, names: str, seeds: int, seed: int, size: str, quiet: bool, **options: Any
 ) -> None:
     """Run the same job under several schedules and compare them in a report.
 

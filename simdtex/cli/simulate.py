@@ -64,12 +64,7 @@ from simdtex.cli.options import GUIDE, given, option, output_option, reads, repo
     help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
 )
 def simulate(
-    training_image: tuple[Path, ...],
-    output: Path,
-    number: int,
-    size: str | None,
-    source: bool,
-    **options: Any,
+    training_image: tuple[Path, ...], output: Path, number: int, size: str | None, source: bool, **options: Any
 ) -> Task:
     """Simulate realisations that look like TRAINING_IMAGE and honour data.
 

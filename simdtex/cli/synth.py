@@ -17,7 +17,6 @@ from simdtex.cli.options import (
     METHODS,
     PREVIEW,
     PROFILE,
-    SAMPLE_MASK,
     data_options,
     given,
     material_options,
@@ -51,7 +50,6 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     words=METHODS["synth"],
     help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
-@SAMPLE_MASK
 @data_options
 @GUIDE
 @material_options

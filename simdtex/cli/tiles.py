@@ -91,21 +91,13 @@ def synthesize_in_tiles(
             seconds, _ = observed(partial(synthesize, sample, (side, side), **own), given["device"])
             click.echo(f"one process needs about {duration_text(seconds * prod(shape) / side**2)}; nothing was written")
         return
-    options |= {"rng": given["seed"], "device": given["device"], "ended": _write_report}
+    options |= {"rng": given["seed"], "ended": _write_report, "note": note}
+    options |= {name: given[name] for name in ("tiles", "workers", "device")}
     if given["report"]:
         options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
     context.meta[RESUME] = output
     with watching(given["quiet"]) as callback:
-        distributed.synthesize(
-            sample,
-            shape,
-            output,
-            tiles=given["tiles"],
-            workers=given["workers"],
-            callback=callback,
-            note=note,
-            **options,
-        )
+        distributed.synthesize(sample, shape, output, callback=callback, **options)
     _done(output, given["quiet"], began)
 
 
