@@ -261,6 +261,8 @@ BAD = {
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
     "an origin of one number": ([*GREY, "--origin", "1"], "origin is (1.0,); give (x, y) or (x, y, z)"),
     "no origin": ([*GREY, "--origin", ""], "must be numbers"),
+    "a text for a number": ([*GREY, "--categories", "sand=x"], "--categories sand=x must be NAME=NUMBER,..."),
+    "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
     "a negative cell": ([*GREY, "--cell", "1,-1"], "give sizes above 0"),
     "an unknown rule": ([*FACIES, "--known", "facies.csv", "--several", "least"], "choose one of: refuse, mean, most"),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
