@@ -30,8 +30,6 @@ UNLABELLED = 255
     ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
 )
-@report_option("labels, fits and, with --truth, the confusion matrix")
-@PROFILE
 @click.argument("picture", type=READ)
 @output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
 @option(
@@ -63,6 +61,8 @@ UNLABELLED = 255
     group=OUTPUTS,
     help="Write the fit of each class at each pixel, 0 to 1, one band for each class: .tif or .npy.",
 )
+@report_option("labels, fits and, with --truth, the confusion matrix")
+@PROFILE
 def classify(
     picture: Path,
     output: Path,

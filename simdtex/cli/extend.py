@@ -41,8 +41,6 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     ("extend brick -o larger --right 512", "Extend all maps in the folder brick: albedo, normal, roughness..."),
     usual="output left right top bottom size seamless seed also preview dry_run device quiet",
 )
-@stages_option("every level and sweep")
-@report_option(REPORTED)
 @click.argument("picture", type=ENTER)
 @OUTPUT
 @click.option("--left", type=int, default=0, help="Add this many pixels at the left.")
@@ -63,6 +61,8 @@ REPORTED = "its pictures, and how evenly it uses the picture"
 @BAND
 @material_options
 @PREVIEW
+@stages_option("every level and sweep")
+@report_option(REPORTED)
 def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
@@ -81,8 +81,6 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     usual="output direction band seed also roles preview report dry_run device quiet",
     of="extend",
 )
-@stages_option("every level and sweep")
-@report_option(REPORTED)
 @click.argument("picture", type=ENTER)
 @OUTPUT
 @option(
@@ -96,6 +94,8 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
 @BAND
 @material_options
 @PREVIEW
+@stages_option("every level and sweep")
+@report_option(REPORTED)
 def tile(direction: Any, **options: Any) -> Task:
     """Make PICTURE tile, or all maps of a material.
 

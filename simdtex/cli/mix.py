@@ -25,8 +25,6 @@ CHOSEN = ("palette", "pattern", "low", "high")
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
     usual="output size palette pattern average low high seed dry_run device quiet",
 )
-@stages_option("every iteration")
-@PROFILE
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @output_option("Write this picture.", WRITE)
 @size_option("twice the first sample", base="the first sample")
@@ -37,6 +35,8 @@ CHOSEN = ("palette", "pattern", "low", "high")
 )
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
+@stages_option("every iteration")
+@PROFILE
 def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Mix the textures SAMPLE... into one picture.
 
@@ -81,8 +81,6 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
     usual="outputs size picture seed iterations pyramid dry_run device quiet",
 )
-@stages_option("the middle slice of every iteration")
-@PROFILE
 @click.argument("sample", type=READ)
 @click.option(
     "-o",
@@ -108,6 +106,8 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     metavar="PNG",
     help="Write a picture of the block: a cube, a sphere and three slices.",
 )
+@stages_option("the middle slice of every iteration")
+@PROFILE
 def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
     """Make a solid block whose slices have the texture of SAMPLE.
 

@@ -22,7 +22,6 @@ from simdtex.cli.options import GUIDE, given, option, output_option, reads, repo
     ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
 )
-@report_option("realisations, shares, entropy, variograms, connectivity, variety")
 @training_options
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
@@ -63,6 +62,7 @@ from simdtex.cli.options import GUIDE, given, option, output_option, reads, repo
     type=int,
     help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
 )
+@report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
     training_image: tuple[Path, ...], output: Path, number: int, size: str | None, source: bool, **options: Any
 ) -> Task:

@@ -37,9 +37,6 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     usual="output size seed method order also guide preview report dry_run device quiet",
 )
-@stages_option("every level, sweep or iteration")
-@report_option("its pictures, how evenly it uses the sample, and how much it copies")
-@PROFILE
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
 @size_option("that of --known or of the output guide, else twice the first sample")
@@ -55,6 +52,9 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @material_options
 @PREVIEW
 @tiles_options
+@stages_option("every level, sweep or iteration")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
+@PROFILE
 def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
