@@ -28,7 +28,7 @@ from simdtex.io.atomic import Damaged, check_target, exclusive, read_checked, wr
 from simdtex.options import real
 from simdtex.random import as_seed
 
-FORMAT = 3
+FORMAT = 4
 """Format of the file; all other formats are rejected."""
 
 FIRST = 1.0

@@ -258,5 +258,5 @@ def test_the_demo_replaces_no_file_of_others(tmp_path, name, content):
     before = path.read_bytes() if path.is_file() else None
     result = run("demo", "-o", tmp_path, "--size", "16x12", "--device", "reference")
     assert result.exit_code == 2 and len(result.output.splitlines()) == 1
-    assert f"{name} was not made by this command; give another folder" in result.output
+    assert f"holds other files ({name}): give an empty or a new one" in result.output
     assert listing(tmp_path) == [name] and (before is None or path.read_bytes() == before)

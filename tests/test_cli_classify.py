@@ -168,8 +168,7 @@ def test_resume_writes_what_the_command_writes(folder):
     assert run(*args).exit_code == 0
     wanted = (folder / "labels.png").read_bytes()
     (folder / "labels.png").unlink()
-    line = {"name": "classify", "arguments": ["picture.png"], "folder": str(folder)}
-    line["options"] = [*map(str, [*SAMPLES, "-o", "labels.png", *WORDS])]
+    line = {"name": "classify", "words": [*map(str, [*args, *WORDS])], "folder": str(folder)}
     kept = Checkpoint("state", every=0, command=line)
     with pytest.raises(KeyboardInterrupt):
         simdtex.classify(
@@ -184,7 +183,7 @@ def test_resume_writes_what_the_command_writes(folder):
 BAD = {
     "nothing to learn from": ([], "give --texture once for each class, or --strokes"),
     "both": ([*SAMPLES, "--strokes", "strokes.png"], "give --texture once for each class, or --strokes"),
-    "no name": (["--texture", "left.png"], "--texture left.png must be NAME=FILE"),
+    "no name": (["--texture", "left.png"], "--texture 'left.png' must be NAME=FILE"),
     "a name twice": ([*SAMPLES, "--texture", "left=cut.png"], "names left twice; give left=FILE0,FILE1"),
     "grey": (["--texture", "left=grey.png"], "grey.png has 1 channel of uint8 and picture.png 3 channels of uint8"),
     "no file": (["--texture", "left=none.png"], "none.png"),

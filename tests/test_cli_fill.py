@@ -232,11 +232,11 @@ def test_extend_shows_what_it_did(folder):
 
 PHOTO = ["photo.png", "-o", "out.png"]
 BAD_EXTEND = {
-    "nothing to add": (PHOTO, "--seamless"),
+    "nothing to add": (PHOTO, "nothing to add"),
     "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
     "the size it has": ([*PHOTO, "--size", "32x24"], "nothing to add"),
     "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "--size cannot be used with --left"),
-    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z is not a direction; give x, y or both"),
+    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z must be x, y or both"),
     "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--seamless"),
 }
 
@@ -248,7 +248,7 @@ def test_bad_extensions_get_one_sentence_and_write_nothing(folder, case):
 
 
 def test_bad_tiles_get_one_sentence_and_write_nothing(folder):
-    refused(folder, "tile", [*PHOTO, "--direction", "z"], "--direction z is not a direction; give x, y or both")
+    refused(folder, "tile", [*PHOTO, "--direction", "z"], "--direction z must be x, y or both")
     refused(folder, "tile", [*PHOTO, "--band", 12], "band=12 leaves nothing of a picture of 24x32")
     image.write(folder / "photo-3x3.png", pixels(folder, "grey.png"))
     refused(folder, "tile", ["photo-3x3.png", "-o", "photo.png", "--preview"], "photo-3x3.png is an input and would be")

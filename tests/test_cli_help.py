@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from simdtex.cli import COMMAND_WORDS, COMMANDS, EXAMPLES, load, main
 from simdtex.cli.command import OPTION_WORDS, entries_of
-from simdtex.cli.options import METHODS
+from simdtex.cli.options import METHODS, job_options
 from simdtex.cli.resume import COMMANDS as RUNS
 from simdtex.io import image
 from simdtex.options import Number, Whole, has_presets, is_flag, table
@@ -63,11 +63,12 @@ def test_help_lists_the_usual_options_and_says_where_the_others_are(name):
 
 @pytest.mark.parametrize("name", (*RUNS, "schedules"))
 def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
-    params = {one.name: one for one in load(name).params if getattr(one, "kind", None)}
-    tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
     job = "extend" if name == "tile" else name
+    own = click.command()(job_options(job)(lambda **_: None)).params
+    params = {one.name: one for one in load(name).params}
+    tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
     declared = {option: one for options in tables for option, one in options.items() if job in one.shown}
-    assert set(params) == {*["preset"] * any(map(has_presets, tables)), *declared}
+    assert {one.name for one in own} == {*["preset"] * any(map(has_presets, tables)), *declared} <= params.keys()
     said = "".join(help_of(name, 1000).split())
     for option, one in declared.items():
         assert f"{one.help}.".replace(" ", "") in said

@@ -235,7 +235,11 @@ def refused(folder, args, said):
 TO = ["-o", "tiled", *SEAMLESS]
 BAD = {
     "two materials": (["extend", "brick", *TO], "brick holds 2 materials: instead of it give", "brick/color.png"),
-    "no such role": (["extend", "brick", *TO, "--map", "gold=height.npy"], "must be ROLE=FILE, with one of the", None),
+    "no such role": (
+        ["extend", "brick", *TO, "--map", "gold=height.npy"],
+        "--map names the role gold; give one of the roles",
+        None,
+    ),
     "no such map": (
         ["fill", "brick", *TO[:2], "--map", "ao=x.png"],
         "brick/x.png",

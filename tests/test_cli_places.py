@@ -221,7 +221,7 @@ def test_a_missing_input_is_named(folder, pair):
     if isinstance(given.type, Place) and given.type.role == "read":
         refused(folder, name, [*words(given, "in"), *rest], "is a folder")
     empty = CliRunner().invoke(cli.main, [name, *words(given, ""), *rest])
-    assert empty.exit_code == 2 and "empty" in empty.output
+    assert empty.exit_code == 2 and ("'' must be" if isinstance(given.type, Pair) else "empty") in empty.output
 
 
 @pytest.mark.parametrize("name", [name for name, c in COMMANDS.items() if any(p.name == "size" for p in c.params)])
@@ -237,7 +237,7 @@ def test_an_empty_size_is_no_default(folder, name):
 
 def test_a_file_name_in_a_pair_may_contain_an_equals_sign(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("sample.png", "a=b.png", "g=1.png"):
+    for name in ("sample.png", "a=b.png", "g=1.png", "d,e.png"):
         image.write(name, np.indices((9, 9)).sum(0).astype(np.uint8) // 4)
     more = ["-o", "o.png", "--size", "9", "--order", "1", "--device", "reference"]
 
@@ -247,6 +247,7 @@ def test_a_file_name_in_a_pair_may_contain_an_equals_sign(tmp_path, monkeypatch)
 
     assert synth("--guide", "g=1.png=g=1.png", "--also", "a=b.png=new=1.png")[0] == 0
     assert (tmp_path / "new=1.png").exists()
+    assert synth("--also", "d,e.png=y.png")[0] == 0, "a file may have a comma in its name, too"
     assert "a=b.png is an input and would be overwritten" in synth("--also", "a=b.png=a=b.png")[1]
     (tmp_path / "a").touch()
     words = "--also a=b.png=x.png has two meanings, since a and a=b.png exist: rename one of them"

@@ -113,7 +113,10 @@ BAD_PYRAMID = {
 }
 BAD_SYNTH = BAD_PYRAMID | {
     "boundary": (["--boundary", "open"], "unknown option 'boundary' of the method 'pyramid'"),
-    "source map": (["--source-map", "map.npz"], "takes no pixel from the sample; leave --source-map and --also out"),
+    "source map": (
+        ["--source-map", "map.npz"],
+        "takes no pixel from the sample; give one picture, and leave --source-map",
+    ),
     "another map": (["--also", "colour.png=c.png"], "leave --source-map and --also out"),
     "too large": (["--size", "60000x60000"], "give a smaller size"),
 }

@@ -43,7 +43,7 @@ def test_a_report(folder):
     beside = {path.read_bytes() for path in (folder / "report").glob("*.png")}
     assert set(embedded(reader)) == beside and len(embedded(reader)) == len(beside) == 4
     assert "breaks (14)" in reader.text
-    job = "--output REPORT --schedule coloring,synchronous --seeds 2 --size 12x10 --order 2 --device reference"
+    job = "-o REPORT --order 2 --size 12x10 --device reference --schedule coloring,synchronous --seeds 2"
     assert f"$ simdtex schedules SAMPLE {job}" in reader.text.replace(str(folder / "report"), "REPORT").replace(
         str(folder / "sample.png"), "SAMPLE"
     )

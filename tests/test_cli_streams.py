@@ -83,7 +83,7 @@ def test_names_that_are_no_text_are_written_and_reported(folder):
     assert os.path.exists(os.fsencode(folder) + b"/o\xff.png")
     page = os.fsencode(folder) + b"/page\xff/"
     with open(page + b"results.json", encoding="utf-8") as file:
-        assert json.load(file)["command"].startswith(r"simdtex synth 's\xff.png' --output 'o\xff.png'")
+        assert json.load(file)["command"].startswith(r"simdtex synth 's\xff.png' -o 'o\xff.png'")
     with open(page + b"index.html", encoding="utf-8") as file:
         assert r"s\xff.png" in file.read()
 

@@ -179,7 +179,7 @@ def test_a_dry_run_counts_the_arrays_of_the_store(folder):
         (["-o", "o.png", "--workers", 2], "--workers requires --tiles"),
         (["-o", "o.zarr", "--tiles", 0], "tiles is 0; give 1 or more"),
         (["-o", "o.zarr", "--tiles", 16, "--workers", 0], "workers is 0; give 1 or more"),
-        (["-o", "o.zarr", "--tiles", 16, "--workers", "x"], "--workers x is neither a number nor an address"),
+        (["-o", "o.zarr", "--tiles", 16, "--workers", "x"], "--workers x must be a number or an address"),
         (["-o", "o.zarr", "--tiles", 16, "--method", "pyramid"], "the method pyramid needs the whole output at once"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--stages", "s"],

@@ -152,3 +152,21 @@ def test_bad_input_is_refused_with_a_remedy(case):
         call = {"training": TRAINING, "known": data(TRAINING), "categorical": True, "device": "reference"}
         simdtex.estimate(**call | change)
     assert "\n" not in str(caught.value)
+
+
+def test_the_callback_sees_the_share_and_the_maps(monkeypatch):
+    monkeypatch.setattr("simdtex.methods.mrf.density.AT_ONCE", 5)
+    seen = []
+    known = np.full((4, 6), np.nan)
+    known[2, 1] = 1
+    found = simdtex.estimate(
+        np.tile([0.0, 0, 0, 1], (32, 8)),
+        known=known,
+        device="reference",
+        callback=lambda p: seen.append((p, p.image())),
+    )
+    shares = [progress.fraction for progress, _ in seen]
+    assert shares == sorted(set(shares)) and len(shares) > 3 and shares[-1] == 1
+    assert [np.isfinite(maps[..., 0]).mean() for _, maps in seen] == shares
+    cells = np.isnan(known)
+    assert np.array_equal(seen[-1][1][cells], np.stack([found["mean"], found.variance], -1)[cells])

@@ -41,9 +41,15 @@ GROUPS = {
         "bench": "Measure the time of each method on each device, and compare with NumPy.",
     },
 }
-"""The commands by what they are for, each in the module of its name, and their first sentences."""
+"""The commands by what they are for, and their first sentences."""
 
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
+
+MODULES = {
+    **{"tile": "extend", "fill": "extend", "estimate": "simulate", "solid": "mix", "ising": "schedules"},
+    **{"demo": "machine", "devices": "machine", "bench": "machine"},
+}
+"""The modules of commands that are not in the one of their name."""
 
 WHAT = "Texture synthesis from samples, by parallel relaxation on any OpenCL device."
 
@@ -73,7 +79,7 @@ EXAMPLES = (
 
 def load(name: str) -> click.Command:
     """Return the command of a name."""
-    command: click.Command = getattr(import_module(f"simdtex.cli.{name}"), name)
+    command: click.Command = getattr(import_module(f"simdtex.cli.{MODULES.get(name, name)}"), name)
     command.help = command.help or COMMANDS[name]  # python -OO takes docstrings away
     return command
 

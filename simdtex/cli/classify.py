@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
+from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size_text, without_alpha
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option, reads, report_option
+from simdtex.cli.options import PROFILE, given, option, output_option, reads, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
 from simdtex.model.pictures import check_alike
 
@@ -26,16 +26,12 @@ UNLABELLED = 255
 
 
 @job(
-    (
-        "classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png",
-        "Label pixels as one of two classes, or as unknown.",
-    ),
-    ("classify photo.png --strokes strokes.png -o labels.png", "Learn the classes from strokes on the picture."),
+    ("classify a.png --texture brick=brick.png --texture grass=grass.png -o b.png", "Tell brick from grass."),
+    ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
-    profile=True,
 )
 @click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write the labels: 1, 2..., and 0 for unknown.")
+@output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
 @option(
     "--texture",
     "textures",
@@ -66,15 +62,15 @@ UNLABELLED = 255
     help="Write the fit of each class at each pixel, 0 to 1, one band for each class: .tif or .npy.",
 )
 @report_option("labels, fits and, with --truth, the confusion matrix")
+@PROFILE
 def classify(
     picture: Path,
     output: Path,
-    textures: tuple[str, ...],
+    textures: tuple[tuple[str, list[Path]], ...],
     strokes: Path | None,
-    validation: tuple[str, ...],
+    validation: tuple[tuple[str, list[Path]], ...],
     truth: Path | None,
     confidence: Path | None,
-    report: Path | None,
     **options: Any,
 ) -> Task:
     """Label each pixel of PICTURE with the texture around it, or as unknown.
@@ -86,7 +82,10 @@ def classify(
     from simdtex.model.labels import read_labels, write_labels
 
     whole = read_material([picture])
-    true = None if truth is None else _read_truth(truth, whole)
+    true = None if truth is None else read_labels(truth, UNLABELLED)
+    if true is not None and true.shape != whole.sizes[0]:
+        sizes = f"{truth} is {size_text(true)} and {picture} {size_text(whole.array)}"
+        raise ValueError(f"{sizes}; give labels of its size")
     held = _read_samples("--validation", validation, whole)
     if bool(textures) == bool(strokes):
         raise ValueError("give --texture once for each class, or --strokes")
@@ -111,43 +110,33 @@ def classify(
     writers: list[Any] = [lambda made, run: write_labels(output, made)]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
-    if report:
+
+    def report(folder: Path, made: Any, run: Any) -> None:
         from simdtex.report.classification import write_classification
-        from simdtex.report.page import check_folder
 
-        check_folder(report)
-        writers.append(lambda made, run: write_classification(report, pixels, made, run, true, command_line()))
+        write_classification(folder, pixels, made, run, true, command_line())
+
     run = partial(classify, pixels, known, **more, **given(options))
-    summary = f"{size(pixels)}, {len(names)} classes"
-    return Task(run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)))
+    summary = f"{size_text(pixels)}, {len(names)} classes"
+    return Task(
+        run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)), report=report
+    )
 
 
-def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
+def _read_samples(
+    flag: str, named: Sequence[tuple[str, list[Path]]], picture: Material
+) -> dict[str, list[NDArray[Any]]]:
     """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
     found: dict[str, list[NDArray[Any]]] = {}
-    for text in texts:
-        name, equals, files = text.partition("=")
-        if not (equals and name and files):
-            raise ValueError(f"{flag} {text} must be NAME=FILE")
+    for name, files in named:
         if name in found:
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
-        for file in files.split(","):
-            pixels = read_pixels(Path(file))[0]
-            pixels, gone = without_alpha(pixels, channels(picture.array))
-            check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
-            found[name].append(masked(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]), gone))
+        for file in files:
+            pixels = without_alpha(read_pixels(file).pixels, channels(picture.array))
+            check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
+            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
-
-
-def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
-    """Read the labels that are to be found; raise if they have another size."""
-    from simdtex.model.labels import read_labels
-
-    true, pixels = read_labels(path, UNLABELLED), picture.array
-    if true.shape != pixels.shape[:2]:
-        raise ValueError(f"{path} is {size(true)} and {picture.paths[0]} {size(pixels)}; give labels of its size")
-    return true
 
 
 def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.ending import reporting
+from simdtex.cli.ending import reporting, settle
 
 Examples = Sequence[tuple[str, str]]
 """Words after ``simdtex``, and what they do."""
@@ -50,9 +50,13 @@ class Command(click.Command):
             self.params.append(click.Option(["--help-all"], callback=_help_all, help="Show all options.", **flags))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the words of a command line; an option of another program names ours."""
+        """Parse and keep the words of a command line; an option of another program names ours."""
+        ctx.meta[WORDS] = list(args)
         try:
             return super().parse_args(ctx, args)
+        except ValueError as error:
+            settle(error)
+            raise
         except click.NoSuchOption as error:
             own = {flag for param in self.params for flag in param.opts}
             ours = [ours for ours, theirs in OPTION_WORDS.items() if error.option_name in theirs]
@@ -95,8 +99,8 @@ def _method(title: str) -> str:
     return title.partition(":")[0] if title.startswith("Method ") else ""
 
 
-ALL = f"{__name__}.all"
-"""Key of a context's `meta`: whether all options are listed."""
+ALL, WORDS = f"{__name__}.all", f"{__name__}.words"
+"""Keys of a context's `meta`: whether all options are listed, and the words after the name of the command."""
 
 
 def _help_all(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:

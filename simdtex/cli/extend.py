@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex extend``: a picture beyond its edges, or without a seam."""
+"""``simdtex extend``, ``tile`` and ``fill``: a picture beyond its edges, without a seam, or without holes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,29 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Reading, check_source_map, read_material
-from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import arranged, folder_of
-from simdtex.cli.options import ALSO, BAND, MAP, OUTPUT, PREVIEW, SOURCE_MAP, given, option, report_option, size_option
-from simdtex.cli.places import ENTER
+from simdtex.cli.inputs import Reading, check_profiles, planes, read_material
+from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.maps import arranged, read_lead
+from simdtex.cli.options import (
+    BAND,
+    DIRECTION,
+    DIRECTIONS,
+    OUTPUT,
+    PREVIEW,
+    given,
+    material_options,
+    option,
+    report_option,
+    size_option,
+    stages_option,
+)
+from simdtex.cli.places import ENTER, READ
+from simdtex.model.pictures import unknown_in
 
 SIDES = ("top", "bottom", "left", "right")
-DIRECTIONS = ("both", "x", "y")
 REPORTED = "its pictures, and how evenly it uses the picture"
 """What the page of a run shows."""
 
@@ -26,7 +40,6 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     ("extend photo.png -o larger.png --size 150% --seamless", "Add pixels at the right and below, and make it tile."),
     ("extend brick -o larger --right 512", "Extend all maps in the folder brick: albedo, normal, roughness..."),
     usual="output left right top bottom size seamless seed also preview dry_run device quiet",
-    stages="every level and sweep",
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
@@ -40,17 +53,17 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     is_flag=False,
     flag_value="both",
     metavar="[x|y|both]",
+    type=DIRECTION,
     words=DIRECTIONS,
     help="Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`.  [both, if no "
     "direction is given]",
 )
 @BAND
-@MAP
-@ALSO
-@SOURCE_MAP
+@material_options
 @PREVIEW
+@stages_option("every level and sweep")
 @report_option(REPORTED)
-def extend(size: str | None, seamless: str | None, **options: Any) -> Task:
+def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
     PICTURE may be a folder with the maps of a material, as in `simdtex tile`.
@@ -58,55 +71,63 @@ def extend(size: str | None, seamless: str | None, **options: Any) -> Task:
     if seamless is None and options["band"] is not None:
         raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
     sides = {name: options.pop(name) for name in SIDES}
-    if seamless is None and size is None and not any(sides.values()):
-        raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
-    return continued("--seamless", seamless, sides, size, **options)
+    return continued(seamless or False, sides, size, **options)
+
+
+@job(
+    ("tile photo.png -o tile.png", "Make a photo tile."),
+    ("tile brick -o tiled --preview", "Make all maps of a material tile; tiled-3x3.png shows copies."),
+    ("tile panorama.png -o round.png --direction x", "Join left and right only."),
+    usual="output direction band seed also roles preview report dry_run device quiet",
+    of="extend",
+)
+@click.argument("picture", type=ENTER)
+@OUTPUT
+@option(
+    "--direction",
+    type=DIRECTION,
+    words=DIRECTIONS,
+    default="both",
+    show_default=True,
+    help="Join left and right (x), top and bottom (y), or both.",
+)
+@BAND
+@material_options
+@PREVIEW
+@stages_option("every level and sweep")
+@report_option(REPORTED)
+def tile(direction: Any, **options: Any) -> Task:
+    """Make PICTURE tile, or all maps of a material.
+
+    A band along the edges is replaced; the rest does not change. PICTURE may be a folder with the maps of a material,
+    whose names end in their kind, such as brick_albedo.png and brick_normal.png; the output is then a folder too. The
+    albedo decides the arrangement. To let another map decide, give its path instead of the folder's.
+    """
+    return continued(direction, dict.fromkeys(SIDES, 0), None, **options)
 
 
 def continued(
-    option: str,
-    direction: str | None,
-    sides: dict[str, int],
-    size: str | None,
-    *,
-    picture: Path,
-    output: Path,
-    roles: tuple[str, ...],
-    also: tuple[str, ...],
-    source_map: Path | None,
-    report: Path | None,
-    preview: bool,
-    **options: Any,
+    seamless: Any, sides: dict[str, int], size: str | None, *, picture: Path, output: Path, **options: Any
 ) -> Task:
-    """Return the task that continues a picture, or a folder of maps; it tiles in the direction of an option."""
+    """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
     from simdtex import extend
 
-    if direction not in (None, *DIRECTIONS):
-        raise ValueError(f"{option} {direction} is not a direction; give x, y or both")
-    folder = folder_of([picture], output, roles)
-    whole = read_material([folder.lead if folder else picture], Reading(palette=bool(options["categorical"])))
+    target, whole = read_lead([picture], output, options, Reading(palette=bool(options["categorical"])))
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     if size is not None:
         sides = _sides(size, sides, (rows, cols))
-    tiling: Any = direction if direction in ("x", "y") else direction is not None
-    check_source_map(source_map, whole)
     metadata = whole.metadata
     if metadata and metadata.geo:
         metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
-    writers = arranged(folder or output, whole, also, source_map, metadata, kept=True, preview=preview)
-    if report:
-        from simdtex.report.page import check_folder
-        from simdtex.report.synthesis import write_synthesis
-
-        check_folder(report)
-        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line(), continued=True))
+    writers = arranged(target, whole, metadata, options)
     width, height = cols + sides["left"] + sides["right"], rows + sides["top"] + sides["bottom"]
     return Task(
-        partial(extend, pixels, seamless=tiling, channel_axis=whole.channel_axis, **sides, **given(options)),
+        partial(extend, pixels, seamless=seamless, channel_axis=whole.channel_axis, **sides, **given(options)),
         f"{width}x{height} from {cols}x{rows}",
-        str(folder or output),
+        str(target),
         writers,
         whole.limits,
+        report=partial(write_page, pixels, continued=True),
     )
 
 
@@ -123,3 +144,86 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
             f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
         )
     return {"top": 0, "bottom": more[0], "left": 0, "right": more[1]}
+
+
+@job(
+    ("fill photo.png -o whole.png --mask hole.png", "Fill the white parts of a mask."),
+    ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
+    ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
+    ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
+    usual="output mask invert grow feather samples reach seed also dry_run device quiet",
+)
+@click.argument("picture", type=ENTER)
+@OUTPUT
+@click.option(
+    "--mask",
+    type=READ,
+    metavar="FILE",
+    help="Fill the white parts of this mask, of the same size.  [the parts of PICTURE that are not fully opaque, or "
+    "NaN; the output then has no alpha]",
+)
+@click.option("--invert", is_flag=True, help="Fill all but the white parts of --mask.")
+@click.option("--grow", type=int, default=0, help="Make the holes wider by this many pixels.")
+@click.option(
+    "--feather",
+    type=int,
+    default=0,
+    help="Blend the filled pixels with the picture up to this many pixels around the holes.",
+)
+@click.option(
+    "--sample",
+    "samples",
+    multiple=True,
+    type=READ,
+    metavar="FILE",
+    help="Fill with this texture, not with that around the hole; may be repeated.",
+)
+@click.option(
+    "--reach",
+    type=int,
+    help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
+)
+@material_options
+def fill(
+    picture: Path, output: Path, mask: Path | None, invert: bool, samples: tuple[Path, ...], **options: Any
+) -> Task:
+    """Fill the holes of PICTURE with the texture around them.
+
+    Pixels outside the holes do not change, except with --grow and --feather. PICTURE may be a folder with the maps of a
+    material, as in `simdtex tile`; the holes are those of the albedo, or of --mask.
+    """
+    from simdtex import fill
+    from simdtex.jobs.filling import widened
+
+    how = Reading(palette=bool(options["categorical"]))
+    target, whole = read_lead([picture], output, options, how)
+    pixels, hole = _hole(whole.pixels[0], mask, invert)
+    whole = whole._replace(pixels=[pixels])
+    texture = read_material(samples, how) if samples else None
+    if texture:
+        check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
+    foreign = "maps cannot be filled with --sample, since no pixel comes from the picture" if texture else ""
+    writers = arranged(target, whole, whole.metadata, options, foreign=foreign)
+    sample = texture and texture.array
+    filled = np.count_nonzero(widened(hole, options["grow"], options["feather"]))
+    axis = None if pixels.ndim == 2 else -1
+    return Task(
+        partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
+        f"{filled} of {hole.size} pixels filled",
+        str(target),
+        writers,
+    )
+
+
+def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
+    from simdtex.io.image import read_mask, split_alpha
+
+    pixels, gone = np.ma.getdata(pixels), planes(np.ma.getmaskarray(pixels)).any(-1)
+    if mask:
+        hole = read_mask(mask, pixels.shape) != invert
+    elif invert:
+        raise ValueError("--invert requires --mask; leave it out")
+    else:
+        pixels, hole = split_alpha(pixels, opaque=True)
+    return pixels, hole | gone | unknown_in(planes(pixels))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
-from simdtex.cli.places import split_pair
-from simdtex.model.pictures import check_alike
+from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
     from simdtex.io.grids import Frame
@@ -123,28 +122,21 @@ def channels(pixels: NDArray[Any]) -> int:
     return int(planes(pixels).shape[2])
 
 
-def size(pixels: NDArray[Any]) -> str:
+def size_text(pixels: NDArray[Any]) -> str:
     """Return width x height as text."""
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def without_alpha(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return a picture without the alpha that pictures of so many channels lack, and where it is transparent."""
+def without_alpha(pixels: NDArray[Any], count: int) -> np.ma.MaskedArray[Any, Any]:
+    """Return a picture without the alpha that pictures of so many channels lack, masked where it is transparent."""
     from simdtex.io.image import split_alpha
 
-    return split_alpha(pixels) if channels(pixels) == count + 1 else (pixels, np.zeros(pixels.shape[:2], bool))
-
-
-def parted(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return a picture without the mask of a raster, and where a channel is masked."""
-    gone: NDArray[np.bool_] = np.asarray(np.ma.getmaskarray(pixels).reshape(*pixels.shape[:2], -1).any(-1))
-    return np.ma.getdata(pixels), gone
-
-
-def masked(pixels: NDArray[Any], gone: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
-    """Return a picture that is masked in all channels where it is gone."""
-    hidden = gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2))
-    return np.ma.MaskedArray(pixels, np.broadcast_to(hidden, pixels.shape))
+    found: NDArray[Any] = np.ma.getdata(pixels)
+    gone: NDArray[np.bool_] = np.asarray(planes(np.ma.getmaskarray(pixels)).any(-1))
+    if channels(found) == count + 1:
+        found, clear = split_alpha(found)
+        gone = gone | clear
+    return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
 
 
 def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = None) -> None:
@@ -231,75 +223,30 @@ def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0], crs[0])
 
 
-def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
-    """Read the masks of ``--sample-mask``, one for each sample, True where pixels may be taken from; or None."""
-    from simdtex.io import image
-
-    if not paths:
-        return None
+def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
+    """Raise unless an option names one file for each sample."""
     if len(paths) != len(samples.pixels):
-        raise ValueError(
-            f"there are {len(paths)} --sample-mask and {len(samples.pixels)} samples; give one for each sample"
-        )
-    return [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
+        counts = f"{len(paths)} files and there are {len(samples.pixels)} samples"
+        raise ValueError(f"{option} names {counts}; give one for each sample")
 
 
-def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[list[Path], Path]:
-    """Return the files that ``A=OUT`` names or, of several samples, ``A0,A1=OUT``: one for each sample, and OUT."""
-    (name, out), *others = split_pair(text)
-    if others:
-        raise ValueError(f"{option} {text} has two meanings, since {name} and {others[0][0]} exist: rename one of them")
-    names = [part.strip() for part in name.split(",")] if samples.several else [name]
-    if not (out and all(names)):
-        raise ValueError(f"{option} {text} must be {form}, two files")
-    if len(names) != len(samples.pixels):
-        raise ValueError(
-            f"{option} {text} names {len(names)} files and there are {len(samples.pixels)} samples; "
-            f"give one for each, separated by commas"
-        )
-    return [Path(one) for one in names], Path(out)
-
-
-def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) -> list[Also]:
+def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
     """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
     from simdtex.io import image
 
     found = []
-    for text in texts:
-        paths, out = read_pair("--also", "MAP=OUT", text, samples)
+    for paths, out in pairs:
+        check_each("--also", paths, samples)
         maps = read_material(paths)
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
             check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
             if pixels.shape[:2] != sample.shape[:2]:
-                raise ValueError(
-                    f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
-                )
+                sizes = f"{path} is {size_text(pixels)} and {of} {size_text(sample)}"
+                raise ValueError(f"{sizes}; give --also a map of the sample's size")
         if files:
             image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
         found.append(Also(maps, out))
     return found
-
-
-def write_arranged(
-    output: Path | Callable[..., object], others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
-) -> list[Callable[[Any, Any], object]]:
-    """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
-
-    ``metadata`` is written with the picture; ``output`` is its file, or ``output(made, run, metadata)`` writes it.
-    """
-    from simdtex.io import image
-    from simdtex.model.source_map import save_source_map
-
-    def write(made: NDArray[Any], run: Any) -> None:
-        if isinstance(output, Path):
-            image.write(output, made, metadata)
-        else:
-            output(made, run, metadata)
-
-    writers: list[Callable[[Any, Any], object]] = [write, *(one.write for one in others)]
-    if source_map:
-        writers.append(lambda made, run: save_source_map(source_map, run.source))
-    return writers
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
@@ -325,20 +272,6 @@ def last_iteration(statistics: dict[str, Any]) -> str:
     if not moved:  # no iteration, or a constant sample
         return text
     return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
-
-
-def check_source_map(path: Path | None, samples: Material, *, everywhere: bool = True) -> None:
-    """Raise where a source map cannot be written there; ``everywhere`` says that all pixels are from a sample."""
-    from simdtex.io import image
-    from simdtex.model.source_map import SOURCE_SUFFIXES
-
-    if path is None:
-        return
-    image.check_writable(path, suffixes=SOURCE_SUFFIXES)
-    far = max(max(sides) for sides in samples.sizes) > 2**16
-    if path.suffix.lower() == ".png" and (far or not everywhere):
-        what = "positions over 65535" if far else "pixels that are not from the sample"
-        raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
 def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
@@ -381,17 +314,15 @@ def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    values, gone = parted(values)
-    values, clear = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
-    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone | clear)
+    found = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    return found.reshape(found.shape[:2]) if channels(found) == 1 else found
 
 
 def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     """Return how files are read, by the options about tables and grids, which are taken out."""
     columns: dict[str, list[str]] = {}
-    for part in _pairs("--columns", options.pop("columns")):
-        columns.setdefault(part[0], []).append(part[1])
-    pairs = _pairs("--categories", options.pop("categories"))
+    for axis, name in options.pop("columns") or ():
+        columns.setdefault(axis, []).append(name)
     return Reading(
         deep,
         bool(options.get("categorical")),
@@ -399,21 +330,86 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
         options.pop("variables", ()),
         options.pop("missing"),
         columns=columns or None,
-        categories={name: number_of_option("--categories", value) for name, value in pairs} or None,
+        categories=options.pop("categories"),
     )
 
 
-def _pairs(option: str, text: str | None) -> list[tuple[str, str]]:
-    """Return the pairs of ``A=B,C=D``."""
-    parts = [part.partition("=") for part in (text or "").split(",") if part]
-    if any(not (sign and left.strip() and right.strip()) for left, sign, right in parts):
-        raise ValueError(f"{option} {text} is not NAME=NAME,...")
-    return [(left.strip(), right.strip()) for left, _, right in parts]
+def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[str, Any]:
+    """Return the mask, the known values and the guide that options name, as `simdtex.synthesize` takes them.
+
+    These options are taken out; ``labels`` is set if the guides decide it.
+    """
+    from simdtex.io import image
+    from simdtex.io.grids import kind_of
+
+    upward = how.deep and kind_of(samples.paths[0]) == "raster"
+    if (samples.deep or upward) and (options["sample_mask"] or options.get("guide")):
+        what = "a volume" if samples.deep else "a raster, whose rows are counted from the south"
+        remedy = "use simdtex.simulate in Python"
+        raise ValueError(f"{samples.paths[0]} is {what}, and --sample-mask and --guide are pictures; {remedy}")
+    masks = None
+    if paths := options.pop("sample_mask"):
+        check_each("--sample-mask", paths, samples)
+        masks = [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
+    file, guide = options.pop("known"), options.pop("guide", None)
+    found: dict[str, Any] = {
+        "channel_axis": samples.channel_axis,
+        "mask": masks and (masks if samples.several else masks[0]),
+        "known": read_known(file, samples, how) if file else None,
+        "guide": None,
+    }
+    if guide is not None:
+        found["guide"], options["labels"] = read_guides(guide, samples, options["labels"])
+    return found
 
 
-def number_of_option(option: str, text: str) -> float:
-    """Return the number that an option gives; raise if it is none."""
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"{option} has {text!r}, which is no number") from None
+def read_guides(
+    pair: tuple[list[Path], Path], samples: Material, labels: bool | None
+) -> tuple[tuple[Any, NDArray[Any]], bool | None]:
+    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and whether it is of labels; None: as it looks.
+
+    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
+    palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
+    free: it has NaN there.
+    """
+    from simdtex.io.image import coloured
+    from simdtex.methods.mrf.options import CATEGORIES, few
+    from simdtex.methods.mrf.plan import LABELS
+
+    paths, out = pair
+    check_each("--guide", paths, samples)
+    found = [read_pixels(path, Reading(palette=True)) for path in (*paths, out)]
+    pictures, lies = tuple(one.pixels for one in found), found[-1].lies
+    palettes = [one.metadata and one.metadata.palette for one in found]
+    if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
+        pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
+    *own, wanted = pictures
+    shown = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
+    wanted, free = shown.data, planes(np.ma.getmaskarray(shown)).any(-1) | unknown_in(planes(shown.data))
+    are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
+    colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
+    if labels is not False and colours and (labels or are_few):
+        known = np.unique(np.concatenate([one.reshape(-1, channels(one)) for one in own]), axis=0)
+        strange = [colour for colour in np.unique(wanted[~free], axis=0) if not (known == colour).all(-1).any()]
+        if strange:
+            more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""
+            raise ValueError(
+                f"{out} has the colour {tuple(strange[0].tolist())}{more}, which {', '.join(map(str, paths))} "
+                f"{'does' if len(paths) == 1 else 'do'} not have; paint with the colours of the labels, without soft "
+                "edges, or give --no-labels"
+            )
+        own, wanted, labels = [_numbers(one, known) for one in own], _numbers(wanted, known), True
+    elif labels is None and free.any():  # in floats, that they are whole numbers would no longer be seen
+        labels = all(one.dtype.kind in "iu" for one in (*own, wanted)) and are_few
+    if free.any():
+        wanted = wanted.astype(np.float64)
+        wanted[free] = np.nan
+    return (own if samples.several else own[0], wanted), labels
+
+
+def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:
+    """Return the number of each pixel's colour, (rows, cols)."""
+    found = np.zeros(pixels.shape[:2], np.int64)
+    for number, colour in enumerate(known):
+        found[(pixels == colour).all(-1)] = number
+    return found

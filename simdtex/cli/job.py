@@ -9,18 +9,17 @@ import secrets
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
-from click.core import ParameterSource
 
-from simdtex.cli.command import command
+from simdtex.cli.command import WORDS, command
 from simdtex.cli.ending import RESUME, afterwards, note, settle
-from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, PROFILE, QUIET, SEED, job_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, QUIET, SEED, job_options, together
 
 if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
@@ -45,41 +44,47 @@ class Task(NamedTuple):
     ``make`` is a public function with its own arguments, which returns what it made and a `simdtex.run.Output`.
     ``summary`` says what is made of what, and ``names`` are the files that are written, in words. ``outputs`` are
     functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the same.
-    ``limits`` are black and white in the pictures of stages, and ``more(made, statistics)`` prints further lines after
-    the summary.
+    ``limits`` are black and white in the pictures of stages, ``more(made, statistics)`` prints further lines after the
+    summary, and ``report(folder, made, output)`` writes the page of ``--report``.
     """
 
     make: Callable[..., Any]
     summary: str
     names: str
-    outputs: Sequence[Callable[[Any, Any], object]]
+    outputs: list[Callable[[Any, Any], object]]
     limits: tuple[float, float] = (0.0, 1.0)
     more: Callable[[Any, dict[str, Any]], None] | None = None
+    report: Callable[[Path, Any, Any], object] | None = None
 
 
 def job(
-    *examples: tuple[str, str], usual: str = "", of: str = "", stages: str = "", profile: bool = False
+    *examples: tuple[str, str], usual: str = "", of: str | None = ""
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
     The command has the options of its methods, ``--seed``, ``--dry-run``, ``--device``, ``--checkpoint`` and
-    ``--quiet`` beside those of the function, and ``--stages`` and ``--profile`` if it is said what stages are, and that
-    kernels are timed. ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the
-    command has, by default that of its name.
+    ``--quiet`` beside those of the function, of which ``--stages``, ``--report`` and ``--profile`` are followed here.
+    ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the command has, by
+    default that of its name. With None it has no such options, no ``--seed`` and no ``--checkpoint``.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
         @functools.wraps(plan)
         def planned(
-            seed: int | None,
             device: str | None,
-            checkpoint: Path | None,
             quiet: bool,
             dry_run: bool,
+            seed: int | None = None,
+            checkpoint: Path | None = None,
             stages: Path | None = None,
+            report: Path | None = None,
             profile: bool = False,
             **own: Any,
         ) -> None:
+            if report:
+                from simdtex.report.page import check_folder
+
+                check_folder(report)
             task = plan(**own)
             if task is None:
                 return
@@ -93,6 +98,8 @@ def job(
             with watching(quiet, stages, task.limits, kept) as callback:
                 given = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
                 made, output = task.make(full_output=True, **given)
+            if report and task.report:
+                task.outputs.append(partial(task.report, report))
             for write in task.outputs:
                 with afterwards():
                     write(made, output)
@@ -101,8 +108,9 @@ def job(
                 kept.remove()
             statistics = output.statistics
             if not quiet:
-                seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}, seed {statistics['seed']}"
-                click.echo(f"{task.names}: {task.summary} {seconds}")
+                seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
+                drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
+                click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
                 if task.more:
                     task.more(made, statistics)
             if profile:
@@ -111,11 +119,8 @@ def job(
                 print_profile(statistics)
 
         own = planned.__dict__.pop("__click_params__", [])
-        shared: list[Callable[..., Any]] = [SEED, DEVICE, job_options(of or plan.__name__), CHECKPOINT, DRY_RUN, QUIET]
-        shared += [stages_option(stages)] * bool(stages) + [PROFILE] * profile
-        function: Any = planned
-        for add in reversed(shared):
-            function = add(function)
+        drawn = () if of is None else (SEED, job_options(of or plan.__name__), CHECKPOINT)
+        function: Any = together(*drawn, DEVICE, DRY_RUN, QUIET)(planned)
         function.__click_params__ += own
         return command(*examples, usual=usual)(function)
 
@@ -195,8 +200,7 @@ def _checkpoint(path: Path | None) -> Checkpoint | None:
     from simdtex.checkpoint import Checkpoint
 
     context = click.get_current_context()
-    options, arguments = given_words(context)
-    line = {"name": context.command.name, "options": options, "arguments": arguments, "folder": os.getcwd()}
+    line = {"name": context.command.name, "words": context.meta[WORDS], "folder": os.getcwd()}
     context.meta[RESUME] = path
     kept = Checkpoint(path, command=line, note=note)
     context.obj = kept
@@ -206,28 +210,15 @@ def _checkpoint(path: Path | None) -> Checkpoint | None:
 def command_line() -> str:
     """Return the command line of the running command, so that a reader can give it again."""
     context = click.get_current_context()
-    options, arguments = given_words(context)
-    words = shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+    words = shlex.join(["simdtex", str(context.command.name), *context.meta[WORDS]])
     return os.fsencode(words).decode(errors="backslashreplace")  # the name of a file may be no text
 
 
-def given_words(context: click.Context) -> tuple[list[str], list[str]]:
-    """Return the options that were given to a command, but ``--checkpoint``, with their values, and the arguments."""
-    options: list[str] = []
-    arguments: list[str] = []
-    for parameter in context.command.params:
-        name = parameter.name or ""
-        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name == "checkpoint":
-            continue
-        given = context.params[name]
-        for value in given if isinstance(given, tuple) else [given]:
-            if not isinstance(parameter, click.Option):
-                arguments.append(str(value))
-            elif parameter.is_flag:
-                options.append((parameter.opts if value else parameter.secondary_opts)[-1])
-            else:
-                options += [parameter.opts[-1], str(value)]
-    return options, arguments
+def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) -> None:
+    """Write the page of a texture and its sample, and the command line."""
+    from simdtex.report.synthesis import write_synthesis
+
+    write_synthesis(folder, sample, made, output, command_line(), **how)
 
 
 @contextmanager
@@ -283,7 +274,10 @@ def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def watching(
-    quiet: bool, stages: Path | None, limits: tuple[float, float], checkpoint: Checkpoint | None
+    quiet: bool = False,
+    stages: Path | None = None,
+    limits: tuple[float, float] = (0.0, 1.0),
+    checkpoint: Checkpoint | None = None,
 ) -> Iterator[Callable[[Any], None]]:
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None

@@ -14,8 +14,7 @@ from simdtex.cli.inputs import read_picture
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import READ
 from simdtex.machine import Machine
-
-EXTRA = "simdtex live needs additional packages ({}); install them with: pip install 'simdtex[live]'"
+from simdtex.options import require
 
 
 @command(
@@ -39,13 +38,10 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
 
     Only this machine can open the page. The page ends with this command.
     """
-    try:
-        from simdtex.live.job import Picture
-        from simdtex.live.server import serve
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.startswith("simdtex"):
-            raise
-        raise ValueError(EXTRA.format(error.name)) from None
+    require("live", "websockets")
+    from simdtex.live.job import Picture
+    from simdtex.live.server import serve
+
     given = None
     if picture:
         found = read_picture(picture)

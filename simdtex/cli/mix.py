@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex mix``: a texture that is a bit like each of several."""
+"""``simdtex mix`` and ``solid``: what only the method pyramid makes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
-from simdtex.cli.inputs import channels, check_profiles, last_iteration, output_shape, read_picture
+from simdtex.cli.command import OUTPUTS
+from simdtex.cli.inputs import channels, last_iteration, output_shape, read_material, size_text
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import given, numbers, size_option
-from simdtex.cli.places import READ, WRITE
+from simdtex.cli.options import NUMBERS, PROFILE, given, option, output_option, size_option, stages_option
+from simdtex.cli.places import EITHER, READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""
@@ -22,18 +24,20 @@ CHOSEN = ("palette", "pattern", "low", "high")
     ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
     usual="output size palette pattern average low high seed dry_run device quiet",
-    stages="every iteration",
-    profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@output_option("Write this picture.", WRITE)
 @size_option("twice the first sample", base="the first sample")
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
-@click.option("--average", metavar="W,W,...", help="Average the patterns with these weights, one for each sample.")
+@click.option(
+    "--average", metavar="W,W,...", type=NUMBERS, help="Average the patterns with these weights, one for each sample."
+)
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
-def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str | None, **options: Any) -> Task:
+@stages_option("every iteration")
+@PROFILE
+def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Mix the textures SAMPLE... into one picture.
 
     Options name a sample by its path as in the command, or by its number from 1. The method is Heeger and Bergen's
@@ -43,19 +47,17 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
     from simdtex.methods.pyramid.mixtures import mix
 
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
-    weights = None if average is None else numbers("--average", average)
-    pictures = [read_picture(path) for path in samples]
-    check_profiles(samples, [picture.metadata for picture in pictures])
-    arrays = [picture.pixels for picture in pictures]
-    shape = output_shape(size, arrays[0])
-    axis = -1 if any(picture.channel_axis is not None for picture in pictures) else None
-    image.check_writable(output, arrays[0].dtype, max(map(channels, arrays)))
+    material = read_material(samples)
+    pixels, metadata = material.pixels, material.metadata and material.metadata._replace(exif=None)
+    shape = output_shape(size, pixels[0])
+    axis = -1 if any(one.ndim > 2 for one in pixels) else None
+    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)))
     return Task(
-        partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen | {"average": weights})),
-        f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
+        partial(mix, pixels, shape, channel_axis=axis, **given(options | chosen)),
+        f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
         str(output),
-        [lambda made, run: image.write(output, made, pictures[0].metadata._replace(exif=None))],
-        (min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)),
+        [lambda made, run: image.write(output, made, metadata)],
+        material.limits,
         lambda made, statistics: click.echo(last_iteration(statistics)),
     )
 
@@ -71,4 +73,65 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     raise ValueError(
         f"--{name} {text} is none of the samples; give the path of one as in the command, "
         f"or its number, 1 to {len(samples)}"
+    )
+
+
+@job(
+    ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
+    ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
+    usual="outputs size picture seed iterations pyramid dry_run device quiet",
+)
+@click.argument("sample", type=READ)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    type=EITHER,
+    help="Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.",
+)
+@click.option(
+    "--size",
+    default="128",
+    show_default=True,
+    metavar="DEPTHxHEIGHTxWIDTH",
+    help="Make a block of this many slices, rows and columns; one number makes a cube.",
+)
+@option(
+    "--view",
+    "picture",
+    group=OUTPUTS,
+    type=WRITE,
+    metavar="PNG",
+    help="Write a picture of the block: a cube, a sphere and three slices.",
+)
+@stages_option("the middle slice of every iteration")
+@PROFILE
+def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
+    """Make a solid block whose slices have the texture of SAMPLE.
+
+    The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
+    """
+    from simdtex.io import image, volume
+    from simdtex.report.solid import view
+    from simdtex.synthesis import synthesize_solid
+
+    shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")
+    material = read_material([sample])
+    pixels = material.pixels[0]
+    writers: list[Any] = []
+    for output in outputs:
+        volume.check_writable(output, pixels.dtype, channels(pixels))
+        writers.append(lambda block, run, output=output: volume.write(output, block))
+    if picture:
+        image.check_writable(picture, suffixes=(".png",))
+        writers.append(lambda block, run: view(np.asarray(block), picture))
+    return Task(
+        partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
+        f"{'x'.join(map(str, shape))} from {size_text(pixels)}",
+        ", ".join(str(path) for path in (*outputs, picture) if path),
+        writers,
+        material.limits,
+        lambda made, statistics: click.echo(last_iteration(statistics)),
     )

@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.places import EITHER, ENTER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -30,9 +30,8 @@ METHODS = {
 class Option(click.Option):
     """An option in a ``group`` of the help.
 
-    The shell completes ``words``, which are the metavar if they are few; ``kind`` is the declared kind of an option of
-    a method. ``methods`` are the helps of those methods, of several, that have the option; of one of them, ``method``.
-    In a command with tiles the help ends in ``with_tiles``.
+    The shell completes ``words``, which are the metavar if they are few. ``methods`` are the helps of those methods, of
+    several, that have the option; of one of them, ``method``.
     """
 
     def __init__(
@@ -40,26 +39,18 @@ class Option(click.Option):
         *names: Any,
         group: str = JOB,
         words: Iterable[str] = (),
-        kind: Any = None,
         method: str = "",
         methods: dict[str, str] | None = None,
-        with_tiles: str = "",
         **given: Any,
     ) -> None:
         super().__init__(*names, **given)
-        self.group, self.words, self.kind = group, list(dict.fromkeys(words)), kind
-        self.methods, self.with_tiles = methods or ({method: str(self.help)} if method else {}), with_tiles
+        self.group, self.words = group, list(dict.fromkeys(words))
+        self.methods = methods or ({method: str(self.help)} if method else {})
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
         found = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
         return found or super().shell_complete(ctx, incomplete)
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """Return the names and the help in this command."""
-        found = super().get_help_record(ctx)
-        tiles = self.with_tiles if any(one.name == "tiles" for one in ctx.command.params) else ""
-        return found and (found[0], f"{found[1]} {tiles}".rstrip())
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -67,8 +58,46 @@ class Option(click.Option):
         return words if self.metavar is None and 0 < len(words) < 30 else super().make_metavar(ctx)
 
 
+class Parsed(click.types.StringParamType):
+    """A text that ``parse`` takes apart; if it raises, an error says that the text must be of a ``form``."""
+
+    def __init__(self, parse: Callable[[str], Any], form: str) -> None:
+        self.parse, self.form = parse, form
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return what the text means."""
+        try:
+            return self.parse(value) if isinstance(value, str) else value
+        except (ValueError, KeyError):
+            name = param.opts[-1] if param else ""
+            raise ValueError(f"{name} {value} must be {self.form}") from None
+
+
+def pairs(text: str) -> list[tuple[str, str]]:
+    """Return the pairs of ``A=B,C=D``."""
+    found = [(left.strip(), right.strip()) for left, right in (part.split("=") for part in text.split(",") if part)]
+    if not all(map(all, found)):
+        raise ValueError(text)
+    return found
+
+
+NUMBERS = Parsed(lambda text: tuple(map(float, text.split(","))), "numbers separated by commas, such as 0.1,0.2")
+DIRECTIONS = {"both": True, "x": "x", "y": "y"}
+DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
+
 option = functools.partial(click.option, cls=Option)
 reads = functools.partial(option, type=READ, metavar="FILE", group=DATA)
+
+
+def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Return a decorator that adds options in this order."""
+
+    def decorate(command: Command) -> Command:
+        for one in reversed(options):
+            command = one(command)
+        return command
+
+    return decorate
 
 
 def job_options(job: str) -> Callable[[Command], Command]:
@@ -82,13 +111,7 @@ def job_options(job: str) -> Callable[[Command], Command]:
         for name, one in options.items():
             if job in one.shown:
                 found.setdefault(name, {})[method if len(tables) > 1 else ""] = one
-
-    def decorate(command: Command) -> Command:
-        for name, methods in reversed(found.items()):
-            command = _option(job, name, methods)(command)
-        return command
-
-    return decorate
+    return together(*(_option(job, name, methods) for name, methods in found.items()))
 
 
 def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Command], Command]:
@@ -97,12 +120,12 @@ def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Comm
     kind = first.kind
     flag = f"--{name.replace('_', '-')}"
     helps = {method: _help(job, one) for method, one in methods.items() if method}
-    how: dict[str, Any] = {"kind": kind, "group": first.group, "help": _help(job, first), "methods": helps}
+    how: dict[str, Any] = {"group": first.group, "help": _help(job, first), "methods": helps}
     if is_flag(kind):
         flag = f"{flag}/--no-{flag[2:]}" if first.default is None else flag
         return option(flag, is_flag=True, default=None, **how)
     if isinstance(kind, Numbers):
-        return option(flag, metavar="N,N,...", **how)
+        return option(flag, metavar="N,N,...", type=NUMBERS, **how)
     if isinstance(kind, Number):
         return option(flag, type=float, **how)
     words = [word for one in methods.values() if isinstance(one.kind, (Choice, Other)) for word in one.kind.valid]
@@ -122,24 +145,16 @@ def _help(job: str, one: Declared) -> str:
 
 
 def given(options: dict[str, Any], without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the options that were given, lists of numbers as such; some left out."""
-    kinds = {one.name: getattr(one, "kind", None) for one in click.get_current_context().command.params}
-    chosen = {name: value for name, value in options.items() if value is not None and name not in without}
-    for name, value in chosen.items():
-        if isinstance(kinds.get(name), Numbers):
-            chosen[name] = tuple(numbers(f"--{name.replace('_', '-')}", value))
-    return chosen
+    """Return the options that were given; some left out."""
+    return {name: value for name, value in options.items() if value is not None and name not in without}
 
 
-def numbers(name: str, text: str) -> list[float]:
-    """Return numbers separated by commas."""
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError:
-        raise ValueError(f"{name} {text} must be numbers separated by commas, such as 0.1,0.2") from None
+def output_option(help: str, type: Any = EITHER, **how: Any) -> Callable[[Command], Command]:
+    """Return ``--output``, which is required unless it has a default."""
+    return option("-o", "--output", required="default" not in how, type=type, help=help, **how)
 
 
-OUTPUT = option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")
+OUTPUT = output_option("Write this picture, or a folder of maps.")
 SEED = option(
     "--seed",
     type=int,
@@ -170,7 +185,7 @@ PREVIEW = option(
     group=OUTPUTS,
     help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
-QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress bar and no summary.")
+QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
 CHECKPOINT = option(
     "--checkpoint",
     type=WRITE,
@@ -180,13 +195,13 @@ CHECKPOINT = option(
 )
 
 
-SAMPLE_MASK = reads(
-    "--sample-mask",
-    multiple=True,
-    method="mrf",
-    help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
-)
-TABLES = (
+data_options = together(
+    reads(
+        "--sample-mask",
+        multiple=True,
+        method="mrf",
+        help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
+    ),
     reads(
         "--known",
         method="mrf",
@@ -196,6 +211,7 @@ TABLES = (
     option(
         "--columns",
         metavar="x=NAME,...",
+        type=Parsed(pairs, "AXIS=NAME,..."),
         group=DATA,
         method="mrf",
         help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
@@ -205,6 +221,7 @@ TABLES = (
     option(
         "--categories",
         metavar="NAME=NUMBER,...",
+        type=Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
         group=DATA,
         method="mrf",
         help="Take these numbers for the texts in the table of --known, as sand=1,shale=0.",
@@ -220,14 +237,7 @@ TABLES = (
         "the values of the sample]",
     ),
 )
-
-
-def data_options(command: Command) -> Command:
-    """Add ``--known`` and the options that say how its table is read."""
-    for one in reversed(TABLES):
-        command = one(command)
-    return command
-
+"""``--sample-mask``, ``--known``, and the options that say how its table is read."""
 
 GUIDE = option(
     "--guide",
@@ -238,10 +248,18 @@ GUIDE = option(
     help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of "
     "labels or numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
-PLACES = (
+training_options = together(
+    click.argument("training_image", nargs=-1, required=True, type=ENTER),
+    option(
+        "--channels",
+        is_flag=True,
+        group=DATA,
+        help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
+    ),
     option(
         "--origin",
         metavar="X,Y[,Z]",
+        type=NUMBERS,
         group=DATA,
         help="Place the centre of the first cell here, in the units of the table of --known.  [that of a grid "
         "TRAINING_IMAGE, else 0,0]",
@@ -249,6 +267,7 @@ PLACES = (
     option(
         "--cell",
         metavar="DX,DY[,DZ]",
+        type=NUMBERS,
         group=DATA,
         help="Make cells of this size, in the same units.  [that of a grid TRAINING_IMAGE, else 1,1]",
     ),
@@ -272,15 +291,9 @@ PLACES = (
         group=DATA,
         help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
     ),
+    data_options,
 )
-
-
-def places(command: Command) -> Command:
-    """Add the options that say where cells and data lie."""
-    for one in reversed(PLACES):
-        command = one(command)
-    return command
-
+"""The training image, its data, and where its cells and they lie."""
 
 BAND = option(
     "--band",
@@ -288,38 +301,33 @@ BAND = option(
     help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  "
     "[an eighth of the shorter side, 8 to 64]",
 )
-CHANNELS = option(
-    "--channels",
-    is_flag=True,
-    group=DATA,
-    help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
+material_options = together(
+    option(
+        "--map",
+        "roles",
+        group=DATA,
+        multiple=True,
+        type=READ_NAMED,
+        metavar="ROLE=FILE",
+        help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
+    ),
+    option(
+        "--also",
+        group=OUTPUTS,
+        multiple=True,
+        type=WRITE_PAIR,
+        metavar="MAP=OUT",
+        help="Arrange another map of the material (normal, height) like the output; may be repeated.",
+    ),
+    option(
+        "--source-map",
+        group=OUTPUTS,
+        type=WRITE,
+        metavar="FILE",
+        help="Write the position in the sample of each pixel: .npz, .npy or .png.",
+    ),
 )
-SOURCE_MAP = option(
-    "--source-map",
-    group=OUTPUTS,
-    type=WRITE,
-    metavar="FILE",
-    help="Write the position in the sample of each pixel: .npz, .npy or .png.",
-    with_tiles="With --tiles FILE is STORE/source.",
-)
-ALSO = option(
-    "--also",
-    group=OUTPUTS,
-    multiple=True,
-    type=WRITE_PAIR,
-    metavar="MAP=OUT",
-    help="Arrange another map of the material (normal, height) like the output; may be repeated.",
-    with_tiles="Give MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
-)
-MAP = option(
-    "--map",
-    "roles",
-    group=DATA,
-    multiple=True,
-    type=READ_NAMED,
-    metavar="ROLE=FILE",
-    help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
-)
+"""The maps of a material, and where the pixels are from."""
 
 
 def report_option(what: str) -> Callable[[Command], Command]:

@@ -34,21 +34,32 @@ class Place(click.Path):
 
 
 class Pair(click.types.StringParamType):
-    """A text ``A=B`` or ``A0,A1=B``: files that are read, and on the right one to ``"read"`` or to ``"write"``.
+    """A text ``A=B`` or ``A0,A1=B``: a list of files that are read, and a path to ``"read"`` or to ``"write"``.
 
-    Or, with ``named``, a name and files that are read: ``NAME=B`` or ``NAME=B0,B1``.
+    Or, with ``named``, ``NAME=B`` or ``NAME=B0,B1``: a name, and a list of files that are read.
     """
-
-    name = "text"
 
     def __init__(self, role: str, named: bool = False) -> None:
         self.role, self.named = role, named
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the text itself, which its reader takes apart; fail if it is empty."""
-        if not value:
-            self.fail("it is empty; give two files with = between them, or leave the option out", param, ctx)
-        return str(value)
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return both sides; raise ValueError if one is missing, or if it is not clear where the left one ends."""
+        if not isinstance(value, str) or not isinstance(param, click.Option):
+            return value
+        cuts = [(value[:at], value[at + 1 :]) for at, letter in enumerate(value) if letter == "="] or [(value, "")]
+        found = [] if self.named else [cut for cut in cuts if all(map(os.path.exists, files(cut[0])))]
+        if len(found) > 1:
+            two = f"{found[0][0]} and {found[1][0]}"
+            raise ValueError(f"{param.opts[-1]} {value} has two meanings, since {two} exist: rename one of them")
+        left, right = (found or cuts)[0]
+        if not (left and right):
+            raise ValueError(f"{param.opts[-1]} {value!r} must be {param.metavar}")
+        return (left, files(right)) if self.named else (files(left), Path(right))
+
+
+def files(text: str) -> list[Path]:
+    """Return the files that a text names: one, or several that are separated by commas."""
+    return [Path(text)] if os.path.exists(text) else [Path(part.strip()) for part in text.split(",")]
 
 
 READ, ENTER, WRITE, FOLDER, EITHER = (Place(role) for role in ("read", "enter", "write", "folder", "either"))
@@ -107,30 +118,22 @@ def _named(context: click.Context) -> Iterator[Named]:
         kind, value = parameter.type, context.params.get(parameter.name or "")
         if parameter.name == "preview" and value:
             yield Named(preview_of(context.params["output"]), "write")
-        for one in value if isinstance(value, tuple) else [value]:
+        several = parameter.multiple or parameter.nargs < 0
+        for one in (value or ()) if several else [value]:
             if one is None:
                 continue
             if isinstance(kind, Place):
                 yield Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
-                pairs = [(str(one).partition("=")[2], "")] if kind.named else split_pair(str(one))
-                for left, right in pairs:
-                    # how many files the left names depends on the samples; a file that is not there harms nothing
-                    for text in {left, *(part.strip() for part in left.split(","))} - {""}:
-                        yield Named(Path(text), "read")
-                    if right:
-                        yield Named(Path(right), kind.role)
+                left, right = one
+                yield from (Named(path, "read") for path in (right if kind.named else left))
+                if not kind.named:
+                    yield Named(right, kind.role)
 
 
 def preview_of(output: Path) -> Path:
     """Return the file of ``--preview``, beside an output."""
     return output.with_name(f"{output.stem}-3x3.png")
-
-
-def split_pair(text: str) -> list[tuple[str, str]]:
-    """Return the two sides of ``A=B`` or ``A0,A1=B``, for each = before which files are named; else at the first =."""
-    sides = [(text[:at], text[at + 1 :]) for at, letter in enumerate(text) if letter == "="] or [(text, "")]
-    return [one for one in sides if all(os.path.exists(part.strip()) for part in one[0].split(","))] or sides[:1]
 
 
 def _real(path: Path) -> Path:

@@ -27,11 +27,14 @@ COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "
 @workers_option
 @DEVICE
 @QUIET
-def resume(path: Path, workers: str | None, device: str | None, quiet: bool) -> None:
+def resume(path: Path, workers: int | str | None, device: str | None, quiet: bool) -> None:
     """Continue the run whose state is in FILE, and write the outputs of its command.
 
     FILE is the file of --checkpoint, or the .zarr store of --tiles.
     """
+    from simdtex.checkpoint import read
+    from simdtex.cli import load
+
     if (path / "zarr.json").is_file() or (path / "work").is_dir():
         resume_tiles(path, workers, device, quiet)
         return
@@ -41,14 +44,6 @@ def resume(path: Path, workers: str | None, device: str | None, quiet: bool) -> 
         raise ValueError(f"{path} does not exist: check the path (a finished run has no checkpoint)")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; give the file of --checkpoint, or the store of --tiles")
-    repeat_command(path, [*(["--device", device] if device else []), *(["--quiet"] if quiet else [])])
-
-
-def repeat_command(path: Path, more: list[str]) -> None:
-    """Run the command of a checkpoint again, with more options, in the folder in which it was given."""
-    from simdtex.checkpoint import read
-    from simdtex.cli import load
-
     command: dict[str, Any] | None = read(path)[0]["command"]
     if command is None:
         raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
@@ -58,7 +53,7 @@ def repeat_command(path: Path, more: list[str]) -> None:
         raise ValueError(
             f"{command['folder']}, the folder in which the run in {path} was started, does not exist; restore it"
         )
-    own = ["--checkpoint", str(path.resolve())]
-    with chdir(command["folder"]):
-        words = [*command["options"], *more, *own, "--", *command["arguments"]]
-        load(command["name"]).main(words, prog_name=f"simdtex {command['name']}", standalone_mode=False)
+    again, given = load(command["name"]), {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
+    with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
+        context.params |= {name: value for name, value in given.items() if value}
+        again.invoke(context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex simulate``: realisations of a training image."""
+"""``simdtex simulate`` and ``estimate``: realisations of a training image."""
 
 from __future__ import annotations
 
@@ -10,56 +10,23 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DEVICE_GROUP, OUTPUTS
-from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material, take_reading
+from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
+from simdtex.cli.inputs import MAPS, Material, output_shape, read_data, read_map, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import (
-    CHANNELS,
-    GUIDE,
-    SAMPLE_MASK,
-    data_options,
-    given,
-    numbers,
-    option,
-    places,
-    reads,
-    report_option,
-    size_option,
-)
-from simdtex.cli.places import EITHER, ENTER
+from simdtex.cli.options import GUIDE, given, option, output_option, reads, report_option, size_option, training_options
 
 
 @job(
-    (
-        "simulate facies.png -o many.nc --number 50 --categorical --known wells.csv",
-        "Simulate 50 realisations that honour the data of wells.",
-    ),
-    (
-        "simulate facies.png -o many.zarr --number 10 --size 500x500 --report page",
-        "Set the size, and write a page of statistics.",
-    ),
-    (
-        "simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10",
-        "Read a grid, and write a grid.",
-    ),
+    ("simulate facies.png -o many.nc -n 50 --categorical --known wells.csv", "Make 50 realisations that honour wells."),
+    ("simulate facies.png -o many.zarr -n 10 --size 500x500 --report page", "Set the size, and write a page."),
+    ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
 )
-@click.argument("training_image", nargs=-1, required=True, type=ENTER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=EITHER,
-    help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.",
-)
+@training_options
+@output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
-@CHANNELS
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations", "TRAINING_IMAGE")
-@places
-@data_options
-@SAMPLE_MASK
 @GUIDE
 @reads(
     "--region",
@@ -97,13 +64,7 @@ from simdtex.cli.places import EITHER, ENTER
 )
 @report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
-    training_image: tuple[Path, ...],
-    output: Path,
-    number: int,
-    size: str | None,
-    report: Path | None,
-    source: bool,
-    **options: Any,
+    training_image: tuple[Path, ...], output: Path, number: int, size: str | None, source: bool, **options: Any
 ) -> Task:
     """Simulate realisations that look like TRAINING_IMAGE and honour data.
 
@@ -124,12 +85,10 @@ def simulate(
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     place = lies | given({name: options.pop(name) for name in ("several", "outside")})
-    writers: list[Any] = [lambda made, run: write_realisations(output, made)]
-    if report:
+    if click.get_current_context().params["report"]:
         if source or "region" in maps:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
-        _check_report(report, material, shape, getattr(known, "values", known))
-        writers.append(lambda made, run: _report(report, material, made, known, place))
+        _check_report(material, shape, getattr(known, "values", known))
     inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -140,8 +99,58 @@ def simulate(
         make,
         f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
         str(output),
-        writers,
+        [lambda made, run: write_realisations(output, made)],
+        report=lambda folder, made, run: _report(folder, material, made, known, place),
     )
+
+
+@job(
+    ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Estimate the probabilities."),
+    ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
+    of=None,
+)
+@training_options
+@output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")
+@size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
+@option("--categorical", is_flag=True, group=DATA, help="Treat values as categories.")
+@option("--nearest", default=8, show_default=True, type=int, help="Use this many data for each cell, the nearest.")
+@option(
+    "--reach", type=int, help="Use data up to this many cells away.  [an eighth of the smaller side of TRAINING_IMAGE]"
+)
+@option(
+    "--bandwidth",
+    default=1.0,
+    show_default=True,
+    type=float,
+    help="Set the width of the Parzen kernel, in units of h_opt.",
+)
+def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
+    """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
+
+    It draws no realisations, so the estimates have no sampling noise.
+    """
+    from simdtex import estimate
+    from simdtex.io.realisations import write_realisations
+    from simdtex.run import Output
+
+    how = take_reading(options, deep=True)
+    material = read_material(training_image, how)
+    if material.deep:
+        raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
+    if material.channel_axis is not None:
+        raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
+    lies = read_place(material, output, options)
+    data = read_data(material, options, how)
+    height, width = output_shape(size, material.pixels[0], data["known"], material.pixels[0])
+    if data["known"] is None:
+        raise ValueError("an estimate requires data; give --known")
+    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | lies
+
+    def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
+        made = estimate(material.array, shape=(height, width), device=device, callback=callback, **inputs)
+        return georeferenced(made, material.crs), Output(None, statistics=made.attrs)
+
+    return Task(make, f"maps of {width}x{height}", str(output), [lambda made, run: write_realisations(output, made)])
 
 
 def read_place(material: Material, output: Path, options: dict[str, Any], source: bool = False) -> dict[str, Any]:
@@ -152,8 +161,7 @@ def read_place(material: Material, output: Path, options: dict[str, Any], source
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.realisations import check_realisations_path
 
-    told = {name: options.pop(name) for name in ("origin", "cell")}
-    lies: dict[str, Any] = {name: None if text is None else numbers(f"--{name}", text) for name, text in told.items()}
+    lies: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
     if material.lies:  # whose z is left out if that of the other option is
         axes = min((len(one) for one in lies.values() if one), default=3)
         lies = {name: one or getattr(material.lies, name)[:axes] for name, one in lies.items()}
@@ -192,11 +200,10 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
     write_ensemble(folder, pixels, made.values, data=data, categories=categories, **shown)
 
 
-def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:
+def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
     from simdtex.experiments.ensemble.summary import LEAST
     from simdtex.options import LARGEST
-    from simdtex.report.page import check_folder
 
     if material.several or material.channel_axis is not None:
         raise ValueError("--report requires one training image of one variable; leave it out")
@@ -207,4 +214,3 @@ def _check_report(folder: Path, material: Material, shape: tuple[int, ...], know
         raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
-    check_folder(folder)

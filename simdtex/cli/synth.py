@@ -9,48 +9,36 @@ from typing import Any
 
 import click
 
-from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import check_source_map, last_iteration, output_shape, read_also, read_material, take_reading
-from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.maps import arranged, folder_of
+from simdtex.cli.inputs import last_iteration, output_shape, read_also, read_data, take_reading
+from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.maps import Folder, arranged, read_lead
 from simdtex.cli.options import (
-    ALSO,
     GUIDE,
-    MAP,
     METHODS,
     PREVIEW,
-    SAMPLE_MASK,
-    SOURCE_MAP,
+    PROFILE,
     data_options,
     given,
+    material_options,
     option,
+    output_option,
     report_option,
     size_option,
+    stages_option,
 )
-from simdtex.cli.places import EITHER, ENTER
+from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
 @job(
     ("synth gravel.png -o more.png", "Make a texture of twice the size that tiles."),
     ("synth brick -o more --size 2x", "Make more of a material: all maps in the folder brick, arranged alike."),
-    (
-        "synth gravel.png -o more.png --size 1024x512 --seed 7 --preview",
-        "Set size and seed, and see 3x3 copies in more-3x3.png.",
-    ),
+    ("synth gravel.png -o more.png --size 1024x512 --preview", "Set the size, and see 3x3 copies in more-3x3.png."),
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     usual="output size seed method order also guide preview report dry_run device quiet",
-    stages="every level, sweep or iteration",
-    profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=EITHER,
-    help="Write this picture, or a folder of maps; with --tiles a .zarr store.",
-)
+@output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
 @size_option("that of --known or of the output guide, else twice the first sample")
 @option(
     "--method",
@@ -59,67 +47,43 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     words=METHODS["synth"],
     help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
-@SAMPLE_MASK
 @data_options
 @GUIDE
-@MAP
-@SOURCE_MAP
-@ALSO
+@material_options
 @PREVIEW
-@report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @tiles_options
-def synth(
-    samples: tuple[Path, ...],
-    output: Path,
-    size: str | None,
-    method: str,
-    source_map: Path | None,
-    roles: tuple[str, ...],
-    also: tuple[str, ...],
-    report: Path | None,
-    preview: bool,
-    **options: Any,
-) -> Task | None:
+@stages_option("every level, sweep or iteration")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
+@PROFILE
+def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
-    The method mrf takes several samples of one type; unknown pixels may be NaN. SAMPLE may be a folder with the maps
-    of a material, as in `simdtex tile`.
+    The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
     """
     from simdtex.synthesis import synthesize
 
     context = click.get_current_context()
     check_tiles(context)
-    folder = folder_of(samples if options["tiles"] is None else (), output, roles)
-    if method == "pyramid" and (source_map or also or folder):
-        what = "give one picture" if folder else "leave --source-map and --also out"
-        raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
     how = take_reading(options)
-    material = read_material([folder.lead] if folder else samples, how)
+    target, material = read_lead(samples, output, options, how)
+    if method == "pyramid" and (options["source_map"] or options["also"] or isinstance(target, Folder)):
+        remedy = "give one picture, and leave --source-map and --also out"
+        raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
     pixels = material.pixels[0]
     data = read_data(material, options, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
-    inputs = data | given(options, without=("tiles", "workers"))
-    if report:
-        from simdtex.report.page import check_folder
-
-        if material.several or known is not None or not material.known:
-            raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
-        check_folder(report)
+    if context.params["report"] and (material.several or known is not None or not material.known):
+        raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
     if options["tiles"] is not None:
-        others = read_also(also, material, files=False)
-        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
+        others = read_also(options["also"], material, files=False)
+        left_out = ("tiles", "workers", "also", "source_map", "preview")
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    check_source_map(source_map, material, everywhere=known is None)
-    if (also or folder) and known is not None:
-        what = "give one picture" if folder else "leave --also out"
-        raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
     like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
-    writers = arranged(folder or output, material, also, source_map, like, kept=known is not None, preview=preview)
-    if report:
-        from simdtex.report.synthesis import write_synthesis
-
-        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
+    foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
+    writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
     def more(made: Any, statistics: dict[str, Any]) -> None:
         if method == "multires":
@@ -140,10 +104,11 @@ def synth(
     height, width = material.sizes[0]
     by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
     return Task(
-        partial(synthesize, material.array, shape, method=method, **inputs),
+        partial(synthesize, material.array, shape, method=method, **data | given(options)),
         f"{shape[1]}x{shape[0]} from {by}",
-        str(folder or output),
+        str(target),
         writers,
         material.limits,
         more,
+        partial(write_page, pixels),
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 from math import prod
 from pathlib import Path
@@ -17,56 +16,41 @@ import click
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
-from simdtex.cli.job import command_line, observed, progress_bar
-from simdtex.cli.options import option
+from simdtex.cli.job import command_line, observed, watching
+from simdtex.cli.options import Parsed, option, together
 
-ALONE = ("stages", "profile", "array", "preview")
+ALONE = ("stages", "profile", "array", "preview", "checkpoint")
 """Options that are of a picture which one process holds."""
 
 CALIBRATED = 512
 """The side of the output, in pixels, from which the time of tiles is estimated."""
 
 
-def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--tiles`` and what goes with it."""
-    for one in (
-        workers_option,
-        option(
-            "--tiles",
-            group=RUNS,
-            type=int,
-            metavar="SIDE",
-            help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
-            "one machine. The pixels are the same.",
-        ),
-    ):
-        command = one(command)
-    return command
-
-
 workers_option = option(
     "--workers",
     group=RUNS,
     metavar="N|ADDRESS",
+    type=Parsed(lambda text: text if "://" in text else int(text), "a number or an address such as tcp://HOST:8786"),
     help="Use N processes on this machine for the tiles, or the workers of the Dask scheduler at tcp://HOST:8786.",
 )
-
-
-def workers_of(text: str | None) -> int | str | None:
-    """Return the number of processes or the address that ``--workers`` names."""
-    if text is None or "://" in text:
-        return text
-    try:
-        return int(text)
-    except ValueError:
-        raise ValueError(f"--workers {text} is neither a number nor an address such as tcp://HOST:8786") from None
+tiles_options = together(
+    option(
+        "--tiles",
+        group=RUNS,
+        type=int,
+        metavar="SIDE",
+        help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
+        "one machine. The pixels are the same. Then --source-map is STORE/source, and --also MAP=STORE/NAME.",
+    ),
+    workers_option,
+)
 
 
 def check_tiles(context: click.Context) -> None:
     """Raise if options exclude one another."""
     given = context.params
     if given["tiles"] is None:
-        if given["workers"]:
+        if given["workers"] is not None:
             raise ValueError("--workers requires --tiles; give the side of a tile, such as --tiles 2048")
         return
     if given["method"] != "mrf":
@@ -80,8 +64,6 @@ def check_tiles(context: click.Context) -> None:
         raise ValueError(
             f"with --tiles the source map is an array of the store; give --source-map {given['output'] / 'source'}"
         )
-    if given.get("checkpoint"):
-        raise ValueError("the store of --tiles is also the checkpoint; leave --checkpoint out")
 
 
 def synthesize_in_tiles(
@@ -93,7 +75,6 @@ def synthesize_in_tiles(
 
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
-    workers = workers_of(given["workers"])
     for one in others:
         if one.out.parent != output:
             raise ValueError(f"{one.out} is not an array of the store; end --also in ={output / one.out.stem}")
@@ -110,25 +91,24 @@ def synthesize_in_tiles(
             seconds, _ = observed(partial(synthesize, sample, (side, side), **own), given["device"])
             click.echo(f"one process needs about {duration_text(seconds * prod(shape) / side**2)}; nothing was written")
         return
-    options |= {"rng": given["seed"], "device": given["device"], "ended": _write_report}
+    options |= {"rng": given["seed"], "ended": _write_report, "note": note}
+    options |= {name: given[name] for name in ("tiles", "workers", "device")}
     if given["report"]:
         options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
-    with _progress(output, given["quiet"]) as callback:
-        distributed.synthesize(
-            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=note, **options
-        )
+    context.meta[RESUME] = output
+    with watching(given["quiet"]) as callback:
+        distributed.synthesize(sample, shape, output, callback=callback, **options)
     _done(output, given["quiet"], began)
 
 
-def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bool) -> None:
+def resume_tiles(store: Path, workers: int | str | None, device: str | None, quiet: bool) -> None:
     """Go on with an output in tiles."""
     from simdtex import distributed
 
     began, finished = time.perf_counter(), distributed.finished(store)
-    with _progress(store, quiet) as callback:
-        distributed.resume(
-            store, workers=workers_of(workers), device=device, callback=callback, note=note, ended=_write_report
-        )
+    click.get_current_context().meta[RESUME] = store
+    with watching(quiet) as callback:
+        distributed.resume(store, workers=workers, device=device, callback=callback, note=note, ended=_write_report)
     if finished:
         click.echo(f"{store} is finished already")
     else:
@@ -148,14 +128,6 @@ def _write_report(samples: list[Any], image: Any, output: Any, command: dict[str
         store = click.get_current_context().meta[RESUME]
         raise ValueError(f"{error}; then go on with: simdtex resume {store}") from None
     write_synthesis(command["report"], samples[0], image, output, command["line"])
-
-
-@contextmanager
-def _progress(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """Yield a callback that moves a progress bar; if the command is stopped, it says how to go on with the store."""
-    click.get_current_context().meta[RESUME] = store
-    with progress_bar(quiet) as show:
-        yield lambda progress: show(progress.fraction, progress.doing)
 
 
 def _done(store: Path, quiet: bool, began: float) -> None:

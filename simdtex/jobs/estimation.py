@@ -22,6 +22,7 @@ from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data
 from simdtex.model.sample import Sample
 from simdtex.options import moderate, real, require, whole
+from simdtex.run import Callback, Progress
 
 if TYPE_CHECKING:
     import xarray
@@ -45,6 +46,7 @@ def estimate(
     reach: int | None = None,
     bandwidth: float = 1.0,
     device: str | None = None,
+    callback: Callback | None = None,
 ) -> xarray.Dataset:
     """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
 
@@ -68,6 +70,9 @@ def estimate(
         h in units of h_opt, equation (8).
     device : str, optional
         As in `simdtex.synthesize`.
+    callback : callable, optional
+        Called with a `simdtex.run.Progress` after each part of the cells. Its ``image()`` are the maps, (y, x, maps);
+        unfinished cells are NaN. If it raises an error, the run ends.
 
     Returns
     -------
@@ -125,9 +130,12 @@ def estimate(
     data = Data(np.argwhere(given.whole), sample.scale.levels(given.values[given.whole]).T)
     sites = np.argwhere(np.ones(size, bool))
     rows = given_data(machine, sample, of, data, sites, nearest, bandwidth)
-    found = np.empty((len(names) if categorical else 2, prod(size)))
+    found, done = np.full((len(names) if categorical else 2, prod(size)), np.nan), 0
     for here, probability in rows:
         found[:, here] = probability.T if categorical else _moments(probability, of, own)
+        done += here.size
+        if callback:
+            callback(Progress(level=0, levels=1, fraction=done / len(sites), image=found.T.reshape(*size, -1).copy))
     certain = given.whole.ravel()
     told = given.values[given.whole][:, 0]
     found[:, certain] = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])

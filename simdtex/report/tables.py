@@ -11,6 +11,7 @@ from math import floor, log10
 
 import rich.table
 from rich.console import Console
+from rich.text import Text
 
 _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
@@ -52,7 +53,8 @@ def print_table(table: Table, width: int | None = None) -> None:
     for number, (name, numeric) in enumerate(zip(table.header, table.numeric, strict=True)):
         shown.add_column(name, justify="right" if numeric else "left", overflow="fold", no_wrap=not number)
     for row in table.rows:
-        shown.add_row(*row.values(), style="yellow" if any(map(warns, row.values())) else None)
+        cells = map(Text, row.values())  # names may contain [brackets], which are no markup
+        shown.add_row(*cells, style="yellow" if any(map(warns, row.values())) else None)
     console.print(shown)
     console.print()
 
