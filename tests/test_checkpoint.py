@@ -194,7 +194,7 @@ def test_finished_realisations_are_kept(file):
     made = []
 
     def callback(progress):
-        made.append(progress.realisation)
+        made.extend([progress.realisation] * progress.complete)
         if len(made) == 2:
             raise Stop
 

@@ -182,6 +182,10 @@ def test_resume_writes_what_the_command_writes(folder):
 
 BAD = {
     "nothing to learn from": ([], "give --texture once for each class, or --strokes"),
+    "validation of strokes": (
+        ["--strokes", "strokes.png", "--validation", "left=left.png"],
+        "--validation requires --texture; leave it out",
+    ),
     "both": ([*SAMPLES, "--strokes", "strokes.png"], "give --texture once for each class, or --strokes"),
     "no name": (["--texture", "left.png"], "--texture 'left.png' must be NAME=FILE"),
     "a name twice": ([*SAMPLES, "--texture", "left=cut.png"], "names left twice; give left=FILE0,FILE1"),

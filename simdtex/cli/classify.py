@@ -89,6 +89,8 @@ def classify(
     held = _read_samples("--validation", validation, whole)
     if bool(textures) == bool(strokes):
         raise ValueError("give --texture once for each class, or --strokes")
+    if strokes and validation:
+        raise ValueError("--validation requires --texture; leave it out")
     pixels: NDArray[Any] = whole.array
     more: dict[str, Any] = {"channel_axis": whole.channel_axis}
     known: Any
