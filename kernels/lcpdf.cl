@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The local conditional probability density function, equations (6) to (8) and (12), and what relaxation takes
-// from it: a draw (Gibbs), the nearest candidate (ICM), or the whole table of probabilities.
+// from it: a draw (Gibbs), the nearest candidate or the mode (ICM), or the whole table of probabilities.
 //
 //   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2
 //
@@ -169,17 +169,32 @@ __kernel void lcpdf_least(__global const float *restrict distance, __global cons
         values[c * S + s] = (ushort)sample[c * plane + candidates[p]];
 }
 
-// The whole density of one channel, (S, greys), up to a factor: the host divides each row by its sum, since OpenCL lets
-// devices round a division as they like.
+// W_p times the kernel of equation (7) around y_p, at a site's grey levels x_c in all channels but one.
+inline ulong weight_at(ulong w, __global const float *y, const int plane, __global const ushort *x, const int S,
+                       const int but, __global const float *window, const int radius)
+{
+    for (int c = 0; c < MADE; ++c) {
+        const int gap = abs((int)y[c * plane] - (int)x[c * S]);
+        if (c != but)
+            w = gap <= radius ? (ulong)((float)w * window[gap]) : 0ul;
+    }
+    return w;
+}
+
+// The density of equation (7) over grey levels and its mode (ICM), of several levels the lowest. From the pixel of the
+// nearest candidate on, each channel in turn, and once more, takes the mode given the others; the source gives most.
 //
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
 // mass    (S, greys)      scratch: sum of the weights per grey level
-// table   (S, greys)      out: f(x)
+// table   (S, greys)      out: f(x) of the last channel, up to a factor: devices may round a division as they like
+// choice  (S,), values (C, S)   in: of the nearest candidate, by lcpdf_least (one channel: anything); out: of the mode
 __kernel void lcpdf_density(__global const float *restrict distance, __global const float *restrict nearest,
                           const int blocks, const int S, const int P, const float scale,
-                          __global const float *restrict sample, __global const int *restrict candidates,
-                          __global const float *restrict window, const int radius, const int greys,
-                          __global ulong *restrict mass, __global float *restrict table)
+                          __global const float *restrict sample, const int plane,
+                          __global const int *restrict candidates, __global const float *restrict window,
+                          const int radius, const int greys, __global ulong *restrict mass,
+                          __global float *restrict table, __global int *restrict choice,
+                          __global ushort *restrict values)
 {
     const int s = get_global_id(0);
     if (s >= S)
@@ -187,18 +202,30 @@ __kernel void lcpdf_density(__global const float *restrict distance, __global co
     const float smallest = smallest_of(nearest, blocks, P, s);
     __global ulong *m = mass + (size_t)s * greys;
     __global float *f = table + (size_t)s * greys;
-    for (int x = 0; x < greys; ++x)
-        m[x] = 0;
+#define WEIGHT(p, but)                                                                                                 \
+    weight_at(weight(DISTANCE(p), smallest, scale), sample + candidates[p], plane, values + s, S, but, window, radius)
+    for (int n = 0; n < (MADE > 1 ? 2 * MADE : 1); ++n) {
+        const int c = n % MADE;
+        for (int x = 0; x < greys; ++x) {
+            m[x] = 0;
+            f[x] = 0.0f;
+        }
+        FOR_CANDIDATES(p) m[(int)sample[c * plane + candidates[p]]] += WEIGHT(p, c);
+        for (int v = 0; v < greys; ++v)
+            for (int x = max(0, v - radius); m[v] && x <= min(greys - 1, v + radius); ++x)
+                f[x] = fma((float)m[v], window[abs(x - v)], f[x]);
+        int mode = 0;
+        for (int x = 1; x < greys; ++x)
+            mode = f[x] > f[mode] ? x : mode;
+        values[c * S + s] = (ushort)mode;
+    }
+    ulong most = 0;
     FOR_CANDIDATES(p)
     {
-        const ulong w = weight(DISTANCE(p), smallest, scale);
-        if (w)
-            m[(int)sample[candidates[p]]] += w;
-    }
-    for (int x = 0; x < greys; ++x) {
-        float here = 0.0f;
-        for (int v = max(0, x - radius); v <= min(greys - 1, x + radius); ++v)
-            here = m[v] ? fma((float)m[v], window[abs(x - v)], here) : here;
-        f[x] = here;
+        const ulong w = WEIGHT(p, -1);
+        if (w > most) {
+            most = w;
+            choice[s] = candidates[p];
+        }
     }
 }

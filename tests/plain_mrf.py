@@ -16,7 +16,7 @@ import numpy as np
 import plain
 from numpy import float32
 from plain_multires import within
-from plain_numbers import cumulative, exponential
+from plain_numbers import cumulative, exponential, fma
 from plain_sample import NOWHERE, UNKNOWN, between, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 from plain_shown import finished, picture
@@ -52,7 +52,7 @@ def options(pictures, preset="default", **given):
     """All options, with what ``search="auto"`` and ``finish=None`` stand for."""
     o = SimpleNamespace(**DEFAULTS | (PAPER if preset == "paper" else {}) | given)
     if o.search == "auto":
-        o.search = "coherent" if o.relaxation == "icm" else "exact"
+        o.search = "coherent" if (o.relaxation, o.pixel) == ("icm", "source") else "exact"
     if o.finish is None:
         colours = {tuple(pixel) for y in pictures for row in y.tolist() for pixel in row}
         categories = o.categorical or len(colours) <= CATEGORIES
@@ -174,6 +174,8 @@ def relaxed(level, X, old, s, turn):
 
     if level.gibbs:  # 6.2.2.2
         values, p = drawn(level, d, numbers, s, turn)
+    elif level.o.pixel == "density":
+        values, p = mode(level, d)
     else:
         p = min(zip(d, numbers, strict=True))[1]
         values = level.own[:, p]
@@ -257,6 +259,7 @@ class Level:
         self.top = Y.top
         self.reach = min(Y.top, int(h * sqrt(2 * log(2.0**33))))  # beyond which the Gaussian is nothing
         gauss = [exp(-k * k / (2 * h * h)) for k in range(self.reach + 1)]
+        self.kernel = np.append(gauss, [0.0] * Y.top).astype(float32)  # by the difference of grey levels
         self.below_step = cumulative([gauss[abs(k)] for k in range(-self.reach, self.reach + 1)])
 
         coarsest, coherent = number == levels - 1, o.search == "coherent"
@@ -488,6 +491,30 @@ def drawn(level, d, numbers, s, turn):
         step = next(k for k, end in enumerate(level.below_step) if end > u) - level.reach
         values[c] = y + step
     return values, p
+
+
+def mode(level, d):
+    """ICM over grey levels: the first of the most probable ones, a channel's given the others', all of them twice.
+
+    The candidate is the one that most of the density there comes from.
+    """
+    w, near = weights(level, d), int(d.argmin())
+    values = level.own[:, near].tolist()
+
+    def given(p, but):
+        found = w[p]
+        for c, x in enumerate(values):
+            found = found if c == but else int(float32(found) * level.kernel[abs(x - level.own[c, p])])
+        return found
+
+    for c in [*range(len(values))] * (2 if len(values) > 1 else 1):
+        grey, f = level.own[c].tolist(), np.zeros(level.top + 1, float32)
+        for y in sorted(set(grey)):
+            weight = float32(sum(given(p, c) for p in range(len(w)) if grey[p] == y))
+            f = fma(weight, level.kernel[abs(np.arange(len(f)) - y)], f)
+        values[c] = f.tolist().index(max(f))
+    share = [given(p, None) for p in range(len(w))]
+    return values, share.index(max(share))
 
 
 def mass(level, y):

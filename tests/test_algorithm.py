@@ -22,6 +22,7 @@ FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "coherence": 0.2}
 """Coherent search that weighs a few candidates at every level but the coarsest."""
 DRAWN = {"relaxation": "gibbs", "pixel": "density"}
 DENSITY = BARE | DRAWN | {"order": 1, "xi": -4.0, "free_sweeps": 1, "coherence": 1.0}
+MODE = {"pixel": "density", "relaxation": "icm", "order": 1, "levels": 2, "free_sweeps": 1, "xi": -4.0}
 MORE = {"order": 2, "levels": 2}
 """The penalties, the structure channel and the finish of the defaults, all together."""
 MORE_OF_A_DENSITY = {"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": 1.5}
@@ -52,6 +53,9 @@ CASES = {
     "gibbs-density-float32": ((10, 9), None, np.float32, (7, 8), DENSITY | {"bandwidth": 0.4}),
     "density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"levels": 2, "bandwidth": 0.3}),
     "density-16-bit": ((8, 9), None, np.uint16, (5, 6), DENSITY | {"levels": 2, "bandwidth": 0.5}),
+    "mode": ((12, 11), None, np.uint8, (8, 9), MODE | {"preset": "paper"}),
+    "mode-colour": ((9, 8), 3, np.uint8, (6, 7), MODE | {"boundary": "open", "bandwidth": 0.8}),
+    "mode-16-bit": ((8, 9), None, np.uint16, (4, 5), MODE | {"bandwidth": 0.3, "balance": 0.5, "coherence": 1.0}),
     "few": ((12, 11), None, np.uint8, (8, 9), FEW),
     "few-colour": ((10, 11), 3, np.uint8, (8, 7), FEW | {"order": 5, "boundary": "open"}),
     "few-order-18": ((11, 10), None, np.uint8, (6, 7), FEW | {"order": 18, "xi": -16.0}),

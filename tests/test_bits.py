@@ -43,6 +43,7 @@ RUNS = {
         (8, 9),
         {"order": 2, "relaxation": "gibbs", "pixel": "density", "coherence": 2.0},
     ),
+    "colour-mode": ((11, 12), 3, np.uint8, (8, 9), {"order": 2, "pixel": "density", "bandwidth": 1.0}),
     "16-bit-two-channels": ((12, 12), 2, np.uint16, (9, 8), {"order": 8, "relaxation": "gibbs"}),
     "float32": ((12, 13), None, np.float32, (13, 7), {"order": 5}),
     "float64-density": (

@@ -62,6 +62,7 @@ VARIANTS = {
     "exact": {"order": 2, "search": "exact"},
     "draws": {"order": 2, "search": "exact", "relaxation": "gibbs"},
     "density": {"order": 2, "search": "exact", "relaxation": "gibbs", "pixel": "density"},
+    "mode": {"order": 2, "pixel": "density"},
     "fixed": {"order": 1, "schedule": "coloring-fixed"},
     "checkerboard": {"order": 2, "schedule": "checkerboard"},
     "synchronous": {"order": 2, "schedule": "synchronous"},

@@ -147,19 +147,24 @@ def test_the_progress_explains_the_next_relaxation(machine):
     np.testing.assert_array_equal(made, simdtex.synthesize(BRICK, (8, 9), **rules))  # asking changes nothing
 
 
-def test_a_density_is_the_lcpdf():
+@pytest.mark.parametrize("relaxation", ["gibbs", "icm"])
+def test_a_density_is_the_lcpdf(relaxation):
     seen = []
 
     def watch(progress):
-        if progress.end_of_sweep:
+        if progress.end_of_sweep and progress.level == 0:
             seen.append((progress.image(), progress.temperature(), progress.explain(4, 5)))
 
     sample = texture((14, 15))  # with levels near 0 and 255
-    simdtex.synthesize(sample, (10, 11), preset="paper", levels=1, order=4, rng=1, callback=watch, device="reference")
+    options = {"preset": "paper", "relaxation": relaxation, "levels": 2, "order": 4, "edges": "whole"}
+    simdtex.synthesize(sample, (10, 11), **options, rng=1, callback=watch, device="reference")
     assert len(seen) > 2
     for image, t, why in seen:
         expected = simdtex.lcpdf(image, sample, [(4, 5)], order=4, temperature=t, device="reference")
         np.testing.assert_allclose(why.density, expected, atol=1e-6)
+        if relaxation == "icm":
+            assert why.values == expected.argmax()
+            assert "takes the mode, the grey level of greatest density" in why.reason
 
 
 def test_a_list_continues_the_nearest_neighbours_alone():

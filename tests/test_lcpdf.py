@@ -313,8 +313,8 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
         assert values.max() <= 255
 
 
-CHOICES = [(False, False), (True, False), (True, True)]
-"""Whether sites draw, and whether from the density."""
+CHOICES = [(False, False), (True, False), (True, True), (False, True)]
+"""Whether sites draw, and whether they take grey levels of the density."""
 
 
 def relaxed(machine, p, bandwidth, strength, draws, density):

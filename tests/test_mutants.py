@@ -21,10 +21,10 @@ from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
 
 
-def test_a_density_is_drawn_from():
-    words = 'pixel="density" draws grey levels; give relaxation="gibbs" too, or pixel="source"'
+def test_the_mode_of_a_density_is_of_all_candidates():
+    words = 'the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"'
     with pytest.raises(ValueError, match=f"^{words}$"):
-        mrf.Options(pixel="density")
+        mrf.Options(pixel="density", search="coherent")
 
 
 def test_options_resolve():
@@ -35,6 +35,7 @@ def test_options_resolve():
     assert resolved() == ("coherent", 1.5)
     assert resolved(relaxation="gibbs") == ("exact", 1.5)
     assert resolved(relaxation="gibbs", pixel="density") == ("exact", 0.0)
+    assert resolved(pixel="density") == ("exact", 0.0)
     assert resolved(search="exact", finish=0.5) == ("exact", 0.5)
     assert resolved(search="coherent", relaxation="gibbs", finish=0) == ("coherent", 0)
     assert resolved(relaxation="gibbs", pixel="density", finish=0.5) == ("exact", 0.5)

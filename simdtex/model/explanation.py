@@ -104,7 +104,7 @@ class Explanation:
         0 is the finest level; sweeps of a level count from 1.
     drawn : bool
         Whether the site draws from the LCPDF (``relaxation="gibbs"``, and every coarsest level) or takes its mode, the
-        candidate of least total cost (``"icm"``).
+        candidate of least total cost or, with a density, the grey level of greatest probability (``"icm"``).
     exact : bool
         Whether all candidates of the level are evaluated, and not only the list of the coherent search.
     weighed : int
@@ -117,10 +117,10 @@ class Explanation:
     candidates : Ranked
         In ascending order of their rank.
     taken : int
-        The index in `candidates` of the taken one.
+        The index in `candidates` of the taken one, or of the one that gives most to the mode of a density.
     values : (channels,) uint16 array
         x_s, the working grey levels that the site takes, of all channels but guides: those of the candidate or, with a
-        density, drawn from the kernel around them.
+        density, its mode, or drawn from the kernel around the candidate's.
     density : (channels, greys) float64 array or None
         With ``pixel="density"``, the LCPDF of each channel over the legal working grey levels; every row adds up to 1.
     """
@@ -148,7 +148,8 @@ class Explanation:
         if self.drawn:
             how = f"draws from the LCPDF of {search}; it has drawn one of probability {found.probability[at]:.4g}"
         else:
-            how = f"takes the mode, the candidate of least total cost of {search}"
+            mode = "candidate of least total cost" if self.density is None else "grey level of greatest density"
+            how = f"takes the mode, the {mode} of {search}"
         return f"Site {self.site} of level {self.level}, sweep {self.sweep}, {how}: rank {found.rank[at]}."
 
     def table(self) -> str:

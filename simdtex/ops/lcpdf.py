@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The local conditional probability density function, equations (6) to (8) and (12), on the machine.
 
-`distance` returns d_p for every site and candidate, `take` a draw or the nearest candidate, `density` the function.
+`distance` returns d_p for every site and candidate, `take` what a site takes, `density` the function.
 """
 
 from __future__ import annotations
@@ -56,13 +56,18 @@ class Window(NamedTuple):
 class Choice(NamedTuple):
     """The choice of a site among its candidates, step 6.2.2.2.
 
-    ``draws``: whether it draws from the LCPDF, or takes the nearest candidate; ``density``: whether it draws a grey
-    level of the Parzen density, or a pixel of the sample; ``window``: that of equation (7).
+    ``draws``: whether it draws from the LCPDF, or takes its mode; ``density``: whether it takes a grey level of the
+    Parzen density, or a pixel of the sample; ``window``: that of equation (7).
     """
 
     draws: bool
     density: bool
     window: Window
+
+    @property
+    def mode(self) -> bool:
+        """Whether a site takes the mode of the density."""
+        return self.density and not self.draws
 
 
 class Key(NamedTuple):
@@ -203,9 +208,32 @@ def taken(
         chosen = np.where(d == d.min(0), numbers, candidates.size).min(0)
     source = candidates.positions[chosen]
     values = candidates.pixels[: candidates.made, source].astype(np.uint16)
-    if choice.density:
+    if choice.mode:  # of all candidates
+        pixels = candidates.pixels[: candidates.made, candidates.positions[: candidates.size]].astype(np.int64)
+        source = candidates.positions[to_mode(values, weights(d, choice.window.scale), pixels, choice.window)]
+    elif choice.density:
         values = np.stack([stepped(x, c, places, choice.window, key) for c, x in enumerate(values)])
     return Relaxed(source, values)
+
+
+def to_mode(x: NDArray[np.uint16], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: Window) -> NDArray[np.intp]:
+    """Move grey levels ``x`` (C, S) to the mode, in place, and return the slot (S,) that gives most there.
+
+    Each channel in turn, and once more, takes the mode given the others, of several levels the lowest.
+    ``w`` (slots, S) are the weights, ``pixels`` (C, slots) the grey levels of the candidates.
+    """
+
+    def weighed(but: int) -> NDArray[np.uint64]:
+        found = w
+        for c, grey in enumerate(pixels):
+            gap = abs(grey[:, None] - x[c])
+            kernel = np.where(gap <= win.radius, win.gauss[np.minimum(gap, win.radius)], np.float32(0))
+            found = found if c == but else (found.astype(np.float32) * kernel).astype(np.uint64)
+        return found
+
+    for c in [*range(len(x))] * (2 if len(x) > 1 else 1):
+        x[c] = smoothed(pixels[c], weighed(c), win).argmax(0)
+    return np.asarray(weighed(-1).argmax(0))
 
 
 @Operation
@@ -218,7 +246,7 @@ def take(
     choice: Choice,
     key: Key,
 ) -> Relaxed:
-    """Return a draw from the LCPDF for each site, or the first of its nearest candidates."""
+    """Return for each site a draw from the LCPDF, the first of its nearest candidates, or the mode of the density."""
     if machine is None:
         numbers = np.arange(candidates.size)[:, None]
         return taken(numbers, distances, candidates, grid.places(sites), choice, key)
@@ -237,40 +265,43 @@ def take(
         *(candidates.pixels, candidates.plane, candidates.positions, *own, *out),
         defines=_defines(machine, candidates),
     )
+    if choice.mode:
+        _density(machine, distances, candidates, choice.window, out)
     return out
 
 
-def smoothed(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
-    """Return f(x) = sum over v of mass[v] exp(-(x - v)^2 / 2h^2), (greys,), grey level 0 first."""
-    greys = np.arange(mass.size)
-    f = np.zeros(mass.size, np.float32)
-    for v in np.flatnonzero(mass):
+def smoothed(y: NDArray[np.int64], w: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+    """Return f(x) = sum over p of w_p exp(-(x - y_p)^2 / 2h^2), (greys, S), of y (slots,) and w (slots, S)."""
+    greys = np.arange(win.top + 1)
+    mass, f = (np.zeros((greys.size, w.shape[1]), dtype) for dtype in (np.uint64, np.float32))
+    np.add.at(mass, y, w)
+    for v in np.unique(y):
         gap = abs(greys - v)
         reached = gap <= win.radius
-        f[reached] = fma32(mass[v].astype(np.float32), win.gauss[gap[reached]], f[reached])
+        f[reached] = fma32(mass[v].astype(np.float32), win.gauss[gap[reached], None], f[reached])
     return f
 
 
 @Operation
 def density(machine: Launcher | None, distances: Distances, candidates: Candidates, win: Window) -> Array:
     """Return the density of one channel at each grey level, up to a factor, (S, greys) float32."""
-    shape = (distances.sites, win.top + 1)
     if machine is None:
-        w = weights(distances.distance, win.scale)
         grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
-        found = np.zeros(shape, np.float32)
-        for s in range(distances.sites):
-            masses = np.zeros(win.top + 1, np.uint64)
-            np.add.at(masses, grey, w[:, s])
-            found[s] = smoothed(masses, win)
-        return found
+        return smoothed(grey, weights(distances.distance, win.scale), win).T
+    unused = Relaxed(machine.empty((distances.sites,), np.int32), machine.empty((1, distances.sites), np.uint16))
+    return _density(machine, distances, candidates, win, unused)
+
+
+def _density(machine: Launcher, distances: Distances, candidates: Candidates, win: Window, near: Relaxed) -> Array:
+    """Return the density of the last channel, (S, greys), and move ``near``, the nearest candidates, to the mode."""
+    shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     machine.launch(
         "lcpdf_density",
         (distances.sites,),
         *_weighing(distances, win),
-        *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
-        *(win.radius, win.top + 1, mass, table),
+        *(candidates.pixels, candidates.plane, candidates.positions, machine.constant(win.gauss)),
+        *(win.radius, win.top + 1, mass, table, *near),
         defines=_defines(machine, candidates),
     )
     return table

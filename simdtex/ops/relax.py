@@ -4,7 +4,7 @@
 A `Relaxation` defines how a site relaxes: its neighbourhood, the proposed candidates (`Everything` or `Listed`), the
 choice among them, and its cooling. `relax` works in place, step after step; `relax_apart` does not change the field.
 The twins call the parts one after another. A device executes one kernel, ``kernels/relax.cl``, or several kernels if
-there are more candidates than a work-item can keep.
+there are more candidates than a work-item can keep, or for the mode of a density.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ class Relaxation(NamedTuple):
     @property
     def fused(self) -> bool:
         """Whether a device relaxes a site in one kernel."""
-        return isinstance(self.proposal, Listed) or self.proposal.slots <= KEPT
+        return isinstance(self.proposal, Listed) or (self.proposal.slots <= KEPT and not self.choice.mode)
 
 
 @Operation
@@ -260,7 +260,7 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     assert isinstance(proposal, Everything)
     candidates = proposal.candidates
-    if not (choice.draws or relaxation.confidences.own):
+    if not (choice.draws or choice.mode or relaxation.confidences.own):
         relaxed = nearest(
             machine, sites, field, offsets, grid, candidates, proposal.strip, relaxation.discount, relaxation.costs
         )

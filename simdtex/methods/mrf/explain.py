@@ -171,8 +171,6 @@ def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.Ch
     """Return the LCPDF of each channel, (C, greys), of weights (slots, 1) and grey levels (C, slots, 1)."""
     rows = []
     for c, grey in enumerate(pixels):
-        mass = np.zeros(choice.window.top + 1, np.uint64)
         others = lcpdf.masses(weights, np.delete(pixels, c, 0), choice)  # whose drawn levels are legal, too
-        np.add.at(mass, grey[:, 0].astype(np.int64), others[:, 0])
-        rows.append(lcpdf.smoothed(mass, choice.window).astype(np.float64))
+        rows.append(lcpdf.smoothed(grey[:, 0].astype(np.int64), others, choice.window)[:, 0].astype(np.float64))
     return np.stack([row / row.sum() for row in rows])

@@ -337,9 +337,12 @@ class Level:
     def at_once(self) -> int:
         """The most sites that are relaxed between two checks of the clock; scratch memory limits it."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        stores = self.relaxation.choice.draws or self.relaxation.confidences.own
+        choice, slots = self.relaxation.choice, self.proposal.slots
+        stores = choice.draws or choice.mode or self.relaxation.confidences.own
         stores = stores and isinstance(self.proposal, Everything)
-        most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
+        if choice.mode:  # as many candidates more as its scratch memory and its time are worth
+            slots += (choice.window.top + 1) * (3 + slots // neighbours)
+        most = self.machine.chunk(slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 
 

@@ -205,7 +205,7 @@ class Options:
         "requires (auto)",
         more="``coherent`` evaluates, at all but the coarsest level, the candidates that continue the source of a "
         "neighbour, the site's own source and some more, unless a level has 64 candidates or fewer. ``auto`` is "
-        '``coherent`` for ``relaxation="icm"``, and ``exact`` if a site draws.',
+        '``coherent`` for ``relaxation="icm"``, and ``exact`` if a site draws or takes the mode of a density.',
         paper="exact",
         jobs={"schedules": "exact"},
     )
@@ -265,9 +265,9 @@ class Options:
     pixel: str = sampling(
         "source",
         Choice(("source", "density")),
-        "Take pixels of the sample (source), or draw grey levels from the Parzen density, whose kernel also spreads "
-        "over the site itself (density)",
-        more='``density`` requires ``relaxation="gibbs"``.',
+        "Take pixels of the sample (source), or grey levels of the Parzen density, whose kernel also spreads over the "
+        "site itself (density)",
+        more='``density`` with ``relaxation="icm"``, the mode, requires the exact search; 16-bit samples take long.',
         paper="density",
     )
     schedule: str | schedules.Schedule = parallel(
@@ -350,8 +350,8 @@ class Options:
         check(self)
         if self.finish and self.finish < NARROWEST:
             raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
-        if (self.relaxation, self.pixel) == ("icm", "density"):
-            raise ValueError('pixel="density" draws grey levels; give relaxation="gibbs" too, or pixel="source"')
+        if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
+            raise ValueError('the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
         if self.categorical and self.finish:
@@ -383,7 +383,7 @@ class Options:
         Grey levels of a density have no source: no structure channel and no lattice. A volume has neither, and no
         finish.
         """
-        usual = "coherent" if self.relaxation == "icm" else "exact"
+        usual = "coherent" if (self.relaxation, self.pixel) == ("icm", "source") else "exact"
         search = usual if self.search == "auto" else self.search
         finish = self.finish
         if finish is None:
