@@ -34,9 +34,6 @@ LONG = 60.0
 EVERY = 10.0
 """Seconds between two lines of progress without a terminal."""
 
-SEEDS = 10**6
-"""Random seeds are below this, so that they are short to give again."""
-
 
 class Task(NamedTuple):
     """What a command does once its input is read and checked.
@@ -94,7 +91,7 @@ def job(
             began = time.perf_counter()
             kept = _checkpoint(checkpoint)
             if seed is None and not (kept and kept.path.exists()):  # else the seed of the checkpoint
-                seed = secrets.randbelow(SEEDS)
+                seed = short_seed()
             with watching(quiet, stages, task.limits, kept) as callback:
                 given = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
                 made, output = task.make(full_output=True, **given)
@@ -125,6 +122,11 @@ def job(
         return command(*examples, usual=usual)(function)
 
     return decorate
+
+
+def short_seed() -> int:
+    """Return a random seed below a million, which is short to give again."""
+    return secrets.randbelow(10**6)
 
 
 class Forecast:

@@ -91,7 +91,7 @@ def synthesize_in_tiles(
             seconds, _ = observed(partial(synthesize, sample, (side, side), **own), given["device"])
             click.echo(f"one process needs about {duration_text(seconds * prod(shape) / side**2)}; nothing was written")
         return
-    options |= {"rng": given["seed"], "ended": _write_report, "note": note}
+    options |= {"rng": short_seed() if given["seed"] is None else given["seed"], "ended": _write_report, "note": note}
     options |= {name: given[name] for name in ("tiles", "workers", "device")}
     if given["report"]:
         options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
