@@ -16,7 +16,7 @@ import click
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
-from simdtex.cli.job import command_line, observed, watching
+from simdtex.cli.job import command_line, observed, short_seed, watching
 from simdtex.cli.options import Parsed, option, together
 
 ALONE = ("stages", "profile", "array", "preview", "checkpoint")
