@@ -36,7 +36,7 @@ __kernel void maspar_alu(const Layout g, __global const uchar *restrict mask, co
         case 13: z = (TO)(x & y); break;
         case 14: z = (TO)(x | y); break;
         case 15: z = (TO)(x >> y); break;
-        case 16: z = (TO)((T)1 << x); break;
+        case 16: z = (TO)(x < 64 ? (T)1 << x : 0); break;
         case 17: z = (TO)popcount(x & ~(x + 1)); break; // number of the lowest bit that is 0
         case 18: z = (TO)mul_hi(x, y); break; // x as a fraction of y
 #endif

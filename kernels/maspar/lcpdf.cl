@@ -9,39 +9,46 @@
 #include "common/vector.h"
 #include "common/distance.h"
 #include "common/parzen.h"
+#include "common/philox.h"
 #include "maspar/layout.h"
 
 #define STEP 4 // vectors of candidates in registers together
 
-// Keeps what has arrived from neighbour k: it is a member of the neighbourhood of every active PE.
+// Keeps what has arrived from neighbour n, and adds its temperature to `heat`.
 __kernel void maspar_lcpdf_keep(const Layout g, __global const uchar *restrict mask, __global float *restrict near,
-                                const int N, const int n, __global const int *restrict arrived)
+                                const int N, const int n, __global const int *restrict arrived,
+                                __global int *restrict heat)
 {
     const int pe = get_global_id(0);
     if (pe >= PES(g))
         return;
     for (int k = pe; k < LAYERS(g) * PES(g); k += PES(g)) {
+        if (!mask[k])
+            continue;
         __global float *z = near + ((size_t)k * N + n) * (C + 1);
-        const float u = (float)(1024 - arrived[k * (C + 1) + C]) * 0x1p-10f;
-        for (int c = 0; c < C && mask[k]; ++c)
-            z[c] = (float)arrived[k * (C + 1) + c] * u;
-        z[C] = mask[k] ? u : z[C];
+        const int t = arrived[k * (C + 1) + C];
+        z[C] = (float)(1024 - t) * 0x1p-10f;
+        for (int c = 0; c < C; ++c)
+            z[c] = (float)arrived[k * (C + 1) + c] * z[C];
+        heat[k] += t;
     }
 }
 
-// Equation (12): neighbours in canonical order, each term two fused multiply-adds.
-// sample (N, C, count)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
+// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the least of all distances so far,
+// which the first block begins; the block has `size` places for candidates, and `count` candidates.
+// sample (N, C, size)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
 __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restrict mask, const int layer,
                                     __global const float *restrict near, const int N,
-                                    __global const float *restrict sample, const int count,
-                                    __global float *restrict distance, const int pitch, const int at)
+                                    __global const float *restrict sample, const int size,
+                                    __global float *restrict distance, const int pitch, const int at, const int count,
+                                    const int first, __global float *restrict least)
 {
     const int pe = get_global_id(0);
     if (pe >= PES(g) || !mask[layer * PES(g) + pe])
         return;
     __global const float *z = near + (size_t)(layer * PES(g) + pe) * N * (C + 1);
     __global float *d = distance + (size_t)pe * pitch + at;
-    for (int p = 0; p < count; p += STEP * V) {
+    for (int p = 0; p < size; p += STEP * V) {
         vec sum[STEP];
         for (int q = 0; q < STEP; ++q)
             sum[q] = 0.0f;
@@ -49,26 +56,16 @@ __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restri
             for (int c = 0; c < C; ++c)
 #pragma unroll
                 for (int q = 0; q < STEP; ++q) {
-                    const vec e = GAP(LOAD(sample + (k * C + c) * count + p + q * V), (vec)z[k * (C + 1) + C],
+                    const vec e = GAP(LOAD(sample + (k * C + c) * size + p + q * V), (vec)z[k * (C + 1) + C],
                                       (vec)z[k * (C + 1) + c]);
                     sum[q] = fma(e, e, sum[q]);
                 }
         for (int q = 0; q < STEP; ++q)
             STORE(sum[q], d + p + q * V);
     }
-}
-
-// The least distance of the blocks so far; the first block begins it.
-__kernel void maspar_lcpdf_least(const Layout g, __global const uchar *restrict mask, const int layer,
-                                 __global const float *restrict distance, const int pitch, const int at,
-                                 const int count, const int first, __global float *restrict least)
-{
-    const int pe = get_global_id(0);
-    if (pe >= PES(g) || !mask[layer * PES(g) + pe])
-        return;
     float found = first ? least[pe] : INFINITY;
     for (int p = 0; p < count; ++p)
-        found = fmin(found, distance[(size_t)pe * pitch + at + p]);
+        found = fmin(found, d[p]);
     least[pe] = found;
 }
 
@@ -102,15 +99,18 @@ __kernel void maspar_lcpdf_weigh(const Layout g, __global const uchar *restrict 
         chosen[k] = taken;
 }
 
-// A grey level from the kernel of equation (7) around that of the chosen candidate, by the lower 32 random bits.
+// A grey level drawn from the kernel of equation (7) around that of the chosen candidate; word c is channel c.
 __kernel void maspar_lcpdf_step(const Layout g, __global const uchar *restrict mask, __global int *restrict x,
-                                const int size, const int word, __global const uint *restrict noise, const int radius,
-                                const int top, __global const ulong *restrict bits)
+                                const int size, const int c, __global const uint *restrict noise, const int radius,
+                                const int top, __global const int *restrict place, const ulong seed, const uint level,
+                                const uint turn)
 {
     const int pe = get_global_id(0);
     if (pe >= PES(g))
         return;
     for (int k = pe; k < LAYERS(g) * PES(g); k += PES(g))
-        if (mask[k])
-            x[k * size + word] += step_from(noise, radius, x[k * size + word], top, (uint)bits[k]);
+        if (mask[k]) {
+            const uint bits = draw4(seed, level, turn, (ulong)place[k], PURPOSE_DRAW, 1 + c).x;
+            x[k * size + c] += step_from(noise, radius, x[k * size + c], top, bits);
+        }
 }

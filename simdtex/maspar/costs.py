@@ -35,13 +35,15 @@ COSTS = {
     "x-net": Cost(WORD * FULL / 23e9, PUBLISHED),  # a word to an adjacent PE, 23 GB/s
     "router": Cost(WORD * FULL / 1.28e9, PUBLISHED),  # a word to any PE, 1.28 GB/s
     "broadcast": Cost(8 * CLOCK, "assumption"),  # a word from the ACU: its 8 nibbles enter the 4-bit PEs in turn
-    "memory": Cost(8 * CLOCK, "assumption"),  # a word moved within a PE's memory, as slow as a 32-bit integer
     "reduction": Cost(32 * CLOCK, "assumption"),  # a word from all PEs to the ACU, bit by bit
 }
 """The costs by kind of instruction, on 32-bit words."""
 
 PHILOX = 10 * 12
 """Integer instructions of four random words: ten rounds of 2 wide multiplications, in halves, and 4 exclusive ors."""
+
+WIDE = 8
+"""Integer instructions of the high half of a product of 64 bits."""
 
 EXP = 26
 """Float instructions of a weight (7): a difference, its scale, exp by 9 fma, and the conversion."""

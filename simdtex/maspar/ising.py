@@ -6,6 +6,7 @@ from __future__ import annotations
 from simdtex import random
 from simdtex.maspar.machine import MP1, Plural
 from simdtex.ops.ising import heat_bath_chances
+from simdtex.ops.lcpdf import Key
 
 
 def ising(mp1: MP1, temperature: float, sweeps: int, seed: int, synchronous: bool = False) -> Plural:
@@ -22,6 +23,6 @@ def ising(mp1: MP1, temperature: float, sweeps: int, seed: int, synchronous: boo
             with mp1.where(square == color):  # no other PE changes its spin
                 up = mp1.xnet(spin, -1, 0) + mp1.xnet(spin, 0, -1) + mp1.xnet(spin, 0, 1) + mp1.xnet(spin, 1, 0)
                 mp1.table(chance, chances, up)  # of this temperature, by the number of neighbours that are up
-                bits = mp1.random(place, (seed, 0, sweep), random.DRAW) & (2**32 - 1)
+                bits = mp1.random(place, Key(seed, 0, sweep), random.DRAW) & (2**32 - 1)
                 spin.set(bits < chance)
     return spin

@@ -7,44 +7,42 @@ singular, and an instruction that uses one broadcasts it. PEs outside the activi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partialmethod
+from operator import mul
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from simdtex.machine.interface import Array, Machine, Operation
 from simdtex.maspar import instructions
 from simdtex.maspar.array import ProcessorArray
 from simdtex.maspar.costs import COSTS, PHILOX
-
-REGISTERS = 40
-"""Registers of 32 bits of a PE for a program; results of expressions are in these, and take no memory."""
-
-DIRECTIONS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
-"""The X-Net's directions, (rows, columns)."""
+from simdtex.ops.lcpdf import Key
 
 
 @dataclass
 class Count:
-    """The count of one kind of instruction: how many a layer executed, and the PEs that were active in them, summed."""
+    """The number of instructions of a kind that layers executed, and the sum of the PEs that were active in them."""
 
     instructions: int = 0
     active: int = 0
 
-    def add(self, instructions: int, active: int) -> None:
-        """Add to both counts."""
-        self.instructions, self.active = self.instructions + instructions, self.active + active
 
-
+@dataclass
 class Mask:
-    """The PEs that are active: ``plane`` (layers, PEs) uint8 on the machine, ``counts`` the number in each layer."""
+    """The PEs that are active: ``plane`` on the machine and ``active`` here, (layers, PEs), None without a machine.
 
-    def __init__(self, plane: Array, active: NDArray[np.bool_]) -> None:
-        self.plane, self.active = plane, active
-        self.counts: list[int] = active.sum(1).tolist()
+    ``counts`` are the active PEs of each layer.
+    """
+
+    counts: list[int]
+    plane: Array = None
+    active: NDArray[np.bool_] | None = None
 
     @property
     def layers(self) -> list[int]:
@@ -53,9 +51,10 @@ class Mask:
 
 
 class Plural:
-    """A variable with ``size`` words of one type for each PE and layer; ``[k]`` is its k-th word.
+    """A variable with words of one type for each PE and layer; ``[k]`` is its k-th word.
 
-    Operators are instructions of all active PEs. `set` assigns in place, and leaves the values of inactive PEs.
+    Operators return expressions, which all active PEs compute from first words. Expressions are in registers, take no
+    memory, and have no value in inactive PEs.
     """
 
     def __init__(self, mp1: MP1, data: Array, word: int = 0) -> None:
@@ -65,75 +64,36 @@ class Plural:
         return Plural(self.mp1, self.data, word)
 
     def set(self, value: Plural | float) -> None:
-        """Assign a plural or a singular value."""
-        if isinstance(value, Plural):
-            self.mp1.alu("copy", self, value)
-        else:
-            self.mp1.alu("put", self, self, value)
+        """Assign a plural or a singular value in all active PEs."""
+        operation = "copy" if isinstance(value, Plural) else "put"
+        self.mp1.alu(operation, self, value if isinstance(value, Plural) else self, value)
 
     def as_type(self, dtype: str) -> Plural:
-        """Return the values as another type."""
-        return self.mp1.alu("copy", self.mp1.register(dtype), self)
+        """Return the values as another type: int32, uint64 or float32."""
+        return self.mp1.alu("copy", self.mp1.expression(dtype), self)
 
-    def _with(self, operation: str, other: Plural | float) -> Plural:
+    def _with(self, operation: str, other: Plural | float = 0) -> Plural:
         dtype = "int32" if operation in instructions.COMPARISONS else self.data.dtype.name
-        return self.mp1.alu(operation, self.mp1.register(dtype), self, other)
+        return self.mp1.alu(operation, self.mp1.expression(dtype), self, other)
 
-    def __add__(self, other: Plural | float) -> Plural:
-        return self._with("add", other)
-
-    def __sub__(self, other: Plural | float) -> Plural:
-        return self._with("sub", other)
-
-    def __mul__(self, other: Plural | float) -> Plural:
-        return self._with("mul", other)
-
-    def __floordiv__(self, other: Plural | int) -> Plural:
-        return self._with("div", other)
-
-    def __mod__(self, other: Plural | int) -> Plural:
-        return self._with("mod", other)
-
-    def __and__(self, other: Plural | int) -> Plural:
-        return self._with("and", other)
-
-    def __or__(self, other: Plural | int) -> Plural:
-        return self._with("or", other)
-
-    def __rshift__(self, other: Plural | int) -> Plural:
-        return self._with("shr", other)
-
-    def __lt__(self, other: Plural | float) -> Plural:
-        return self._with("lt", other)
-
-    def __le__(self, other: Plural | float) -> Plural:
-        return self._with("le", other)
-
-    def __gt__(self, other: Plural | float) -> Plural:
-        return self._with("gt", other)
-
-    def __ge__(self, other: Plural | float) -> Plural:
-        return self._with("ge", other)
-
-    def __eq__(self, other: object) -> Plural:  # type: ignore[override]
-        return self._with("eq", other)  # type: ignore[arg-type]
-
-    def __ne__(self, other: object) -> Plural:  # type: ignore[override]
-        return self._with("ne", other)  # type: ignore[arg-type]
-
+    __add__ = partialmethod(_with, "add")
+    __sub__ = partialmethod(_with, "sub")
+    __mul__ = partialmethod(_with, "mul")
+    __floordiv__ = partialmethod(_with, "div")
+    __mod__ = partialmethod(_with, "mod")
+    __and__ = partialmethod(_with, "and")
+    __or__ = partialmethod(_with, "or")
+    __rshift__ = partialmethod(_with, "shr")
+    __lt__ = partialmethod(_with, "lt")
+    __le__ = partialmethod(_with, "le")
+    __gt__ = partialmethod(_with, "gt")
+    __ge__ = partialmethod(_with, "ge")
+    __eq__ = partialmethod(_with, "eq")  # type: ignore[assignment]
+    __ne__ = partialmethod(_with, "ne")  # type: ignore[assignment]
     __hash__ = None  # type: ignore[assignment]
-
-    def bit(self) -> Plural:
-        """Return 2**x."""
-        return self._with("bit", 0)
-
-    def lowest(self) -> Plural:
-        """Return the number of the lowest bit that is 0."""
-        return self._with("lowest", 0)
-
-    def share(self, of: int) -> Plural:
-        """Return x as a fraction of 2**64, times a number, rounded down: an integer below ``of`` from random bits."""
-        return self._with("share", of)
+    bit = partialmethod(_with, "bit")  # 2**x
+    lowest = partialmethod(_with, "lowest")  # the number of the lowest bit that is 0
+    share = partialmethod(_with, "share")  # x / 2**64 of a number: of random bits, an integer below it
 
 
 class MP1:
@@ -152,48 +112,59 @@ class MP1:
     Attributes
     ----------
     counts : dict of Count
-        By kind of instruction (`simdtex.maspar.costs.COSTS`).
+        By section of the program and kind of instruction (`simdtex.maspar.costs.COSTS`).
     row, col : Plural
         The PE's pixel, int32.
     """
 
     def __init__(
-        self, machine: Machine | None, array: ProcessorArray, shape: tuple[int, int], memory: int = 2**16
+        self, machine: Machine | None, array: ProcessorArray, shape: tuple[int, int], memory: float = 2**16
     ) -> None:
         self.machine, self.array, self.shape, self.memory = machine, array, shape, memory
-        self.layout = instructions.Layout.of(array, shape)
-        self.layers, self.used = len(self.layout.pixel), 0
-        self.padded = self.layout.address.shape
-        self.counts = {kind: Count() for kind in COSTS}
-        inside = (self.layout.pixel < np.array(shape)).all(-1)
-        self.mask = Mask(self._put(inside.astype(np.uint8)), inside)
-        self.row, self.col = (self.plural() for _ in range(2))
+        self.layout = instructions.Layout(array, shape)
+        self.layers, self.used, self._section = self.layout.layers, 0, ""
+        self.counts: dict[tuple[str, str], Count] = defaultdict(Count)
+        self.mask = Mask([array.size] * self.layers)
         if machine:
-            for variable, at in zip((self.row, self.col), np.moveaxis(self.layout.pixel, -1, 0), strict=True):
-                variable.data = machine.put(at[..., None].astype(np.int32))
+            self.mask = self._mask(np.ones((self.layers, array.size), bool))
+        self.row, self.col = self.plural(), self.plural()
+        if machine:
+            pixel = self.layout.pixel
+            self.mask = self._mask((pixel < np.array(shape)).all(-1))
+            self.row.data, self.col.data = (machine.put(pixel[..., [axis]].astype(np.int32)) for axis in (0, 1))
 
-    def _put(self, values: NDArray[Any]) -> Array:
+    def put(self, values: NDArray[Any]) -> Array:
+        """Return a table of the ACU, from which it broadcasts, on the machine."""
         return self.machine.put(values) if self.machine else values
 
-    def register(self, dtype: str = "int32", shape: tuple[int, ...] | None = None) -> Plural:
-        """Return a plural for the result of an expression, 0 at first."""
-        return Plural(self, self._put(np.zeros(shape or (self.layers, self.array.size, 1), dtype)))
+    def _mask(self, active: NDArray[np.bool_]) -> Mask:
+        return Mask(active.sum(1).tolist(), self.put(active.astype(np.uint8)), active)
 
-    def plural(self, dtype: str = "int32", size: int = 1, layers: bool = True) -> Plural:
-        """Return a plural variable of ``size`` words in the memory of every PE, 0 at first.
+    def expression(self, dtype: str = "int32", shape: tuple[int, ...] | None = None) -> Plural:
+        """Return a plural without values, for the result of an expression."""
+        shape = shape or (self.layers, self.array.size, 1)
+        if not self.machine:
+            return Plural(self, np.broadcast_to(np.zeros(1, dtype), shape))
+        return Plural(self, instructions.register(self.machine, shape, np.dtype(dtype)))
 
-        It has values for every virtual layer, or without ``layers`` one for each PE. Raises ValueError if the memory of
-        a PE does not suffice.
-        """
-        need = np.dtype(dtype).itemsize * size * (self.layers if layers else 1)
-        if self.used + need > self.memory:
+    def reserve(self, size: int) -> None:
+        """Take bytes of every PE's memory; raise ValueError if it does not suffice."""
+        if not self.fits(size):
             raise ValueError(
-                f"the program needs {self.used + need} bytes of each PE for {self.layers} pixels, and a PE has "
-                f"{self.memory}; give a larger array, or more memory"
+                f"the program needs {self.used + size} bytes of each PE, which holds {self.layers} pixels, and a PE "
+                f"has {self.memory}; give a larger array, a smaller picture or order, or more memory"
             )
-        self.used += need
-        shape = (self.layers, self.array.size, size) if layers else (self.array.size, size)
-        return self.register(dtype, shape)
+        self.used += size
+
+    def fits(self, size: int) -> bool:
+        """Return whether ``size`` more bytes fit the memory of a PE."""
+        return self.used + size <= self.memory
+
+    def plural(self, dtype: str = "int32", size: int = 1) -> Plural:
+        """Return a plural variable of ``size`` words in the memory of every PE, 0 at first."""
+        self.reserve(np.dtype(dtype).itemsize * size * self.layers)
+        shape = (self.layers, self.array.size, size)
+        return Plural(self, self.machine.put(np.zeros(shape, dtype))) if self.machine else self.expression(dtype, shape)
 
     @contextmanager
     def frame(self) -> Iterator[None]:
@@ -204,71 +175,66 @@ class MP1:
         finally:
             self.used = used
 
-    def fits(self, size: int) -> bool:
-        """Return whether ``size`` more bytes fit the memory of a PE."""
-        return self.used + size <= self.memory
+    @contextmanager
+    def section(self, name: str) -> Iterator[None]:
+        """Count the instructions inside as those of a section of the program."""
+        outer, self._section = self._section, name
+        try:
+            yield
+        finally:
+            self._section = outer
 
     @contextmanager
     def where(self, condition: Plural | Mask) -> Iterator[Mask]:
-        """Let only those active PEs execute whose ``condition`` is not 0, or a mask of a previous ``where``."""
+        """Let only those active PEs execute whose ``condition`` is not 0, or those of a previous mask."""
         outer = self.mask
         if isinstance(condition, Mask):
             self.mask = condition
         elif self.machine:
-            held = self.machine.get((condition != 0).data)[..., 0] > 0
-            active = held & outer.active
-            self.mask = Mask(self.machine.put(active.astype(np.uint8)), active)
-            self.count("integer")
+            self.mask = self._mask((self.machine.get(condition.data)[..., condition.word] != 0) & outer.active)
         try:
             yield self.mask
         finally:
             self.mask = outer
 
-    def count(self, kind: str, number: int = 1, layer: int | None = None) -> None:
-        """Count instructions of a kind, in one layer or in all."""
+    def count(self, kind: str, number: int | list[int] = 1, layer: int | None = None) -> None:
+        """Count a number of instructions of a kind in a layer, or in each of all layers."""
         counts = self.mask.counts if layer is None else [self.mask.counts[layer]]
-        self.counts[kind].add(number * len(counts), number * sum(counts))
+        numbers = number if isinstance(number, list) else [number] * len(counts)
+        total = self.counts[self._section, kind]
+        total.instructions += sum(numbers)
+        total.active += sum(map(mul, numbers, counts))
 
     def execute(self, operation: Operation[..., Any], *args: Any) -> Any:
         """Run an instruction on the device, if there is one, under the current mask."""
         return operation(self.machine, self.layout, self.mask.plane, *args) if self.machine else None
 
-    def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float | None = None) -> Plural:
+    def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float = 0) -> Plural:
         """Set a plural to an operation of the arithmetic unit, and return it."""
-        kind = "float" if a.data.dtype.kind == "f" else "integer"
-        self.count(kind, a.data.dtype.itemsize // 4)
-        single = not isinstance(b, Plural)
-        if single and operation not in ("copy", "bit", "lowest"):
-            self.count("broadcast")
-        other, number = (None, b or 0) if not isinstance(b, Plural) else ((b.data, b.word), 0)
+        self.count("float" if a.data.dtype.kind == "f" else "integer", a.data.dtype.itemsize // 4)
+        if isinstance(b, Plural):
+            other, number = (b.data, b.word), 0.0
+        else:
+            other, number = None, b
+            self.count("broadcast", operation not in ("copy", "bit", "lowest"))
         self.execute(instructions.alu, operation, (to.data, to.word), (a.data, a.word), other, number)
         return to
 
     def xnet(self, plural: Plural, down: int, right: int, distance: int = 1) -> Plural:
         """Return all words of the pixel ``distance`` away in a direction: 1, 0 or -1 rows and columns.
 
-        The picture's last row and column of a padded layout are next to its first. Words move one PE at a time, if they
-        leave the PE.
+        The last row and column of the picture, padded to whole layers, are next to its first. Words move one PE at a
+        time, if they leave the PE.
         """
-        words = plural.data.shape[-1] * plural.data.dtype.itemsize // 4
-        moves = self.moves(down * distance, right * distance)
-        self.counts["x-net"].add(words * sum(moves), words * sum(n * c for n, c in zip(moves, self.mask.counts, strict=True)))
-        self.count("memory", words)
-        to = self.register(plural.data.dtype.name, plural.data.shape)
+        moves = self.array.moves(self.layout.grid, down * distance, right * distance)
+        self.count("x-net", [instructions.words(plural.data) * one for one in moves])
+        to = self.expression(plural.data.dtype.name, plural.data.shape)
         self.execute(instructions.xnet, to.data, plural.data, (down, right), distance)
         return to
 
-    def moves(self, down: int, right: int) -> list[int]:
-        """Return, for each layer, the PEs that a word passes on its way from the pixel ``down`` and ``right``."""
-        if self.array.mapping != "hierarchical":
-            return [max(abs(down), abs(right))] * self.layers
-        high, wide = (n // pes for n, pes in zip(self.padded, (self.array.rows, self.array.cols), strict=True))
-        at = [(n, m) for n in range(high) for m in range(wide)]
-        return [max(abs((n + down) // high), abs((m + right) // wide)) for n, m in at]
-
     def router(self, to: Plural, plural: Plural, row: Plural, col: Plural) -> None:
         """Set all words to those of the pixel in ``row`` and ``col`` of each PE, wherever that is."""
-        self.count("router", plural.data.shape[-1] * plural.data.dtype.itemsize // 4)
+        self.count("router", instructions.words(plural.data))
         self.execute(instructions.router, to.data, plural.data, row.data, col.data)
 
     def sum(self, plural: Plural) -> int:
@@ -281,27 +247,30 @@ class MP1:
 
     def any(self, plural: Plural) -> bool:
         """Return whether an int32 word is not 0 in any active PE, to the ACU: the global OR."""
-        return bool(self._reduced(plural != 0, False).any())
+        return self.sum(plural != 0) > 0
 
     def _reduced(self, plural: Plural, least: bool) -> NDArray[np.int64]:
         self.count("reduction")
         part = self.execute(instructions.reduction, plural.data, plural.word, least)
-        return self.machine.get(part) if self.machine else np.zeros(1, np.int64)  # type: ignore[no-any-return]
+        return np.asarray(self.machine.get(part)) if self.machine else np.zeros(1, np.int64)
 
-    def random(self, place: Plural, key: tuple[int, int, int], purpose: int, attempt: int = 0) -> Plural:
-        """Return 64 random bits of each PE, keyed by (seed, level, turn), the place of its pixel and the purpose."""
+    def random(self, place: Plural, key: Key, purpose: int) -> Plural:
+        """Return 64 random bits of each PE, keyed by ``key``, the place of its pixel and the purpose."""
         self.count("integer", PHILOX)
-        bits = self.register("uint64")
-        self.execute(instructions.random_bits, bits.data, place.data, key, purpose, attempt)
+        bits = self.expression("uint64")
+        self.execute(instructions.random_bits, bits.data, place.data, key, purpose)
         return bits
 
-    def table(self, to: Plural, entries: Sequence[Any] | NDArray[Any], index: Plural) -> None:
+    def table(self, to: Plural, entries: ArrayLike, index: Plural) -> None:
         """Set a plural to the entry ``index`` of a table, which the ACU broadcasts entry by entry."""
         held = np.asarray(entries, to.data.dtype)
         self.count("broadcast", len(held))
         self.count("integer", len(held))
-        self.execute(instructions.table, (to.data, to.word), self._put(held), index.data)
+        self.execute(instructions.table, (to.data, to.word), self.put(held), index.data)
 
-    def seconds(self) -> dict[str, float]:
-        """Return the modelled seconds of a MasPar MP-1 by kind of instruction."""
-        return {kind: count.instructions * COSTS[kind].seconds for kind, count in self.counts.items()}
+    def seconds(self) -> dict[str, dict[str, float]]:
+        """Return the modelled seconds of a MasPar MP-1 by section of the program and kind of instruction."""
+        found: dict[str, dict[str, float]] = {}
+        for (section, kind), count in self.counts.items():
+            found.setdefault(section, {})[kind] = count.instructions * COSTS[kind].seconds
+        return found
