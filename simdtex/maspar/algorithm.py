@@ -8,6 +8,7 @@ the paper's. The program has the bytes of `simdtex.synthesize` with ``preset="pa
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -57,11 +58,17 @@ class Problem(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step of the program: its level and sweep, and the PEs that relaxed sites, (layers, PEs) packed into bits."""
+    """A step of the program: its level and sweep, and a mask of the PEs that relaxed sites, packed into bits."""
 
     level: int
     sweep: int
-    active: NDArray[np.uint8]
+    packed: NDArray[np.uint8]
+    shape: tuple[int, int, int]
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """The mask, (layers, rows, cols) of PEs."""
+        return np.unpackbits(self.packed, count=prod(self.shape)).reshape(self.shape).astype(bool)
 
 
 class Program:
@@ -97,9 +104,10 @@ class Program:
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
                         mp1.count("reduction")  # which layers have a site to relax
-                    if chosen.layers:
+                    if chosen.active is not None and chosen.layers:
                         relaxation.relax(chosen, sweep)  # 6.2.2
-                        yield Step(level.number, sweep, np.packbits(chosen.active))
+                        shape = (mp1.layers, mp1.array.rows, mp1.array.cols)
+                        yield Step(level.number, sweep, np.packbits(chosen.active), shape)
 
     def _any_warm(self, walk: Walk) -> bool:
         with self.mp1.section("schedule"), self.mp1.where(walk.sites):
@@ -120,16 +128,18 @@ class Pass:
         mp1.reserve(4 * n if self.keeps else 4)
         most = STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
         held = -(-(n if self.keeps else min(n, most)) // STEPPED) * STEPPED
-        shapes = {"distances": ("float32", held), "least": ("float32",), "sum": ("uint64",), "target": ("uint64",)}
-        made = {name: mp1.expression(one[0], (mp1.array.size, *one[1:])).data for name, one in shapes.items()}
-        noise = mp1.put(level.choice.window.noise)
-        self.draw = Draw(**made, own=mp1.put(level.own), noise=noise, choice=level.choice)
+        pes, table = mp1.array.size, mp1.put(level.choice.window.noise)
+        distances = mp1.expression("float32", (pes, held))
+        least, total, target = (mp1.expression(dtype, (pes,)) for dtype in ("float32", "uint64", "uint64"))
+        words = (distances.data, least.data, total.data, target.data)
+        self.draw = Draw(*words, mp1.put(level.own), table, level.choice)
         self.blocks = [self._block(p, min(n - p, most)) for p in range(0, n, most)]
 
     def _block(self, first: int, count: int) -> Block:
         part = self.level.sample[..., first : first + count]
-        padded = np.pad(part, ((0, 0), (0, 0), (0, -count % STEPPED)))
-        return Block(self.mp1.put(padded), count, first, first if self.keeps else 0)
+        if self.mp1.machine:
+            part = np.pad(part, ((0, 0), (0, 0), (0, -count % STEPPED)))
+        return Block(self.mp1.put(part), count, first, first if self.keeps else 0)
 
     def relax(self, chosen: Mask, sweep: int) -> None:
         """Relax the chosen sites."""
@@ -163,10 +173,10 @@ class Pass:
 
     def _distances(self, layer: int, block: Block) -> None:
         """Accumulate the distances (12) of a block of candidates, and find the least one, to which weights relate."""
-        mp1, terms = self.mp1, block.count * self.level.sample[..., 0].size
+        mp1, terms = self.mp1, block.number * self.level.sample[..., 0].size
         with mp1.section("distance"):
             mp1.count("broadcast", terms, layer)
-            mp1.count("float", 4 * terms + block.count, layer)
+            mp1.count("float", 4 * terms + block.number, layer)
             mp1.execute(instructions.distance, layer, self.near.data, block, self.draw)
 
     def _weigh(self, layer: int, choose: bool) -> None:
@@ -176,9 +186,9 @@ class Pass:
             if not self.keeps:
                 self._distances(layer, block)
             with mp1.section("draw" if choose else "weights"):
-                mp1.count("float", EXP * block.count, layer)
-                mp1.count("broadcast", shares * block.count, layer)  # the legal share of each channel's kernel
-                mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.count, layer)
+                mp1.count("float", EXP * block.number, layer)
+                mp1.count("broadcast", shares * block.number, layer)  # the legal share of each channel's kernel
+                mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.number, layer)
                 mp1.execute(instructions.weigh, layer, block, self.draw, self.bits.data, self.chosen.data, choose)
 
     def _take(self, key: Key) -> None:

@@ -211,12 +211,12 @@ def keep(
 class Block(NamedTuple):
     """A block of candidates that the ACU broadcasts one after another.
 
-    ``sample`` (N, C, size) float32, their neighbourhoods; ``count`` of them are candidates; ``first``, the number of
+    ``sample`` (N, C, size) float32, their neighbourhoods; ``number`` of them are candidates; ``first``, the number of
     the first one, and ``at``, its place among the distances that a PE keeps.
     """
 
     sample: Array
-    count: int
+    number: int
     first: int
     at: int
 
@@ -244,7 +244,7 @@ def distance(
     """Set the distances of a block of candidates, equation (12), and the least one of the blocks so far."""
     neighbours, channels, size = block.sample.shape
     if machine is not None:
-        kept = (to.distances, to.distances.shape[-1], block.at, block.count, block.first, to.least)
+        kept = (to.distances, to.distances.shape[-1], block.at, block.number, block.first, to.least)
         defines = {"C": channels, "V": machine.vector}
         layout.launch(machine, "lcpdf_distance", mask, layer, near, neighbours, block.sample, size, *kept, **defines)
         return
@@ -256,7 +256,7 @@ def distance(
             e = z[:, k, c, None] - z[:, k, channels, None] * block.sample[k, c].astype(np.float64)
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
     to.distances[active, block.at : block.at + size] = d
-    least = d[:, : block.count].min(1)
+    least = d[:, : block.number].min(1)
     to.least[active] = np.minimum(to.least[active], least) if block.first else least
 
 
@@ -276,17 +276,17 @@ def weigh(
 
     The draw is a share ``bits`` of the sum, which the weights of the first block with ``choose`` replace.
     """
-    window, here = draw.choice.window, slice(block.at, block.at + block.count)
+    window, here = draw.choice.window, slice(block.at, block.at + block.number)
     if machine is not None:
         radius = window.radius if draw.choice.density else -1
-        given: tuple[Any, ...] = (draw.distances, draw.distances.shape[-1], block.at, block.count, block.first)
+        given: tuple[Any, ...] = (draw.distances, draw.distances.shape[-1], block.at, block.number, block.first)
         given += (draw.least, window.scale, draw.own, draw.own.shape[1], draw.noise, radius, window.top)
         given += (draw.sum, int(choose), bits, draw.target, chosen)
         layout.launch(machine, "lcpdf_weigh", mask, layer, *given, C=draw.own.shape[0], V=machine.vector)
         return
     active = mask[layer] > 0
     d = np.concatenate([draw.least[active][None], draw.distances[active, here].T])
-    own = draw.own[:, block.first : block.first + block.count, None]
+    own = draw.own[:, block.first : block.first + block.number, None]
     total = np.cumsum(masses(weights(d, window.scale)[1:], own, draw.choice), 0, dtype=np.uint64)
     if choose and not block.first:
         draw.target[active] = TWINS[OPERATIONS.index("share")](bits[layer, active, 0], draw.sum[active])

@@ -130,7 +130,7 @@ class MP1:
         self.row, self.col = self.plural(), self.plural()
         if machine:
             pixel = self.layout.pixel
-            self.mask = self._mask((pixel < np.array(shape)).all(-1))
+            self.mask = self._mask(np.all(pixel < np.array(shape), -1))
             self.row.data, self.col.data = (machine.put(pixel[..., [axis]].astype(np.int32)) for axis in (0, 1))
 
     def put(self, values: NDArray[Any]) -> Array:
@@ -145,7 +145,7 @@ class MP1:
         shape = shape or (self.layers, self.array.size, 1)
         if not self.machine:
             return Plural(self, np.broadcast_to(np.zeros(1, dtype), shape))
-        return Plural(self, instructions.register(self.machine, shape, np.dtype(dtype)))
+        return Plural(self, instructions.register(self.machine, shape, dtype))
 
     def reserve(self, size: int) -> None:
         """Take bytes of every PE's memory; raise ValueError if it does not suffice."""
