@@ -34,14 +34,14 @@ __kernel void maspar_lcpdf_keep(const Layout g, __global const uchar *restrict m
     }
 }
 
-// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the least of all distances so far,
-// which the first block begins; the block has `size` places for candidates, and `count` candidates.
+// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the least one of all
+// blocks, the first of which has `begin`; a block has `size` places for candidates, and `count` candidates.
 // sample (N, C, size)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
 __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restrict mask, const int layer,
                                     __global const float *restrict near, const int N,
                                     __global const float *restrict sample, const int size,
                                     __global float *restrict distance, const int pitch, const int at, const int count,
-                                    const int first, __global float *restrict least)
+                                    const int begin, __global float *restrict least)
 {
     const int pe = get_global_id(0);
     if (pe >= PES(g) || !mask[layer * PES(g) + pe])
@@ -63,7 +63,7 @@ __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restri
         for (int q = 0; q < STEP; ++q)
             STORE(sum[q], d + p + q * V);
     }
-    float found = first ? least[pe] : INFINITY;
+    float found = begin ? INFINITY : least[pe];
     for (int p = 0; p < count; ++p)
         found = fmin(found, d[p]);
     least[pe] = found;

@@ -171,20 +171,20 @@ class Pass:
             mp1.count("integer")
             mp1.execute(instructions.keep, self.near.data, number, there.data, self.heat.data)
 
-    def _distances(self, layer: int, block: Block) -> None:
+    def _distances(self, layer: int, block: Block, again: bool = False) -> None:
         """Accumulate the distances (12) of a block of candidates, and find the least one, to which weights relate."""
         mp1, terms = self.mp1, block.number * self.level.sample[..., 0].size
         with mp1.section("distance"):
             mp1.count("broadcast", terms, layer)
             mp1.count("float", 4 * terms + block.number, layer)
-            mp1.execute(instructions.distance, layer, self.near.data, block, self.draw)
+            mp1.execute(instructions.distance, layer, self.near.data, block, self.draw, not (block.first or again))
 
     def _weigh(self, layer: int, choose: bool) -> None:
         """Add up the weights (7) of all candidates or, to ``choose`` one, once more as far as the target."""
         mp1, shares = self.mp1, self.program.channels * self.level.choice.density
         for block in self.blocks:
             if not self.keeps:
-                self._distances(layer, block)
+                self._distances(layer, block, again=True)
             with mp1.section("draw" if choose else "weights"):
                 mp1.count("float", EXP * block.number, layer)
                 mp1.count("broadcast", shares * block.number, layer)  # the legal share of each channel's kernel

@@ -239,12 +239,12 @@ class Draw(NamedTuple):
 
 @Operation
 def distance(
-    machine: Launcher | None, layout: Layout, mask: Array, layer: int, near: Array, block: Block, to: Draw
+    machine: Launcher | None, layout: Layout, mask: Array, layer: int, near: Array, block: Block, to: Draw, begin: bool
 ) -> None:
-    """Set the distances of a block of candidates, equation (12), and the least one of the blocks so far."""
+    """Set the distances of a block of candidates, equation (12), and the least one since the last ``begin``."""
     neighbours, channels, size = block.sample.shape
     if machine is not None:
-        kept = (to.distances, to.distances.shape[-1], block.at, block.number, block.first, to.least)
+        kept = (to.distances, to.distances.shape[-1], block.at, block.number, int(begin), to.least)
         defines = {"C": channels, "V": machine.vector}
         layout.launch(machine, "lcpdf_distance", mask, layer, near, neighbours, block.sample, size, *kept, **defines)
         return
@@ -257,7 +257,7 @@ def distance(
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
     to.distances[active, block.at : block.at + size] = d
     least = d[:, : block.number].min(1)
-    to.least[active] = np.minimum(to.least[active], least) if block.first else least
+    to.least[active] = least if begin else np.minimum(to.least[active], least)
 
 
 @Operation

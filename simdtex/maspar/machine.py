@@ -105,7 +105,7 @@ class MP1:
         The device that executes the instructions; None: they are only counted, with every PE active.
     array : ProcessorArray
     shape : (int, int)
-        Rows and columns of the picture. PEs without a pixel are never active.
+        Rows and columns of the picture. PEs without a pixel are active only in ``where(mp1.everywhere)``.
     memory : int
         Bytes of a PE for plural variables.
 
@@ -115,6 +115,8 @@ class MP1:
         By section of the program and kind of instruction (`simdtex.maspar.costs.COSTS`).
     row, col : Plural
         The PE's pixel, int32.
+    everywhere : Mask
+        All PEs.
     """
 
     def __init__(
@@ -124,9 +126,9 @@ class MP1:
         self.layout = instructions.Layout(array, shape)
         self.layers, self.used, self._section = self.layout.layers, 0, ""
         self.counts: dict[tuple[str, str], Count] = defaultdict(Count)
-        self.mask = Mask([array.size] * self.layers)
+        self.everywhere = self.mask = Mask([array.size] * self.layers)
         if machine:
-            self.mask = self._mask(np.ones((self.layers, array.size), bool))
+            self.everywhere = self.mask = self._mask(np.ones((self.layers, array.size), bool))
         self.row, self.col = self.plural(), self.plural()
         if machine:
             pixel = self.layout.pixel

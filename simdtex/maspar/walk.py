@@ -71,7 +71,7 @@ class Walk:
         """Yield the number of each offset, and all words of a variable from there; sites without it are then masked."""
         mp1 = self.mp1
         for down, right, number in self._path:
-            with mp1.where(self.sites):
+            with mp1.where(self.sites if self.grid.torus else mp1.everywhere):  # values may pass outside the picture
                 arrived = mp1.xnet(plural, down, right, self.grid.spacing)
             if (down, right) in self._beyond:
                 with mp1.where(self._beyond[down, right]):
