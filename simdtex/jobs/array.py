@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from math import sqrt
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,14 @@ class Execution(Output):
     steps: list[Step] = field(default_factory=list)
 
 
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Any
+) -> tuple[NDArray[Any], Execution]: ...
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Any
+) -> NDArray[Any]: ...
 def synthesize(
     sample: ArrayLike,
     shape: tuple[int, int],
