@@ -85,6 +85,7 @@ def test_a_text_may_name_the_mapping(name):
         "cut-and-stack",
     ]
     assert parse_array(name + ":hierarchical").size == parse_array(name).size
+    assert parse_array("1k:hierarchical") == parse_array("maspar-mp1-1k:hierarchical")
 
 
 @pytest.mark.parametrize("text", ["4x4:round-robin", "4x4:"])

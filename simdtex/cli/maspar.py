@@ -13,11 +13,8 @@ import click
 from simdtex.cli.command import command
 from simdtex.cli.inputs import output_shape, read_material
 from simdtex.cli.job import SEEDS, progress_bar
-from simdtex.cli.options import DEVICE, QUIET, SEED, option, size_option
+from simdtex.cli.options import DEVICE, QUIET, SEED, given, option, size_option
 from simdtex.cli.places import READ, WRITE
-
-ARRAYS = ("1k", "2k", "4k", "8k", "16k")
-"""The sizes that were sold, as ``--array`` takes them."""
 
 
 @command(
@@ -32,7 +29,7 @@ ARRAYS = ("1k", "2k", "4k", "8k", "16k")
     default="16k",
     show_default=True,
     metavar="PES",
-    words=ARRAYS,
+    words=("1k", "2k", "4k", "8k", "16k"),
     help="Use the array of this many PEs, or ROWSxCOLS.",
 )
 @option(
@@ -60,10 +57,8 @@ ARRAYS = ("1k", "2k", "4k", "8k", "16k")
 )
 @option(
     "--pixel",
-    default="density",
-    show_default=True,
     words=("density", "source"),
-    help="Draw grey levels from the Parzen density, or pixels of the sample.",
+    help="Draw grey levels from the Parzen density, or pixels of the sample (source).  [density]",
 )
 @SEED
 @DEVICE
@@ -72,7 +67,6 @@ def maspar(
     sample: Path,
     output: Path,
     size: str | None,
-    array: str,
     seed: int | None,
     device: str | None,
     quiet: bool,
@@ -91,7 +85,6 @@ def maspar(
     shape: Any = output_shape(size, material.pixels[0])
     image.check_writable(output)
     seed = secrets.randbelow(SEEDS) if seed is None else seed
-    given = {"array": f"maspar-mp1-{array}" if array in ARRAYS else array, **options, "rng": seed, "device": device}
     began = time.perf_counter()
     with progress_bar(quiet) as show:
         made, run = synthesize(
@@ -100,7 +93,9 @@ def maspar(
             channel_axis=material.channel_axis,
             callback=lambda progress: show(progress.fraction, progress.doing),
             full_output=True,
-            **given,
+            rng=seed,
+            device=device,
+            **given(options),
         )
     like = material.metadata and material.metadata._replace(exif=None, geo=None)
     image.write(output, made, like)

@@ -19,6 +19,7 @@ from simdtex.options import one_of, shown
 
 MAPPINGS = ("cut-and-stack", "hierarchical")
 
+PREFIX = "maspar-mp1-"
 ARRAYS = {
     "maspar-mp1-1k": (32, 32),
     "maspar-mp1-2k": (32, 64),
@@ -126,7 +127,8 @@ def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
     Parameters
     ----------
     text : str
-        ``"ROWSxCOLS"`` or a key of `ARRAYS`, either followed by ``":cut-and-stack"`` or ``":hierarchical"`` if wanted.
+        ``"ROWSxCOLS"`` or a key of `ARRAYS`, which may be short as in ``"16k"``; either may be followed by
+        ``":cut-and-stack"`` or ``":hierarchical"``.
     mapping : str
         The mapping if the text names none.
 
@@ -135,14 +137,14 @@ def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
     ValueError
         The text names no array, or more than `LARGEST` PEs.
     """
-    found = re.fullmatch(
-        rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|({'|'.join(ARRAYS)}))(?::(.*))?", text if isinstance(text, str) else ""
-    )
+    models = "|".join(name.removeprefix(PREFIX) for name in ARRAYS)
+    form = rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|(?:{PREFIX})?({models}))(?::(.*))?"
+    found = re.fullmatch(form, text if isinstance(text, str) else "")
     if not found:
         raise ValueError(
             f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
         )
-    rows, cols = ARRAYS[found[3]] if found[3] else (int(found[1]), int(found[2]))
+    rows, cols = ARRAYS[PREFIX + found[3]] if found[3] else (int(found[1]), int(found[2]))
     if rows * cols > LARGEST:
         raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
     return ProcessorArray(rows, cols, mapping if found[4] is None else found[4])
