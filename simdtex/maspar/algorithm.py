@@ -8,6 +8,7 @@ the paper's. The program has the bytes of `simdtex.synthesize` with ``preset="pa
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import count
 from math import prod
 from typing import NamedTuple
 
@@ -97,9 +98,11 @@ class Program:
             with mp1.section("colouring"):
                 walk = Walk(mp1, level.grid, self.problem.offsets)  # 3, 4, 6.1
                 color, colors = coloring(mp1, walk, self.problem.order, seed)
-            relaxation, sweep = Pass(self, level, walk), 0
-            while self._any_warm(walk):  # 6.2
-                sweep += 1
+            relaxation = Pass(self, level, walk)
+            for sweep in count(1):
+                with mp1.section("schedule"), mp1.where(walk.sites):
+                    if not mp1.any(t > 0):  # 6.2
+                        break
                 bits = random.draw4(seed, level.number, sweep, np.arange(colors), random.SCHEDULE)[0]
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
@@ -108,10 +111,6 @@ class Program:
                         relaxation.relax(chosen, sweep)  # 6.2.2
                         shape = (mp1.layers, mp1.array.rows, mp1.array.cols)
                         yield Step(level.number, sweep, np.packbits(chosen.active), shape)
-
-    def _any_warm(self, walk: Walk) -> bool:
-        with self.mp1.section("schedule"), self.mp1.where(walk.sites):
-            return self.mp1.any(self.temperature > 0)
 
 
 class Pass:
@@ -128,18 +127,17 @@ class Pass:
         mp1.reserve(4 * n if self.keeps else 4)
         most = STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
         held = -(-(n if self.keeps else min(n, most)) // STEPPED) * STEPPED
-        pes, table = mp1.array.size, mp1.put(level.choice.window.noise)
-        distances = mp1.expression("float32", (pes, held))
-        least, total, target = (mp1.expression(dtype, (pes,)) for dtype in ("float32", "uint64", "uint64"))
-        words = (distances.data, least.data, total.data, target.data)
-        self.draw = Draw(*words, mp1.put(level.own), table, level.choice)
+        distances, least = (mp1.expression("float32", (mp1.array.size, *more)).data for more in ((held,), ()))
+        total, target = (mp1.expression("uint64", (mp1.array.size,)).data for _ in range(2))
+        own, noise = mp1.put(level.own), mp1.put(level.choice.window.noise)
+        self.draw = Draw(distances, least, total, target, self.bits.data, self.chosen.data, own, noise, level.choice)
         self.blocks = [self._block(p, min(n - p, most)) for p in range(0, n, most)]
 
-    def _block(self, first: int, count: int) -> Block:
-        part = self.level.sample[..., first : first + count]
+    def _block(self, first: int, size: int) -> Block:
+        part = self.level.sample[..., first : first + size]
         if self.mp1.machine:
-            part = np.pad(part, ((0, 0), (0, 0), (0, -count % STEPPED)))
-        return Block(self.mp1.put(part), count, first, first if self.keeps else 0)
+            part = np.pad(part, ((0, 0), (0, 0), (0, -size % STEPPED)))
+        return Block(self.mp1.put(part), size, first, first if self.keeps else 0)
 
     def relax(self, chosen: Mask, sweep: int) -> None:
         """Relax the chosen sites."""
@@ -189,7 +187,7 @@ class Pass:
                 mp1.count("float", EXP * block.number, layer)
                 mp1.count("broadcast", shares * block.number, layer)  # the legal share of each channel's kernel
                 mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.number, layer)
-                mp1.execute(instructions.weigh, layer, block, self.draw, self.bits.data, self.chosen.data, choose)
+                mp1.execute(instructions.weigh, layer, block, self.draw, choose)
 
     def _take(self, key: Key) -> None:
         """Take the chosen candidates, or a grey level around each of them."""

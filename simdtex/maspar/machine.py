@@ -209,7 +209,8 @@ class MP1:
 
     def execute(self, operation: Operation[..., Any], *args: Any) -> Any:
         """Run an instruction on the device, if there is one, under the current mask."""
-        return operation(self.machine, self.layout, self.mask.plane, *args) if self.machine else None
+        on = instructions.On(self.layout, self.mask.plane)
+        return operation(self.machine, on, *args) if self.machine else None
 
     def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float = 0) -> Plural:
         """Set a plural to an operation of the arithmetic unit, and return it."""
@@ -253,7 +254,7 @@ class MP1:
 
     def _reduced(self, plural: Plural, least: bool) -> NDArray[np.int64]:
         self.count("reduction")
-        part = self.execute(instructions.reduction, plural.data, plural.word, least)
+        part = self.execute(instructions.reduction, (plural.data, plural.word), least)
         return np.asarray(self.machine.get(part)) if self.machine else np.zeros(1, np.int64)
 
     def random(self, place: Plural, key: Key, purpose: int) -> Plural:
