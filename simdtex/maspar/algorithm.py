@@ -162,8 +162,7 @@ class Pass:
     def _gather(self) -> None:
         """Fetch the neighbours by one walk, keep them in canonical order, and add up their temperatures."""
         mp1, program = self.mp1, self.program
-        with mp1.where(self.walk.sites):
-            self.heat.set(0)
+        self.heat.set(0)
         for number, there in self.walk.neighbours(program.state):
             mp1.count("float", 1 + program.channels)
             mp1.count("integer")
