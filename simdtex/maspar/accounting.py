@@ -58,7 +58,7 @@ class Account:
 
         def counted(layers: int) -> Counter[str]:
             mp1.counts.clear()
-            relaxation.relax(Mask([1] * layers + [0] * (mp1.layers - layers)), 1)
+            relaxation.relax(Mask(np.arange(mp1.layers)[:, None] < layers), 1)
             found: Counter[str] = Counter()
             for (_, kind), count in mp1.counts.items():
                 found[kind] += count.instructions

@@ -107,7 +107,7 @@ class Program:
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
                         mp1.count("reduction")  # which layers have a site to relax
-                    if chosen.active is not None and chosen.layers:
+                    if chosen.layers:
                         relaxation.relax(chosen, sweep)  # 6.2.2
                         shape = (mp1.layers, mp1.array.rows, mp1.array.cols)
                         yield Step(level.number, sweep, np.packbits(chosen.active), shape)

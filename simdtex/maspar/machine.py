@@ -33,16 +33,12 @@ class Count:
     active: int = 0
 
 
-@dataclass
 class Mask:
-    """The PEs that are active: ``plane`` on the machine and ``active`` here, (layers, PEs), None without a machine.
+    """The PEs that are active: ``active`` (layers, PEs) here, ``plane`` on the machine, ``counts`` in each layer."""
 
-    ``counts`` are the active PEs of each layer.
-    """
-
-    counts: list[int]
-    plane: Array = None
-    active: NDArray[np.bool_] | None = None
+    def __init__(self, active: NDArray[np.bool_], plane: Array = None) -> None:
+        self.active, self.plane = active, plane
+        self.counts: list[int] = active.sum(1).tolist()
 
     @property
     def layers(self) -> list[int]:
@@ -126,9 +122,7 @@ class MP1:
         self.layout = instructions.Layout(array, shape)
         self.layers, self.used, self._section = self.layout.layers, 0, ""
         self.counts: dict[tuple[str, str], Count] = defaultdict(Count)
-        self.everywhere = self.mask = Mask([array.size] * self.layers)
-        if machine:
-            self.everywhere = self.mask = self._mask(np.ones((self.layers, array.size), bool))
+        self.everywhere = self.mask = self._mask(np.broadcast_to(True, (self.layers, array.size)))
         self.row, self.col = self.plural(), self.plural()
         if machine:
             pixel = self.layout.pixel
@@ -140,7 +134,7 @@ class MP1:
         return self.machine.put(values) if self.machine else values
 
     def _mask(self, active: NDArray[np.bool_]) -> Mask:
-        return Mask(active.sum(1).tolist(), self.put(active.astype(np.uint8)), active)
+        return Mask(active, self.machine and self.machine.put(active.astype(np.uint8)))
 
     def expression(self, dtype: str = "int32", shape: tuple[int, ...] | None = None) -> Plural:
         """Return a plural without values, for the result of an expression."""
