@@ -17,8 +17,9 @@ from simdtex.driver import check_shape, execute
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar.algorithm import Level, Problem, Program, Step
+from simdtex.maspar.algorithm import AT_ONCE, Level, Problem, Program, Step
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
+from simdtex.maspar.instructions import STEPPED
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
 from simdtex.methods.mrf.input import Input
@@ -116,7 +117,8 @@ def synthesize(
     Notes
     -----
     Cost: the multiply-adds of ``simdtex.synthesize`` with these options, and some hundred launches per step. Memory on
-    the device: 4 bytes per candidate and PE, if the PEs keep distances, and 4 (channels + 1) per neighbour and pixel.
+    the device: at most that of all PEs, 1 GiB with 16,384 PEs of 64 KiB, and 4 bytes per candidate, neighbour and
+    channel.
 
     Examples
     --------
@@ -172,9 +174,10 @@ def _run(
     """Run the program, and return the picture, channels last, and the rest of the output."""
     run = Lattices(plan, machine, seed)
     mp1 = MP1(machine, array, (plan.shape[0], plan.shape[1]), memory)
-    n, words = max(run.places(k).positions.size for k in range(run.levels)), run.sample.channels + 1
-    terms = 4 * len(run.offsets) * words
-    require(machine, array.size * (mp1.layers * (terms + 64 + 16 * words) + 4 * n) + terms * n)
+    n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
+    held = min(memory, 4 * n + mp1.layers * (8 * terms + 128)) + 4 * STEPPED * AT_ONCE
+    remedy = 'give a smaller array or sample, or memory="16K"'
+    require(machine, array.size * held + 4 * terms * n, 4 * terms * n, remedy)
     program, steps, stages = Program(mp1, problem(run)), [], []
 
     def values(of: Any) -> NDArray[Any]:
