@@ -314,8 +314,9 @@ class Output:
     virtual layers; ``shifts``, X-Net shifts of a word that bring every pixel of the finest level all its neighbours,
     for either mapping; ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site;
     ``active``, the mean number of active PEs per pass; ``utilisation``, its ratio to all PEs; ``sites``, relaxations;
-    ``moved``, words that each PE shifted; ``flop``, 32-bit operations in the distances; ``model_seconds``, the time of
-    a MasPar MP-1 by the model of `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
+    ``flop``, 32-bit operations in the distances; ``moved`` and ``routed``, words that each PE got through the X-Net and
+    the router; ``instructions`` by kind, as in `simdtex.maspar.costs`; ``model_seconds``, their time on a MasPar MP-1;
+    and ``launches``, kernels enqueued on the device.
 
     A level of ``multires`` has the mean number of ``candidates`` of a pixel, and the largest, ``most``; ``nodes``, the
     pixels of the levels above in the sample's pyramid, and ``compared``, the mean number of nodes that a pixel was

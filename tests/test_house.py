@@ -60,6 +60,14 @@ def test_every_kernel_function_is_launched_by_its_operation(stem):
         assert f'"{name}"' in operation or f'"{short}"' in operation
 
 
+def test_every_kernel_function_of_the_array_is_launched_by_an_instruction():
+    instructions = (PACKAGE / "maspar" / "instructions.py").read_text()
+    for path in (ROOT / "kernels" / "maspar").glob("*.cl"):
+        names = re.findall(r"__kernel\s+void\s+(\w+)", path.read_text())
+        assert names and all(name.startswith(f"maspar_{path.stem}") for name in names)
+        assert all(f'"{name.removeprefix("maspar_")}"' in instructions for name in names)
+
+
 def test_every_file_names_its_licence():
     sources = [*MODULES, *(ROOT / "kernels").rglob("*.cl"), *(ROOT / "kernels").rglob("*.h")]
     assert [str(p) for p in sources if "SPDX-License-Identifier: BSD-3-Clause" not in p.read_text()[:200]] == []
@@ -68,7 +76,7 @@ def test_every_file_names_its_licence():
 # The rooms of the house; imports go one way: a room may know of those after it.
 ROOMS = [
     *("__main__", "cli", "report", "bench", "__init__", "live", "experiments", "distributed", "synthesis", "jobs"),
-    *("methods", "driver", "checkpoint", "schedules", "ops", "machine", "maspar", "run", "model", "io", "options"),
+    *("methods", "driver", "checkpoint", "schedules", "maspar", "ops", "machine", "run", "model", "io", "options"),
     "random",
 ]
 

@@ -34,6 +34,7 @@ GROUPS = {
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",
         "ising": "Relax Ising spins by each schedule and compare with the exact energy.",
+        "maspar": "Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.",
     },
     "This machine": {
         "demo": "Synthesise brick, grass and gravel from pictures of scikit-image.",

@@ -288,8 +288,13 @@ class OpenCL:
         return max(1, fit // self.vector) * self.vector
 
     def kernel(self, function: str, defines: Mapping[str, int | str] = NONE) -> Any:
-        """Return a kernel, compiled once for these -D constants; its file is the first word of its name."""
-        file, options = function.partition("_")[0], " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
+        """Return a kernel, compiled once for these -D constants.
+
+        Its file is the first word of its name, or the second in the folder of the first if that is "maspar".
+        """
+        words = function.split("_")
+        file = "/".join(words[:2]) if words[0] == "maspar" else words[0]
+        options = " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = TOGETHER if file in TOGETHER and not defines else (file,)
         if (files, options) not in self._kernels:
             source = "".join(kernel_source(f"{name}.cl") for name in files)

@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The cost of a run on a processor array, and a model of the time on a MasPar MP-1.
+"""The cost of a run on a processor array, without executing it there.
 
-The figures of the full MP-1 are the published ones; the model counts the distances of equation (12) and the fetching of
-neighbourhoods only.
+The account is that of the paper's program (`simdtex.maspar.algorithm`) with the steps, the sites and the number of
+candidates of any run: one step of it is executed on an array without a machine, which only counts.
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from math import inf
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.maspar.algorithm import Level, Pass, Problem, Program
 from simdtex.maspar.array import MAPPINGS, ProcessorArray
+from simdtex.maspar.costs import COSTS
+from simdtex.maspar.machine import MP1, Mask
+from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
+from simdtex.ops.lcpdf import Choice
 
-FULL = 16384
-"""PEs of the full MP-1."""
-FLOPS = 1200e6 / FULL
-"""32-bit operations per second and PE."""
-XNET = 23e9 / FULL
-"""Bytes per second and PE to an adjacent PE."""
-WORD = 4
 FLOP = 4
 """Operations for one neighbour and channel of equation (12): x_r u - y_r u, squared, added."""
 
 
 class Account:
-    """The counts of SIMD passes and of their work.
+    """The counts of SIMD passes and of their instructions, and the modelled time of a MasPar MP-1.
 
     Parameters
     ----------
@@ -35,36 +35,44 @@ class Account:
     offsets : (n, 2) int32 array
         The neighbourhood, rows and columns of sites.
     channels : int
-    words : int
-        Words fetched from each neighbour: its channels, its temperature and, with coherence, its source.
 
     Notes
     -----
-    Per step: one pass for each virtual layer with an active site. The model's seconds are ::
-
-        passes candidates |N| channels 4 / FLOPS  +  shifts words 4 / XNET
-
-    since the time of a pass does not depend on the number of active PEs.
+    Per step, all neighbourhoods are fetched by one walk; then there is one pass for each virtual layer with an active
+    site, which takes the same time for any number of active PEs. The PEs keep all distances. The account leaves out
+    the start and the schedule.
     """
 
-    def __init__(self, array: ProcessorArray, offsets: NDArray[np.int32], channels: int, words: int) -> None:
-        self.array, self._offsets, self._words = array, offsets, words
-        self._flop_each = FLOP * len(offsets) * channels
-        keys = ("steps", "passes", "sites", "moved", "flop", "model_seconds")
-        self.total: dict[str, Any] = dict.fromkeys(keys, 0)
+    def __init__(self, array: ProcessorArray, offsets: NDArray[np.int32], channels: int) -> None:
+        self.array, self._offsets, self._channels = array, offsets, channels
+        self.total: dict[str, Any] = dict.fromkeys(("steps", "passes", "sites", "flop", *COSTS), 0)
 
-    def begin(self, grid: Grid, candidates: int) -> None:
-        """Start a level with its lattice and the number of candidates of a relaxation."""
-        self._grid, self._shifts = grid, self.array.shifts(grid, self._offsets)
-        self._flop = self._flop_each * candidates
+    def begin(self, grid: Grid, candidates: int, choice: Choice) -> None:
+        """Start a level with its lattice, the number of candidates of a relaxation, and the choice among them."""
+        self._grid, self._flop = grid, FLOP * len(self._offsets) * self._channels * candidates
+        mp1 = MP1(None, self.array, (grid.height, grid.width), inf)
+        any_value = np.broadcast_to(np.float32(0), (len(self._offsets), self._channels, candidates))
+        level = Level(0, grid, choice, any_value[0, 0], any_value[0], any_value)
+        program = Program(mp1, Problem(np.zeros((1 + self._channels, 1), np.int32), self._offsets, 1, -1, 0))
+        relaxation = Pass(program, level, Walk(mp1, grid, self._offsets))
+
+        def counted(layers: int) -> Counter[str]:
+            mp1.counts.clear()
+            relaxation.relax(Mask(np.arange(mp1.layers)[:, None] < layers), 1)
+            found: Counter[str] = Counter()
+            for (_, kind), count in mp1.counts.items():
+                found[kind] += count.instructions
+            return found
+
+        self._step = counted(0)
+        self._pass = counted(1) - self._step
 
     def step(self, sites: NDArray[np.int32]) -> None:
         """Count the sites of one step."""
-        passes = np.unique(self.array.place(sites, self._grid)[0])
-        moved = int(self._shifts[passes].sum()) * self._words
-        seconds = passes.size * self._flop / FLOPS + WORD * moved / XNET
-        counts = {"steps": 1, "passes": passes.size, "sites": sites.size, "moved": moved}
-        for key, more in (counts | {"flop": sites.size * self._flop, "model_seconds": seconds}).items():
+        passes = np.unique(self.array.place(sites, self._grid)[0]).size
+        counts = {"steps": 1, "passes": passes, "sites": sites.size, "flop": sites.size * self._flop}
+        counts |= {kind: self._step[kind] + passes * self._pass[kind] for kind in COSTS}
+        for key, more in counts.items():
             self.total[key] += more
 
     def report(self) -> dict[str, Any]:
@@ -76,8 +84,11 @@ class Account:
             "array": f"{self.array.rows}x{self.array.cols}",
             "mapping": self.array.mapping,
             "layers": rows * cols,
-            "shifts": {name: int(array.shifts(self._grid, self._offsets).sum()) for name, array in arrays.items()},
+            "shifts": {name: array.shifts(self._grid, self._offsets) for name, array in arrays.items()},
             "active": active,
             "utilisation": active / self.array.size,
-            **self.total,
+            **{key: self.total[key] for key in ("steps", "passes", "sites", "flop")},
+            **{"moved": self.total["x-net"], "routed": self.total["router"]},
+            "instructions": {kind: self.total[kind] for kind in COSTS},
+            "model_seconds": sum(self.total[kind] * cost.seconds for kind, cost in COSTS.items()),
         }

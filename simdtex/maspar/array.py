@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from simdtex.options import one_of, shown
 
 MAPPINGS = ("cut-and-stack", "hierarchical")
 
+PREFIX = "maspar-mp1-"
 ARRAYS = {
     "maspar-mp1-1k": (32, 32),
     "maspar-mp1-2k": (32, 64),
@@ -27,6 +28,9 @@ ARRAYS = {
     "maspar-mp1-16k": (128, 128),
 }
 """Rows and columns of the models of the MP-1."""
+
+DIRECTIONS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
+"""The directions of the X-Net, (rows, columns)."""
 
 LARGEST = 2**22
 """PEs of the largest array."""
@@ -77,39 +81,44 @@ class ProcessorArray:
             layer, pe = np.divmod(at, pes)
         return layer, pe
 
-    def shifts(self, grid: Grid, offsets: NDArray[np.int32]) -> NDArray[np.int64]:
-        """Return the X-Net shifts that bring each PE one word from every neighbour of its site, per layer (layers,).
+    def moves(self, grid: Grid, down: int, right: int) -> list[int]:
+        """Return, for each layer, the X-Net shifts that bring each PE a word from ``down`` and ``right`` pixels away.
 
-        A shift moves one word of every PE to one of the 8 adjacent PEs, around the edges of the array. A neighbour that
-        is d rows and e columns of PEs away takes ``max(|d|, |e|)`` of them; if PEs of a layer need different ways for
-        the same neighbour, for example at the seam of a picture that does not fill the array, all go each way in turn.
-        Neighbours on the same PE take none. The sites are those of the grid: on a coarser level neighbours are farther
-        apart.
+        A shift moves one word of every PE to one of the 8 adjacent PEs, around the edges of the array. Words that stay
+        on their PE take none.
         """
-        pairs = offsets.tolist()
-        down = self._ways(grid, grid.height, self.rows, {i for i, _ in pairs})
-        across = self._ways(grid, grid.width, self.cols, {j for _, j in pairs})
+        if self.mapping != "hierarchical":
+            return [max(abs(down), abs(right))] * prod(self.layers(grid))
+        (high, wide) = self.layers(grid)
+        return [max(abs((n + down) // high), abs((m + right) // wide)) for n in range(high) for m in range(wide)]
 
-        @cache
-        def total(rows: int, cols: int) -> int:
-            return sum(max(u, v) for i, j in pairs for u in down[rows][i] for v in across[cols][j])
+    def shifts(self, grid: Grid, offsets: NDArray[np.int32]) -> int:
+        """Return the X-Net shifts that bring the sites of all layers one word from every neighbour, along a `path`."""
+        s = grid.spacing
+        return sum(sum(self.moves(grid, down * s, right * s)) for down, right, _ in path(offsets))
 
-        rows, cols = ([ways.index(each) for each in ways] for ways in (down, across))  # most layers are equal
-        return np.array([total(row, col) for row in rows for col in cols], np.int64)
 
-    def _ways(self, grid: Grid, length: int, pes: int, offsets: set[int]) -> list[dict[int, tuple[int, ...]]]:
-        """Return for each layer along an axis: offset -> distances to the neighbours' PEs, one for each way."""
-        count = -(-length // grid.spacing)
-        site = np.arange(count, dtype=np.int64)
-        layer, pe = self._axis(site * grid.spacing, length, pes)
-        found: list[dict[int, set[int]]] = [{d: set() for d in offsets} for _ in range(-(-length // pes))]
-        for d in offsets:
-            there = np.full(count, True) if grid.torus else (site + d >= 0) & (site + d < count)
-            way = self._axis((site + d) % count * grid.spacing, length, pes)[1] - pe
-            way = (way + pes // 2) % pes - pes // 2  # the shorter way around
-            for number, one in set(zip(layer[there].tolist(), way[there].tolist(), strict=True)):
-                found[number][d].add(one)
-        return [{d: tuple(sorted(map(abs, ways))) for d, ways in each.items()} for each in found]
+def path(offsets: NDArray[np.int32]) -> list[tuple[int, int, int | None]]:
+    """Return moves of one site (rows, columns) that lead from (0, 0) through all offsets, and each offset's number.
+
+    The path goes to the offset with the fewest free ones around it. Where it is enclosed, it goes to the nearest offset
+    by way of others, whose numbers are then None. Order 8 takes 24 moves, and order 18 takes 60.
+    """
+    free = {(i, j): number for number, (i, j) in enumerate(offsets.tolist())}
+    at, moves = (0, 0), []
+
+    def around(i: int, j: int) -> list[tuple[int, int]]:
+        return [(i + di, j + dj) for di, dj in DIRECTIONS if (i + di, j + dj) in free]
+
+    while free:
+        there = min(around(*at), key=lambda o: (len(around(*o)), -(o[0] ** 2) - o[1] ** 2, o), default=None)
+        if there is None:
+            there = min(free, key=lambda o: (max(abs(o[0] - at[0]), abs(o[1] - at[1])), o))
+        while at != there:
+            step = tuple(int(np.sign(b - a)) for a, b in zip(at, there, strict=True))
+            at = (at[0] + step[0], at[1] + step[1])
+            moves.append((step[0], step[1], free.pop(there) if at == there else None))
+    return moves
 
 
 def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
@@ -118,7 +127,8 @@ def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
     Parameters
     ----------
     text : str
-        ``"ROWSxCOLS"`` or a key of `ARRAYS`, either followed by ``":cut-and-stack"`` or ``":hierarchical"`` if wanted.
+        ``"ROWSxCOLS"`` or a key of `ARRAYS`, which may be short as in ``"16k"``; either may be followed by
+        ``":cut-and-stack"`` or ``":hierarchical"``.
     mapping : str
         The mapping if the text names none.
 
@@ -127,14 +137,14 @@ def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
     ValueError
         The text names no array, or more than `LARGEST` PEs.
     """
-    found = re.fullmatch(
-        rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|({'|'.join(ARRAYS)}))(?::(.*))?", text if isinstance(text, str) else ""
-    )
+    models = "|".join(name.removeprefix(PREFIX) for name in ARRAYS)
+    form = rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|(?:{PREFIX})?({models}))(?::(.*))?"
+    found = re.fullmatch(form, text if isinstance(text, str) else "")
     if not found:
         raise ValueError(
             f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
         )
-    rows, cols = ARRAYS[found[3]] if found[3] else (int(found[1]), int(found[2]))
+    rows, cols = ARRAYS[PREFIX + found[3]] if found[3] else (int(found[1]), int(found[2]))
     if rows * cols > LARGEST:
         raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
     return ProcessorArray(rows, cols, mapping if found[4] is None else found[4])

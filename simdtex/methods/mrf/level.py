@@ -158,9 +158,6 @@ class Lattices:
         else:
             listed = sample.candidates(machine, places, self.planes)
             proposal = Listed(listed, square_of(machine, sample, places), len(offsets), options.chance_at(number))
-        dimensions = sample.channels * (len(offsets) + 1)
-        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, count, dimensions)  # (8)
-        draws = options.relaxation == "gibbs" or coarsest
         freedom = min(1.0, WHOLE / count, (count / SMALL) ** 2)
         novelty = options.novelty * freedom if coarsest and proposal.slots <= KEPT else 0.0
         relaxation = Relaxation(
@@ -170,7 +167,7 @@ class Lattices:
             discount=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * sample.variance),
             costs=Costs(None, self._phased(number, proposal.candidates), None, self._kinds(proposal.candidates)),
-            choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),  # 6.2.2.2
+            choice=self.choice(number),  # 6.2.2.2
             xi=min(-1, round(options.xi * 1024)),  # 6.2.2.3 the temperature, equation (13)
             seed=self.seed,
             level=number,
@@ -178,6 +175,14 @@ class Lattices:
         )
         setting = Setting(machine, grid, offsets, options.order, self.seed, number)
         return Level(setting, self.plan.schedule, relaxation, options.balance * self.usual, self.fair_use(number))
+
+    def choice(self, number: int) -> Choice:
+        """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
+        options, sample, count = self.options, self.sample, self.places(number).positions.size
+        dimensions = sample.channels * (len(self.offsets) + 1)
+        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, count, dimensions)
+        draws = options.relaxation == "gibbs" or number == self.levels - 1
+        return Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top))
 
     def _on(self, level: Level, grid: Grid) -> Level:
         """Return the level with the parts that depend on the window, for a lattice or a window of it."""

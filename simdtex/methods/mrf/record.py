@@ -41,8 +41,7 @@ class Record:
         self.reports: list[dict[str, Any]] = []
         self.account: Account | None = None
         if options.array:
-            words = run.sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
-            self.account = Account(parse_array(options.array), run.offsets, run.sample.channels, words)
+            self.account = Account(parse_array(options.array), run.offsets, run.sample.channels)
         self.launches = run.machine.launches
         self._run, self._callback = run, callback
         self._expected = expected_work(run)
@@ -143,7 +142,7 @@ class Record:
         work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
         self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
         if self.account:
-            self.account.begin(grid, self._slots)
+            self.account.begin(grid, self._slots, self._run.choice(level.number))
 
     def save(self) -> dict[str, Any]:
         """Return everything received so far, as plain arrays and numbers."""
@@ -163,7 +162,8 @@ class Record:
         self._skipped, self._weighed = self._run.machine.spared - saved["skipped"], -saved["weighed"]
         self._began = time.perf_counter() - saved["seconds"]
         if self.account and self.reports:
-            self.account.begin(self._run.grid(self.reports[-1]["level"]), self._slots)
+            number = self.reports[-1]["level"]
+            self.account.begin(self._run.grid(number), self._slots, self._run.choice(number))
             self.account.total.update(saved["account"])
 
 

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Step 6.2.2 of Algorithm 1 on the array, for one virtual layer: the ACU broadcasts the sample candidate by candidate, and
+// the PEs of a layer accumulate distances (12), weights (7) and the draw. A launch takes a block of `count` candidates.
+//
+// near     (layers, PEs, N, C + 1)  of each neighbour the weighted values x_r u of the channels, and u = 1 - t_r
+// distance (PEs, pitch)             of the candidates that a PE keeps; `at` is the place of the block's first one
+// own      (C, n)                   values of the candidates themselves, `first` that of the block's first one
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/vector.h"
+#include "common/distance.h"
+#include "common/parzen.h"
+#include "common/philox.h"
+#include "maspar/layout.h"
+
+#define STEP 4 // vectors of candidates in registers together
+
+// Keeps what has arrived from neighbour n, and adds its temperature to `heat`.
+__kernel void maspar_lcpdf_keep(const Layout g, __global const uchar *restrict mask, __global float *restrict near,
+                                const int N, const int n, __global const int *restrict arrived,
+                                __global int *restrict heat)
+{
+    const int pe = get_global_id(0);
+    if (pe >= PES(g))
+        return;
+    for (int k = pe; k < LAYERS(g) * PES(g); k += PES(g)) {
+        if (!mask[k])
+            continue;
+        __global float *z = near + ((size_t)k * N + n) * (C + 1);
+        const int t = arrived[k * (C + 1) + C];
+        z[C] = (float)(1024 - t) * 0x1p-10f;
+        for (int c = 0; c < C; ++c)
+            z[c] = (float)arrived[k * (C + 1) + c] * z[C];
+        heat[k] += t;
+    }
+}
+
+// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the least one of all
+// blocks, the first of which has `begin`; a block has `size` places for candidates, and `count` candidates.
+// sample (N, C, size)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
+__kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restrict mask, const int layer,
+                                    __global const float *restrict near, const int N,
+                                    __global const float *restrict sample, const int size,
+                                    __global float *restrict distance, const int pitch, const int at, const int count,
+                                    const int begin, __global float *restrict least)
+{
+    const int pe = get_global_id(0);
+    if (pe >= PES(g) || !mask[layer * PES(g) + pe])
+        return;
+    __global const float *z = near + (size_t)(layer * PES(g) + pe) * N * (C + 1);
+    __global float *d = distance + (size_t)pe * pitch + at;
+    for (int p = 0; p < size; p += STEP * V) {
+        vec sum[STEP];
+        for (int q = 0; q < STEP; ++q)
+            sum[q] = 0.0f;
+        for (int k = 0; k < N; ++k)
+            for (int c = 0; c < C; ++c)
+#pragma unroll
+                for (int q = 0; q < STEP; ++q) {
+                    const vec e = GAP(LOAD(sample + (k * C + c) * size + p + q * V), (vec)z[k * (C + 1) + C],
+                                      (vec)z[k * (C + 1) + c]);
+                    sum[q] = fma(e, e, sum[q]);
+                }
+        for (int q = 0; q < STEP; ++q)
+            STORE(sum[q], d + p + q * V);
+    }
+    float found = begin ? INFINITY : least[pe];
+    for (int p = 0; p < count; ++p)
+        found = fmin(found, d[p]);
+    least[pe] = found;
+}
+
+// The weights of equation (7), and their sum over the blocks so far. With `choose`, that sum is drawn a target from by the
+// random `bits` before the first block, and the first candidate at which the weights exceed it is `chosen`.
+__kernel void maspar_lcpdf_weigh(const Layout g, __global const uchar *restrict mask, const int layer,
+                                 __global const float *restrict distance, const int pitch, const int at,
+                                 const int count, const int first, __global const float *restrict least,
+                                 const float scale, __global const float *restrict own, const int n,
+                                 __global const uint *restrict noise, const int radius, const int top,
+                                 __global ulong *restrict sum, const int choose, __global const ulong *restrict bits,
+                                 __global ulong *restrict target, __global int *restrict chosen)
+{
+    const int pe = get_global_id(0), k = layer * PES(g) + pe;
+    if (pe >= PES(g) || !mask[k])
+        return;
+    if (choose && !first) {
+        target[pe] = mul_hi(bits[k], sum[pe]);
+        chosen[k] = -1;
+    }
+    ulong total = first ? sum[pe] : 0;
+    int taken = choose ? chosen[k] : -1;
+    for (int p = 0; p < count && taken < 0; ++p) {
+        const float d = distance[(size_t)pe * pitch + at + p];
+        if (WEIGHS(d, least[pe], scale))
+            total += mass_of(d, least[pe], scale, own, n, first + p, noise, radius, top);
+        taken = choose && total > target[pe] ? first + p : -1;
+    }
+    sum[pe] = total;
+    if (choose)
+        chosen[k] = taken;
+}
+
+// A grey level drawn from the kernel of equation (7) around that of the chosen candidate; word c is channel c.
+__kernel void maspar_lcpdf_step(const Layout g, __global const uchar *restrict mask, __global int *restrict x,
+                                const int size, const int c, __global const uint *restrict noise, const int radius,
+                                const int top, __global const int *restrict place, const ulong seed, const uint level,
+                                const uint turn)
+{
+    const int pe = get_global_id(0);
+    if (pe >= PES(g))
+        return;
+    for (int k = pe; k < LAYERS(g) * PES(g); k += PES(g))
+        if (mask[k]) {
+            const uint bits = draw4(seed, level, turn, (ulong)place[k], PURPOSE_DRAW, 1 + c).x;
+            x[k * size + c] += step_from(noise, radius, x[k * size + c], top, bits);
+        }
+}

@@ -1,0 +1,129 @@
+"""Algorithm 1 on the processor array: the bytes of the engine, its steps, and the account of the same run."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+
+import simdtex
+from simdtex import maspar
+from simdtex.maspar.array import MAPPINGS
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.schedules.schedule import neighbours_in
+
+CASES = {
+    "of the array's size": ((12, 16), "12x16", {"order": 4}),
+    "smaller": ((11, 9), "16x16", {"order": 8, "levels": 2}),
+    "larger, sides no multiple": ((11, 13), "4x5", {"order": 2, "levels": 3}),
+    "larger, whole layers": ((12, 16), "4x8", {"order": 2, "boundary": "open"}),
+    "open, smaller": ((9, 10), "16x12", {"order": 4, "boundary": "open", "pixel": "source"}),
+    "colour": ((7, 12), "4x4", {"order": 2, "channels": 3}),
+    "colours of the sample": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", "xi": -0.5}),
+    "real numbers": ((8, 7), "8x4", {"order": 2, "dtype": np.float32, "bandwidth": 0.3}),
+    "one pixel": ((1, 1), "2x2", {"order": 1}),
+}
+
+
+def both(shape, array, device, mapping="cut-and-stack", channels=None, dtype=np.uint8, size=(14, 13), **options):
+    """Image and output of the array, and of the engine with the same array to account for."""
+    sample = texture(size, channels, dtype)
+    given = {"channel_axis": channels and -1, "rng": 3, "device": device, "full_output": True}
+    memory = {"memory": options.pop("memory", "64K")}
+    ours = maspar.synthesize(sample, shape, array=array, mapping=mapping, **memory, **given, **options)
+    theirs = simdtex.synthesize(sample, shape, array=f"{array}:{mapping}", preset="paper", **given, **options)
+    return *ours, *theirs
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize("name", CASES)
+def test_the_program_has_the_bytes_of_the_engine(name, mapping):
+    shape, array, options = CASES[name]
+    image, output, wanted, engine = both(shape, array, REFERENCE, mapping, **options)
+    assert_same_bits(image, wanted)
+    assert_same_bits(output.source, engine.source)
+    assert not output.temperature.any()
+    assert len(output.steps) == sum(level["steps"] for level in engine.statistics["levels"])
+    for one, other in zip(output.stages, engine.stages, strict=True):
+        assert_same_bits(one.image, other.image)
+
+
+@pytest.mark.parametrize("name", ["larger, sides no multiple", "colour", "colours of the sample"])
+def test_the_program_has_the_same_bytes_on_devices(machine, name):
+    shape, array, options = CASES[name]
+    image, _, wanted, _ = both(shape, array, machine, "hierarchical", **options)
+    assert_same_bits(image, wanted)
+
+
+def test_less_memory_computes_distances_three_times(machine):
+    """The distances of 4096 candidates take 16 KiB alone."""
+    given = {"order": 2, "levels": 1, "size": (66, 66), "shape": (6, 7), "array": "4x4", "device": machine}
+    image, output, wanted, _ = both(**given)
+    again, more, _, _ = both(**given, memory="16K")
+    assert_same_bits(image, wanted)
+    assert_same_bits(again, wanted)
+    counts = [one.counts["distance"]["float"].instructions for one in (output, more)]
+    assert counts[1] == 3 * counts[0]
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize("name", ["smaller", "larger, sides no multiple", "larger, whole layers", "colour"])
+def test_the_account_is_that_of_the_execution(name, mapping):
+    shape, array, options = CASES[name]
+    _, output, _, engine = both(shape, array, REFERENCE, mapping, **options)
+    told, counted, seconds = engine.statistics["accounting"], Counter(), 0.0
+    for section in ("neighbourhood", "distance", "weights", "draw", "cooling"):
+        counted.update({kind: count.instructions for kind, count in output.counts[section].items()})
+        seconds += sum(output.seconds[section].values())
+    assert {kind: n for kind, n in told["instructions"].items() if n} == {kind: n for kind, n in counted.items() if n}
+    assert told["model_seconds"] == pytest.approx(seconds, rel=1e-12)
+    assert told["moved"] == counted["x-net"] and told["routed"] == counted["router"]
+    each = 4 * len(neighbourhood_offsets(options["order"])) * options.get("channels", 1)  # and 1 for the least
+    assert output.counts["distance"]["float"].active * each == told["flop"] * (each + 1)
+    assert told["passes"] == sum(bool(layer.any()) for step in output.steps for layer in step.active)
+
+
+def test_the_steps_show_which_elements_relax():
+    _, output, _, engine = both((11, 13), "4x5", REFERENCE, order=2, levels=2)
+    active = [step.active for step in output.steps]
+    assert active[0].shape == (9, 4, 5)
+    assert sum(one.sum() for one in active) == sum(level["relaxations"] for level in engine.statistics["levels"])
+    grid = Grid(11, 13)
+    padded = np.array([one.reshape(3, 3, 4, 5).swapaxes(1, 2).reshape(12, 15)[:11, :13] for one in active])
+    for step, one in zip(output.steps, padded, strict=True):
+        grid = Grid(11, 13, 2**step.level)
+        sites = np.flatnonzero(one).astype(np.int32)
+        assert neighbours_in(grid, neighbourhood_offsets(2), sites) is None
+
+
+def test_progress_is_told_step_by_step():
+    told = []
+    options = {"array": "8x8", "order": 2, "levels": 2, "rng": 1, "device": REFERENCE}
+    maspar.synthesize(
+        texture((14, 13)), (8, 8), callback=lambda p: told.append((p.fraction, p.image().shape)), **options
+    )
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions) and 0 < fractions[0] < 0.5 < fractions[-1] <= 1
+    assert [shape for _, shape in told][:: len(told) - 1] == [(4, 4), (8, 8)]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"coherence": 1.0}, "does not execute coherence=1.0; leave it out, or use simdtex.synthesize"),
+        ({"relaxation": "icm", "pixel": "source"}, "does not execute relaxation='icm'"),
+        ({"schedule": "raster"}, "does not execute schedule='raster'"),
+        ({"memory": "32K"}, "unknown memory '32K'; choose one of: 16K, 64K"),
+        ({"mapping": "round"}, "choose one of: cut-and-stack, hierarchical"),
+        ({"array": "0x4"}, "give rows x columns such as 128x128"),
+        ({"array": "4096x4096"}, "is beyond 4194304; give a smaller one"),
+        ({"array": "1x1", "memory": "16K"}, r"needs \d+ bytes of each PE, which holds 1600 pixels, and a PE has 16384"),
+    ],
+)
+def test_what_the_program_cannot_do_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        maspar.synthesize(texture((14, 13)), (40, 40), order=2, rng=1, device=REFERENCE, **options)
+    with pytest.raises(ValueError, match="takes one sample without unknown pixels"):
+        maspar.synthesize([texture((14, 13))] * 2, (8, 8), device=REFERENCE)
+    with pytest.raises(AttributeError, match="no attribute 'synthesise'"):
+        maspar.synthesise  # noqa: B018
