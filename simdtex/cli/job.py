@@ -41,7 +41,7 @@ class Task(NamedTuple):
     ``make`` is a public function with its own arguments, which returns what it made and a `simdtex.run.Output`.
     ``summary`` says what is made of what, and ``names`` are the files that are written, in words. ``outputs`` are
     functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the same.
-    ``limits`` are black and white in the pictures of stages, ``more(made, statistics)`` prints further lines after the
+    ``limits`` are black and white in the pictures of stages, ``more(made, output)`` prints further lines after the
     summary, and ``report(folder, made, output)`` writes the page of ``--report``.
     """
 
@@ -50,7 +50,7 @@ class Task(NamedTuple):
     names: str
     outputs: list[Callable[[Any, Any], object]]
     limits: tuple[float, float] = (0.0, 1.0)
-    more: Callable[[Any, dict[str, Any]], None] | None = None
+    more: Callable[[Any, Any], None] | None = None
     report: Callable[[Path, Any, Any], object] | None = None
 
 
@@ -109,7 +109,7 @@ def job(
                 drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
                 click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
                 if task.more:
-                    task.more(made, statistics)
+                    task.more(made, output)
             if profile:
                 from simdtex.report.terminal import print_profile
 

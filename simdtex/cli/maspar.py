@@ -3,26 +3,25 @@
 
 from __future__ import annotations
 
-import secrets
-import time
 from pathlib import Path
 from typing import Any
 
 import click
 
-from simdtex.cli.command import command
-from simdtex.cli.inputs import output_shape, read_material
-from simdtex.cli.job import SEEDS, progress_bar
-from simdtex.cli.options import DEVICE, QUIET, SEED, given, option, size_option
+from simdtex.cli.inputs import channels, output_shape, read_material
+from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.options import SEED, given, option, output_option, report_option, size_option
 from simdtex.cli.places import READ, WRITE
 
 
-@command(
+@job(
     ("maspar gravel.png -o more.png --order 8 --size 64x64", "Make a small texture as in 1998; it takes seconds."),
     ("maspar gravel.png -o more.png --array 4k --mapping hierarchical", "Use a smaller array, with blocks on each PE."),
+    ("maspar gravel.png -o more.png --order 8 --size 64 --report page", "See the PEs at work, for several schedules."),
+    of=None,
 )
 @click.argument("sample", type=READ)
-@option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@output_option("Write this picture.", WRITE)
 @size_option("twice the sample")
 @option(
     "--array",
@@ -60,18 +59,16 @@ from simdtex.cli.places import READ, WRITE
     words=("density", "source"),
     help="Draw grey levels from the Parzen density, or pixels of the sample (source).  [density]",
 )
+@option(
+    "--film",
+    default="coloring,checkerboard,synchronous,raster",
+    show_default=True,
+    metavar="A,B,...",
+    help="Show the PEs that these schedules activate, with --report.",
+)
+@report_option("the seconds of 1998, the PEs at work, and a film of schedules")
 @SEED
-@DEVICE
-@QUIET
-def maspar(
-    sample: Path,
-    output: Path,
-    size: str | None,
-    seed: int | None,
-    device: str | None,
-    quiet: bool,
-    **options: Any,
-) -> None:
+def maspar(sample: Path, output: Path, size: str | None, film: str, **options: Any) -> Task:
     """Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.
 
     The output has the bytes of `simdtex synth --preset paper`. 64x64 pixels with order 8 take seconds, and 128x128 with
@@ -79,28 +76,28 @@ def maspar(
     """
     from simdtex.io import image
     from simdtex.jobs.array import synthesize
-    from simdtex.report.terminal import print_sections
+    from simdtex.report.array import section_table, write_array
+    from simdtex.report.tables import print_table
+    from simdtex.schedules import get
 
+    names = [get(name.strip()).name for name in film.split(",")]
     material = read_material([sample])
     shape: Any = output_shape(size, material.pixels[0])
-    image.check_writable(output)
-    seed = secrets.randbelow(SEEDS) if seed is None else seed
-    began = time.perf_counter()
-    with progress_bar(quiet) as show:
-        made, run = synthesize(
-            material.array,
-            shape,
-            channel_axis=material.channel_axis,
-            callback=lambda progress: show(progress.fraction, progress.doing),
-            full_output=True,
-            rng=seed,
-            device=device,
-            **given(options),
-        )
+    image.check_writable(output, material.pixels[0].dtype, channels(material.pixels[0]))
     like = material.metadata and material.metadata._replace(exif=None, geo=None)
-    image.write(output, made, like)
-    if not quiet:
-        height, width = material.sizes[0]
-        seconds = f"in {time.perf_counter() - began:.1f} s on {run.statistics['device']}, seed {seed}"
-        click.echo(f"{output}: {shape[1]}x{shape[0]} from {width}x{height} {seconds}")
-        print_sections(run.statistics["array"], run.seconds)
+
+    def make(checkpoint: None, **call: Any) -> Any:
+        return synthesize(material.array, shape, channel_axis=material.channel_axis, **given(options), **call)
+
+    def report(folder: Path, made: Any, run: Any) -> None:
+        write_array(folder, material.pixels[0], made, run, names, command_line())
+
+    height, width = material.sizes[0]
+    return Task(
+        make,
+        f"{shape[1]}x{shape[0]} from {width}x{height}",
+        str(output),
+        [lambda made, run: image.write(output, made, like)],
+        more=lambda made, run: print_table(section_table(run)),
+        report=report,
+    )

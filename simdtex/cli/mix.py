@@ -58,7 +58,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
         str(output),
         [lambda made, run: image.write(output, made, metadata)],
         material.limits,
-        lambda made, statistics: click.echo(last_iteration(statistics)),
+        lambda made, output: click.echo(last_iteration(output.statistics)),
     )
 
 
@@ -133,5 +133,5 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | No
         ", ".join(str(path) for path in (*outputs, picture) if path),
         writers,
         material.limits,
-        lambda made, statistics: click.echo(last_iteration(statistics)),
+        lambda made, output: click.echo(last_iteration(output.statistics)),
     )

@@ -85,7 +85,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
-    def more(made: Any, statistics: dict[str, Any]) -> None:
+    def more(made: Any, output: Any) -> None:
+        statistics = output.statistics
         if method == "multires":
             counts = " ".join(f"{level['candidates']:.3g}" for level in statistics["levels"][1:])
             click.echo(f"candidates per level, coarse to fine: {counts}")

@@ -32,18 +32,20 @@ PAGE, RESULTS = "index.html", "results.json"
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A picture of a report: a plot, or (rows, cols[, channels]) uint8; ``file`` is its name beside the page.
+    """A picture of a report: a plot, (rows, cols[, channels]) uint8, or a PNG; ``file`` is its name beside the page.
 
     The first sentence of the caption describes the picture to readers who do not see it.
     """
 
     file: str
-    picture: Plot | NDArray[np.uint8]
+    picture: Plot | NDArray[np.uint8] | bytes
     caption: str
 
     @cached_property
     def png(self) -> bytes:
         """The picture as a PNG."""
+        if isinstance(self.picture, bytes):
+            return self.picture
         return figure_png(self.picture) if isinstance(self.picture, Plot) else encoded(self.picture)
 
     @property

@@ -58,24 +58,6 @@ def print_accounting(accounting: dict[str, Any]) -> None:
     print_table(Table(caption, [{"What": what, "How much": much} for what, much in rows.items()]))
 
 
-def print_sections(array: str, seconds: dict[str, dict[str, float]]) -> None:
-    """Print the modelled seconds of an execution on an array, by section of the program and kind of instruction."""
-    kinds = sorted({kind for section in seconds.values() for kind in section})
-    rows = []
-    for name, each in (seconds | {"all": _summed(seconds)}).items():
-        times = {kind: seconds_text(each[kind]) if each.get(kind) else "" for kind in kinds}
-        together = sum(each.values())
-        rows.append(
-            {"section": name, **times, "together": (duration_text if together >= 60 else seconds_text)(together)}
-        )
-    print_table(Table(f"A MasPar MP-1 of {array} PEs, by the model", rows))
-
-
-def _summed(seconds: dict[str, dict[str, float]]) -> dict[str, float]:
-    kinds = {kind for section in seconds.values() for kind in section}
-    return {kind: sum(section.get(kind, 0.0) for section in seconds.values()) for kind in kinds}
-
-
 def print_benchmark(results: dict[str, Any]) -> None:
     """Print the results of `simdtex.bench.run.run`."""
     host = results["host"]
