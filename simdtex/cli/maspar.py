@@ -71,8 +71,8 @@ from simdtex.cli.places import READ, WRITE
 def maspar(sample: Path, output: Path, size: str | None, film: str, **options: Any) -> Task:
     """Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.
 
-    The output has the bytes of `simdtex synth --preset paper`. 64x64 pixels with order 8 take seconds, and 128x128 with
-    order 18 a minute or two.
+    The output has the bytes of `simdtex synth --preset paper`. From a sample of 128x128, 64x64 pixels with order 8 take
+    seconds, and 128x128 with order 18 a minute or two.
     """
     from simdtex.io import image
     from simdtex.jobs.array import synthesize

@@ -28,7 +28,7 @@ from simdtex.schedules.schedule import Masked, Setting
 Steps = Iterator[NDArray[np.bool_]]
 """The sites that relax together, step by step, each (rows, cols)."""
 
-FRAMES, PAUSE = 90, 140
+FRAMES, PAUSE = 60, 200
 """The frames of a film, and the milliseconds between two."""
 
 SIDE, GAP = 200, 14
@@ -46,8 +46,8 @@ FILM = "PEs that relax a site now (light), and that have done so in this sweep (
 WHY = (
     "The paper relaxes sites together only if none is a neighbour of another, equation (14), because a site must see "
     "the present values of its neighbours. coloring does so in as few steps as there are colours. raster keeps the "
-    "rule too, one site a step. synchronous relaxes all sites in one step and checkerboard in two, but neighbours among "
-    "them: what they draw need not have the distribution of the model (see simdtex schedules and simdtex ising)."
+    "rule too, one site a step. synchronous relaxes all sites in one step and checkerboard in two, but neighbours "
+    "among them: what they draw need not have the distribution of the model (see simdtex schedules and simdtex ising)."
 )
 
 
