@@ -64,28 +64,37 @@ def test_a_dry_run_needs_the_memory_of_the_run(monkeypatch):
     assert f"needs about {told} MiB" in run(*words).output
 
 
-def clock(monkeypatch, *times):
-    """Let the clock of forecasts show these times, and then the last."""
-    left = list(times)
-    monkeypatch.setattr(job.time, "perf_counter", lambda: left.pop(0) if left[1:] else left[0])
+@pytest.fixture
+def clock(monkeypatch):
+    """The clock of forecasts: its only element is the time."""
+    at = [0.0]
+    monkeypatch.setattr(job.time, "perf_counter", lambda: at[0])
+    return at
 
 
-def test_the_rest_of_a_run_takes_as_long_as_its_beginning(monkeypatch):
-    clock(monkeypatch, 10.0, 12.0, 12.05, 12.5, 14.0)
-    forecast = job.Forecast()
-    assert [forecast.seconds(0.1), forecast.seconds(0.11), forecast.seconds(0.1)] == [None, None, None]
-    assert forecast.seconds(0.3) == pytest.approx(4 + 2 / 0.2 * 0.7), "two seconds for the setup, two for a fifth"
+def test_the_rest_of_a_run_takes_as_long_as_its_beginning(clock):
+    forecast, found = job.Forecast(), {}
+    for clock[0], share in [(2, 0.1), (2.05, 0.11), (9.05, 0.11), (9.25, 0.2)]:
+        found[clock[0]] = forecast.seconds(share)
+    assert list(found.values())[:3] == [None, None, None]
+    assert found[9.25] == pytest.approx(9.25 + 0.25 / 0.1 * 0.8), "in the seven seconds a kernel was compiled"
 
 
-@pytest.mark.parametrize(("last", "said"), [(0.9, False), (0.12, True)])
-def test_a_long_run_is_said_once_and_lines_follow_every_ten_seconds(monkeypatch, capsys, last, said):
-    clock(monkeypatch, 0.0, 0.0, 0.0, *[1.5] * 2, *[9.0] * 2, *[11.0] * 2, *[12.0] * 2)
+def test_of_rare_callbacks_all_time_counts(clock):
+    forecast, found = job.Forecast(), []
+    for clock[0], share in [(2, 0.0), (7, 0.25), (11, 0.4), (12, 0.5)]:
+        found.append(forecast.seconds(share))
+    assert found == [None, None, None, pytest.approx(12 + 10 / 0.5 * 0.5)]
+
+
+@pytest.mark.parametrize("whole", [50.0, 90.0])
+def test_a_long_run_is_said_once_and_lines_follow_every_ten_seconds(clock, capsys, whole):
     with job.progress_bar(quiet=False) as show:
-        for fraction in (0.1, last, last, last, last):
-            show(fraction, "level 2")
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[:-1] == ["simdtex: this is expected to last about 67.5 s"] * said
-    assert re.fullmatch(rf"{last:.0%}, level 2; about \d+\.\d (s|min) left", lines[-1])
+        for clock[0] in np.arange(0, 25, 0.25):
+            show(clock[0] / whole, "level 2")
+    said = ["simdtex: this is expected to last about 90.0 s"] * (whole > 60)
+    lines = [f"{now / whole:.0%}, level 2; about {whole - now:.1f} s left" for now in (10, 20)]
+    assert capsys.readouterr().err.splitlines() == said + lines
 
 
 def test_a_random_seed_is_short_and_printed():

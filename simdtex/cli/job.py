@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 CALIBRATION, SURE = 0.1, 1.0
 """Seconds of a run after which its duration is estimated, and is said to be long."""
 
+SMOOTH, ROUGH = 0.5, 10.0
+"""The most seconds between two callbacks without the compilation of a kernel, and how long others are disregarded."""
+
 LONG = 60.0
 """Seconds beyond which the expected duration of a run is said."""
 
@@ -134,15 +137,24 @@ class Forecast:
 
     def __init__(self) -> None:
         self.began = time.perf_counter()
-        self.first: tuple[float, float] | None = None
+        self.last: tuple[float, float] | None = None
+        self.smooth, self.all = [0.0, 0.0], [0.0, 0.0]  # seconds, and the share that was done in them
 
     def seconds(self, fraction: float, observed: float = CALIBRATION) -> float | None:
-        """Return the expected seconds from the beginning to the end; None before so many seconds are ``observed``."""
+        """Return the expected seconds from the beginning to the end; None before so many seconds are ``observed``.
+
+        The time before the first callback, and between two that are far apart, is that of compiling kernels.
+        """
         now = time.perf_counter() - self.began
-        before, share = self.first = self.first or (now, fraction)  # before it, kernels are compiled
-        if now - before < observed or fraction <= share:
-            return None
-        return now + (now - before) / (fraction - share) * (1 - fraction)
+        if self.last is not None:
+            took, done = now - self.last[0], fraction - self.last[1]
+            for sums in (self.all, self.smooth) if took <= SMOOTH else (self.all,):
+                sums[0], sums[1] = sums[0] + took, sums[1] + done
+        self.last = now, fraction
+        for (took, share), least in ((self.smooth, observed), (self.all, ROUGH)):
+            if took >= least and share > 0:
+                return now + took / share * (1 - fraction)
+        return None
 
 
 class Enough(Exception):
