@@ -17,7 +17,9 @@ from simdtex.options import table
 COMMANDS = {
     "synth": 48,
     "fill": 12,
+    "tile": 5,
     "extend": 6,
+    "maspar": 2,
     "simulate": 8,
     "estimate": 3,
     "classify": 4,
@@ -39,7 +41,7 @@ REAL = (0, -1, -0.0, "nan", "inf", "-inf", 1e308, -1e308, 1e-320, 5e-324, 2**31,
 TEXT = ("", " ", "x", "-", "--", "nan", "\u00d7", "\U0001f4a9", "a" * 5000, "\n", "%s", "{0}", "../x", "\udc80", "0")
 SIZES = (
     *("0x0", "", "x", "5", "1x1", "2x9", "100000x100000", "46341x46341", "1e3x4", "-4x4", "4x", "999999999999x1"),
-    "3x3x3",
+    *("3x3x3", "2x", "150%", "0.01x", "1e9%"),
 )
 
 MODEST = {
@@ -199,6 +201,8 @@ class Maker:
             words += ["--mask", self.file("mask")]
         if name == "extend" and "--size" not in words:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
+        if name == "maspar" and rng.random() < 0.9:
+            words += ["--array", rng.choice(("4x4", "8x8", "3x5", "16x16"))]
         if name == "ising":
             words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2"]
             words += ["--schedule", rng.choice(("coloring", "raster", "block"))]
@@ -206,7 +210,7 @@ class Maker:
             words += ["--seeds", "1", "--schedule", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes
             words += ["--json", "no/such/file.json"]
-        if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
+        if name in ("simulate", "synth", "fill", "extend", "tile", "maspar") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
         if name == "classify" and rng.random() < 0.9:
             words += ["--texture", f"a={samples[0] if rng.random() < 0.5 else self.file('picture')}"]
