@@ -272,6 +272,8 @@ class Worker:
                 path = Path(top, name)
                 there[str(path.relative_to(folder))] = path
         named = {word for arg in one.args for word in re.split(r"[=,]", arg)}
+        if "--preview" in one.args:
+            named |= {f"{Path(word).stem}-3x3.png" for word in named if word}
         failed = bool(result.code) or any(kind == "traceback" for kind, _ in result.faults)
         for name, data in one.files.items():
             path = folder / name

@@ -4,11 +4,8 @@
 from __future__ import annotations
 
 import io
-import logging
 import re
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from math import prod
 from threading import Lock
 from typing import Any, NamedTuple
@@ -19,7 +16,7 @@ import PIL.Image
 from numpy.typing import NDArray
 
 from simdtex.io import rasters
-from simdtex.io.limits import Refused, check_array, check_size, needs, read_npy
+from simdtex.io.limits import Refused, check_array, check_size, needs, quiet, read_npy
 
 Array = NDArray[Any]
 
@@ -141,19 +138,6 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
     if data.startswith(b"\x76\x2f\x31\x01"):
         return _read_exr(data, most)
     return _read_pillow(data, most, palette)
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Suppress warnings and the log of tifffile: a damaged file is reported in one sentence."""
-    logger = logging.getLogger("tifffile")
-    before, logger.disabled = logger.disabled, True
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logger.disabled = before
 
 
 def _opened(data: bytes, most: int, page: int = 0) -> PIL.Image.Image:

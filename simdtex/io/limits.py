@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import stat
+import warnings
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -144,3 +146,16 @@ def read_npz(path: PathLike, name: str, most: int) -> NDArray[Any]:
             raise ValueError("it is compressed by another method than deflate")
         with archive.open(member) as file:
             return read_npy(file, member.file_size, most)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Suppress warnings and the log of tifffile: a damaged file is reported in one sentence."""
+    logger = logging.getLogger("tifffile")
+    before, logger.disabled = logger.disabled, True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.disabled = before

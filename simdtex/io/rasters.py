@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.limits import Refused, check_array, needs
+from simdtex.io.limits import Refused, check_array, needs, quiet
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]
@@ -103,7 +103,7 @@ def is_raster(file: BinaryIO) -> bool:
 
     file.seek(0)
     try:
-        with tifffile.TiffFile(file) as tiff:
+        with quiet(), tifffile.TiffFile(file) as tiff:
             pages: Any = tiff.pages
             return any(tag in pages.first.tags for tag in _TAGS) or any(page.subfiletype & 4 for page in pages)
     except Exception:  # the reader of pictures reports the error

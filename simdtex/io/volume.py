@@ -26,10 +26,20 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target, earlier_files
-from simdtex.io.decode import decode, is_stack, native, quiet, read_stack
+from simdtex.io.decode import decode, is_stack, native, read_stack
 from simdtex.io.grids import CartesianGrid, frame
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import Refused, check_size, explained, max_pixels_or_default, needs, read_npy, read_npz, reading
+from simdtex.io.limits import (
+    Refused,
+    check_size,
+    explained,
+    max_pixels_or_default,
+    needs,
+    quiet,
+    read_npy,
+    read_npz,
+    reading,
+)
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
