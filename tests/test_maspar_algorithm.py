@@ -21,6 +21,8 @@ CASES = {
     "colour": ((7, 12), "4x4", {"order": 2, "channels": 3}),
     "colours of the sample": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", "xi": -0.5}),
     "real numbers": ((8, 7), "8x4", {"order": 2, "dtype": np.float32, "bandwidth": 0.3}),
+    "nearest": ((11, 9), "4x8", {"order": 2, "pixel": "source", "relaxation": "icm"}),
+    "nearest colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", "relaxation": "icm"}),
     "one pixel": ((1, 1), "2x2", {"order": 1}),
 }
 
@@ -48,7 +50,7 @@ def test_the_program_has_the_bytes_of_the_engine(name, mapping):
         assert_same_bits(one.image, other.image)
 
 
-@pytest.mark.parametrize("name", ["larger, sides no multiple", "colour", "colours of the sample"])
+@pytest.mark.parametrize("name", ["larger, sides no multiple", "colour", "colours of the sample", "nearest colours"])
 def test_the_program_has_the_same_bytes_on_devices(machine, name):
     shape, array, options = CASES[name]
     image, _, wanted, _ = both(shape, array, machine, "hierarchical", **options)
@@ -67,7 +69,7 @@ def test_less_memory_computes_distances_three_times(machine):
 
 
 @pytest.mark.parametrize("mapping", MAPPINGS)
-@pytest.mark.parametrize("name", ["smaller", "larger, sides no multiple", "larger, whole layers", "colour"])
+@pytest.mark.parametrize("name", ["smaller", "larger, sides no multiple", "larger, whole layers", "colour", "nearest"])
 def test_the_account_is_that_of_the_execution(name, mapping):
     shape, array, options = CASES[name]
     _, output, _, engine = both(shape, array, REFERENCE, mapping, **options)
@@ -111,7 +113,7 @@ def test_progress_is_told_step_by_step():
     ("options", "message"),
     [
         ({"coherence": 1.0}, "does not execute coherence=1.0; leave it out, or use simdtex.synthesize"),
-        ({"relaxation": "icm", "pixel": "source"}, "does not execute relaxation='icm'"),
+        ({"relaxation": "icm"}, 'takes no mode of a density; give pixel="source"'),
         ({"schedule": "raster"}, "does not execute schedule='raster'"),
         ({"memory": "32K"}, "unknown memory '32K'; choose one of: 16K, 64K"),
         ({"mapping": "round"}, "choose one of: cut-and-stack, hierarchical"),

@@ -34,14 +34,15 @@ __kernel void maspar_lcpdf_keep(const Layout g, __global const uchar *restrict m
     }
 }
 
-// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the least one of all
-// blocks, the first of which has `begin`; a block has `size` places for candidates, and `count` candidates.
+// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the `least` of all blocks and its
+// candidate, of several the first, `chosen` by ICM. A block has `size` places and `count` candidates; the first, `begin`.
 // sample (N, C, size)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
 __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restrict mask, const int layer,
                                     __global const float *restrict near, const int N,
                                     __global const float *restrict sample, const int size,
                                     __global float *restrict distance, const int pitch, const int at, const int count,
-                                    const int begin, __global float *restrict least)
+                                    const int first, const int begin, __global float *restrict least,
+                                    __global int *restrict chosen)
 {
     const int pe = get_global_id(0);
     if (pe >= PES(g) || !mask[layer * PES(g) + pe])
@@ -65,7 +66,10 @@ __kernel void maspar_lcpdf_distance(const Layout g, __global const uchar *restri
     }
     float found = begin ? INFINITY : least[pe];
     for (int p = 0; p < count; ++p)
-        found = fmin(found, d[p]);
+        if (d[p] < found) {
+            found = d[p];
+            chosen[layer * PES(g) + pe] = first + p;
+        }
     least[pe] = found;
 }
 

@@ -55,6 +55,11 @@ from simdtex.cli.places import READ, WRITE
     help="Wrap the output around, so that it tiles (torus), or not (open).",
 )
 @option(
+    "--relaxation",
+    words=("gibbs", "icm"),
+    help="Draw from the LCPDF (gibbs), or take its mode (icm); the coarsest level always draws.  [gibbs]",
+)
+@option(
     "--pixel",
     words=("density", "source"),
     help="Draw grey levels from the Parzen density, or pixels of the sample (source).  [density]",

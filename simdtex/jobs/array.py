@@ -31,7 +31,7 @@ from simdtex.run import Callback, Output, Progress, Stage
 MEMORY = {"16K": 2**14, "64K": 2**16}
 """The bytes of a PE's memory, in the two sizes that were sold."""
 
-EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "pixel")
+EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel")
 """The options that the program executes; all others have the paper's values."""
 
 
@@ -98,8 +98,8 @@ def synthesize(
     full_output : bool
         Return counts, modelled seconds and the active PEs of each step too.
     **options
-        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi`` and ``pixel`` of
-        `simdtex.methods.mrf.Options`; their defaults are the paper's.
+        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi``, ``relaxation`` and
+        ``pixel`` of `simdtex.methods.mrf.Options`; their defaults are the paper's.
 
     Returns
     -------
@@ -140,6 +140,10 @@ def synthesize(
             raise ValueError(
                 f"the program of the array does not execute {name}={value!r}; leave it out, or use simdtex.synthesize"
             )
+    if (chosen.relaxation, chosen.pixel) == ("icm", "density"):
+        raise ValueError(
+            'the program of the array takes no mode of a density; give pixel="source" or relaxation="gibbs"'
+        )
     made = mrf.plan(inputs.pictures, size, chosen)
     run = partial(_run, made, pes, MEMORY[memory])
     found = execute("maspar.synthesize", run, dict, channel_axis, rng, device, callback, full_output, None)

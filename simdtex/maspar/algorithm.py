@@ -146,13 +146,15 @@ class Pass:
         with mp1.section("neighbourhood"):
             self._gather()
         with mp1.where(chosen):
-            with mp1.section("draw"):
-                self.bits.set(mp1.random(program.place, key, random.DRAW))
+            if level.choice.draws:
+                with mp1.section("draw"):
+                    self.bits.set(mp1.random(program.place, key, random.DRAW))
             for layer in chosen.layers:
                 for block in self.blocks:  # 6.2.2.1
                     self._distances(layer, block)
-                self._weigh(layer, choose=False)
-                self._weigh(layer, choose=True)  # 6.2.2.2, the Gibbs sampler; ICM takes the mode here instead
+                if level.choice.draws:  # 6.2.2.2, the Gibbs sampler; ICM takes the nearest candidate
+                    self._weigh(layer, choose=False)
+                    self._weigh(layer, choose=True)
             with mp1.section("draw"):
                 self._take(key)
             with mp1.section("cooling"):  # 6.2.2.3
@@ -174,6 +176,8 @@ class Pass:
         with mp1.section("distance"):
             mp1.count("broadcast", terms, layer)
             mp1.count("float", 4 * terms + block.number, layer)
+            if not self.level.choice.draws:
+                mp1.count("integer", block.number, layer)  # the number of the least one
             mp1.execute(instructions.distance, layer, self.near.data, block, self.draw, not (block.first or again))
 
     def _weigh(self, layer: int, choose: bool) -> None:

@@ -239,12 +239,12 @@ class Draw(NamedTuple):
 
 @Operation
 def distance(machine: Launcher | None, on: On, layer: int, near: Array, block: Block, to: Draw, begin: bool) -> None:
-    """Set the distances of a block of candidates, equation (12), and the least one since the last ``begin``."""
+    """Set the distances (12) of a block of candidates, and ``least`` and ``chosen`` to the nearest since ``begin``."""
     neighbours, channels, size = block.sample.shape
     if machine is not None:
-        kept = (to.distances, to.distances.shape[-1], block.at, block.number, int(begin), to.least)
-        given = (layer, near, neighbours, block.sample, size, *kept)
-        on.launch(machine, "lcpdf_distance", *given, C=channels, V=machine.vector)
+        kept = (to.distances, to.distances.shape[-1], block.at, block.number, block.first)
+        given = (layer, near, neighbours, block.sample, size, *kept, int(begin))
+        on.launch(machine, "lcpdf_distance", *given, to.least, to.chosen, C=channels, V=machine.vector)
         return
     active = on.active[layer]
     z = near[layer].reshape(-1, neighbours, channels + 1)[active].astype(np.float64)
@@ -254,8 +254,10 @@ def distance(machine: Launcher | None, on: On, layer: int, near: Array, block: B
             e = z[:, k, c, None] - z[:, k, channels, None] * block.sample[k, c].astype(np.float64)
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
     to.distances[active, block.at : block.at + size] = d
-    least = d[:, : block.number].min(1)
-    to.least[active] = least if begin else np.minimum(to.least[active], least)
+    real, old = d[:, : block.number], np.float32(np.inf) if begin else to.least[active]
+    to.least[active] = np.minimum(real.min(1), old)
+    nearest = block.first + real.argmin(1)
+    to.chosen[layer, active, 0] = np.where(real.min(1) < old, nearest, to.chosen[layer, active, 0])
 
 
 @Operation
