@@ -98,8 +98,8 @@ def synthesize(
     full_output : bool
         Return counts, modelled seconds and the active PEs of each step too.
     **options
-        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi``, ``relaxation`` and
-        ``pixel`` of `simdtex.methods.mrf.Options`; their defaults are the paper's.
+        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi``, ``relaxation``
+        and ``pixel`` of `simdtex.methods.mrf.Options`; their defaults are the paper's.
 
     Returns
     -------
