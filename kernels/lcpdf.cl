@@ -173,11 +173,9 @@ __kernel void lcpdf_least(__global const float *restrict distance, __global cons
 inline ulong weight_at(ulong w, __global const float *y, const int plane, __global const ushort *x, const int S,
                        const int but, __global const float *window, const int radius)
 {
-    for (int c = 0; c < MADE; ++c) {
-        const int gap = abs((int)y[c * plane] - (int)x[c * S]);
+    for (int c = 0; c < MADE; ++c)
         if (c != but)
-            w = gap <= radius ? (ulong)((float)w * window[gap]) : 0ul;
-    }
+            w = weight_near(w, abs((int)y[c * plane] - (int)x[c * S]), window, radius);
     return w;
 }
 

@@ -26,6 +26,12 @@ inline ulong weight(const float d, const float smallest, const float scale)
     return a < NO_WEIGHT ? (ulong)(exp32(-a) * 0x1p40f) : 0ul;
 }
 
+// W_p times the kernel of equation (7) at a gap of grey levels; `window` (radius + 1,) holds exp(-k^2 / 2h^2).
+inline ulong weight_near(const ulong w, const int gap, __global const float *window, const int radius)
+{
+    return gap <= radius ? (ulong)((float)w * window[gap]) : 0ul;
+}
+
 // The kernel of equation (7) around grey level y, cut off at the legal levels 0..top: `noise` holds cumulative
 // probabilities of the steps -radius..radius, so the legal steps span noise values low .. low + mass.
 inline uint legal_low(__global const uint *noise, const int radius, const int y)

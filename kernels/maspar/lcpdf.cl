@@ -103,6 +103,51 @@ __kernel void maspar_lcpdf_weigh(const Layout g, __global const uchar *restrict 
         chosen[k] = taken;
 }
 
+// The mode of equation (7) in channel c given the grey levels x of the others, of several levels the lowest (ICM). The
+// weights of a block add up in the `mass` (PEs, greys) of grey levels; x takes the mode after the last block. With `start`, x
+// begins with the `chosen` candidate; with c = -1, that becomes the one that gives most at x.
+__kernel void maspar_lcpdf_mode(const Layout g, __global const uchar *restrict mask, const int layer,
+                                __global const float *restrict distance, const int pitch, const int at,
+                                const int count, const int first, __global const float *restrict least,
+                                const float scale, __global const float *restrict own, const int n,
+                                __global const float *restrict window, const int radius, const int greys,
+                                __global ulong *restrict mass, __global ulong *restrict sum, __global int *restrict x,
+                                const int size, const int c, const int start, __global int *restrict chosen)
+{
+    const int pe = get_global_id(0), k = layer * PES(g) + pe;
+    if (pe >= PES(g) || !mask[k])
+        return;
+    __global ulong *m = mass + (size_t)pe * greys;
+    for (int v = 0; !first && v < greys; ++v)
+        m[v] = 0;
+    for (int b = 0; start && !first && b < C; ++b)
+        x[k * size + b] = (int)own[b * n + chosen[k]];
+    ulong most = first ? sum[pe] : 0;
+    for (int p = 0; p < count; ++p) {
+        ulong w = weight(distance[(size_t)pe * pitch + at + p], least[pe], scale);
+        for (int b = 0; b < C; ++b)
+            if (b != c)
+                w = weight_near(w, abs((int)own[b * n + first + p] - x[k * size + b]), window, radius);
+        if (c >= 0)
+            m[(int)own[c * n + first + p]] += w;
+        else if (w > most) {
+            most = w;
+            chosen[k] = first + p;
+        }
+    }
+    sum[pe] = most;
+    float best = -1.0f;
+    for (int v = 0; c >= 0 && first + count == n && v < greys; ++v) {
+        float f = 0.0f;
+        for (int y = max(0, v - radius); y <= min(greys - 1, v + radius); ++y)
+            f = fma((float)m[y], window[abs(v - y)], f);
+        if (f > best) {
+            best = f;
+            x[k * size + c] = v;
+        }
+    }
+}
+
 // A grey level drawn from the kernel of equation (7) around that of the chosen candidate; word c is channel c.
 __kernel void maspar_lcpdf_step(const Layout g, __global const uchar *restrict mask, __global int *restrict x,
                                 const int size, const int c, __global const uint *restrict noise, const int radius,

@@ -140,10 +140,6 @@ def synthesize(
             raise ValueError(
                 f"the program of the array does not execute {name}={value!r}; leave it out, or use simdtex.synthesize"
             )
-    if (chosen.relaxation, chosen.pixel) == ("icm", "density"):
-        raise ValueError(
-            'the program of the array takes no mode of a density; give pixel="source" or relaxation="gibbs"'
-        )
     made = mrf.plan(inputs.pictures, size, chosen)
     run = partial(_run, made, pes, MEMORY[memory])
     found = execute("maspar.synthesize", run, dict, channel_axis, rng, device, callback, full_output, None)
@@ -178,8 +174,14 @@ def _run(
     """Run the program, and return the picture, channels last, and the rest of the output."""
     run = Lattices(plan, machine, seed)
     mp1 = MP1(machine, array, (plan.shape[0], plan.shape[1]), memory)
+    need = 8 * (run.sample.top + 1) * run.choice(0).mode
+    if not mp1.fits(need):
+        raise ValueError(
+            f"the mode of a density takes {need} bytes of each PE for {run.sample.top + 1} grey levels, and a PE has "
+            f'{memory}; give more memory, pixel="source" or relaxation="gibbs"'
+        )
     n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
-    held = min(memory, 4 * n + mp1.layers * (8 * terms + 128)) + 4 * STEPPED * AT_ONCE
+    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 128)) + 4 * STEPPED * AT_ONCE
     remedy = 'give a smaller array or sample, or memory="16K"'
     require(machine, array.size * held + 4 * terms * n, 4 * terms * n, remedy)
     program, steps, stages = Program(mp1, problem(run)), [], []

@@ -23,7 +23,7 @@ from simdtex.maspar.instructions import STEPPED, Block, Draw
 from simdtex.maspar.machine import MP1, Mask
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
-from simdtex.ops.lcpdf import Choice, Key
+from simdtex.ops.lcpdf import Choice, Key, turns
 
 AT_ONCE = 16
 """The most times `STEPPED` candidates of one launch; fewer on an array beyond the largest MP-1."""
@@ -123,14 +123,18 @@ class Pass:
         self.bits, self.chosen = mp1.plural("uint64"), mp1.plural()
         mp1.plural(size=channels + 1)  # what walks through the neighbourhoods
         mp1.reserve(4 + 8 + 8)  # the least distance, the sum of weights and the target
+        window, greys = level.choice.window, (level.choice.window.top + 1) * level.choice.mode
+        mp1.reserve(8 * greys)  # the sums of weights of each grey level
         self.keeps = mp1.fits(4 * n)  # else all distances are computed again for each use
         mp1.reserve(4 * n if self.keeps else 4)
         most = STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
         held = -(-(n if self.keeps else min(n, most)) // STEPPED) * STEPPED
         distances, least = (mp1.expression("float32", (mp1.array.size, *more)).data for more in ((held,), ()))
         total, target = (mp1.expression("uint64", (mp1.array.size,)).data for _ in range(2))
-        own, noise = mp1.put(level.own), mp1.put(level.choice.window.noise)
-        self.draw = Draw(distances, least, total, target, self.bits.data, self.chosen.data, own, noise, level.choice)
+        mass = mp1.expression("uint64", (mp1.array.size, max(1, greys))).data
+        own, noise, gauss = (mp1.put(table) for table in (level.own, window.noise, window.gauss))
+        words = (distances, least, total, target, self.bits.data, self.chosen.data)
+        self.draw = Draw(*words, own, noise, gauss, mass, level.choice)
         self.blocks = [self._block(p, min(n - p, most)) for p in range(0, n, most)]
 
     def _block(self, first: int, size: int) -> Block:
@@ -152,9 +156,11 @@ class Pass:
             for layer in chosen.layers:
                 for block in self.blocks:  # 6.2.2.1
                     self._distances(layer, block)
-                if level.choice.draws:  # 6.2.2.2, the Gibbs sampler; ICM takes the nearest candidate
+                if level.choice.draws:  # 6.2.2.2, the Gibbs sampler; ICM takes the nearest candidate, or the mode
                     self._weigh(layer, choose=False)
                     self._weigh(layer, choose=True)
+                elif level.choice.mode:
+                    self._mode(layer)
             with mp1.section("draw"):
                 self._take(key)
             with mp1.section("cooling"):  # 6.2.2.3
@@ -192,13 +198,33 @@ class Pass:
                 mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.number, layer)
                 mp1.execute(instructions.weigh, layer, block, self.draw, choose)
 
+    def _mode(self, layer: int) -> None:
+        """Move from the nearest candidates to the mode, channel by channel, and choose those that give most."""
+        mp1, channels, window = self.mp1, self.program.channels, self.level.choice.window
+        greys, width = window.top + 1, 2 * window.radius + 1
+        for turn, c in enumerate([*turns(channels), -1]):
+            others = channels - (c >= 0)
+            for block in self.blocks:
+                if not self.keeps:
+                    self._distances(layer, block, again=True)
+                with mp1.section("weights"):
+                    mp1.count("float", (EXP + 2 * others) * block.number, layer)  # converted, times the kernel
+                    mp1.count("broadcast", channels * block.number, layer)
+                    mp1.count("integer", (2 + 2 * others) * block.number, layer)
+                    mp1.execute(instructions.mode, layer, block, self.draw, self.program.state.data, c, not turn)
+            with mp1.section("draw"):
+                terms, looked = greys * width * (c >= 0), channels * self.level.own[0].size * (not turn)
+                mp1.count("broadcast", terms + looked, layer)
+                mp1.count("integer", 3 * greys * (c >= 0) + looked, layer)
+                mp1.count("float", 2 * terms + greys * (c >= 0), layer)  # smoothed, and the highest
+
     def _take(self, key: Key) -> None:
         """Take the chosen candidates, or a grey level around each of them."""
         mp1, program, choice = self.mp1, self.program, self.level.choice
         mp1.table(program.source, self.level.source, self.chosen)
-        for c in range(program.channels):
+        for c in range(0 if choice.mode else program.channels):
             mp1.table(program.state[c], self.level.own[c], self.chosen)
-            if choice.density:
+            if choice.density and choice.draws:
                 mp1.count("broadcast", len(choice.window.noise))
                 mp1.count("integer", PHILOX + len(choice.window.noise))
                 mp1.execute(instructions.step, (program.state.data, c), self.draw, program.place.data, key)

@@ -18,7 +18,7 @@ from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.maspar.array import ProcessorArray
 from simdtex.model.lattice import Grid
-from simdtex.ops.lcpdf import Choice, Key, masses, stepped, weights
+from simdtex.ops.lcpdf import Choice, Key, masses, spread, stepped, weighed, weights
 
 Word: TypeAlias = tuple[Array, int]
 
@@ -223,7 +223,7 @@ class Draw(NamedTuple):
 
     One layer after another uses ``distances`` (PEs, kept) and ``least`` float32, ``sum`` and ``target`` uint64 (PEs,);
     ``bits`` and ``chosen`` are of all layers; ``own`` (C, n) float32 are the values of the candidates themselves, and
-    ``noise`` is the table of ``choice.window``.
+    ``noise`` and ``gauss`` are the tables of ``choice.window``. ``mass`` (PEs, greys) uint64 is of one layer too.
     """
 
     distances: Array
@@ -234,7 +234,20 @@ class Draw(NamedTuple):
     chosen: Array
     own: Array
     noise: Array
+    gauss: Array
+    mass: Array
     choice: Choice
+
+    def kept(self, block: Block) -> tuple[Any, ...]:
+        """Return the arguments of kernels that weigh the candidates of a block."""
+        place = (self.distances, self.distances.shape[-1], block.at, block.number, block.first)
+        return *place, self.least, self.choice.window.scale, self.own, self.own.shape[1]
+
+    def weights(self, active: NDArray[np.bool_], block: Block) -> NDArray[np.uint64]:
+        """Return the weights (7) of a block in the active PEs, (candidates, PEs), in NumPy."""
+        here = slice(block.at, block.at + block.number)
+        d = np.concatenate([self.least[active][None], self.distances[active, here].T])
+        return weights(d, self.choice.window.scale)[1:]
 
 
 @Operation
@@ -266,18 +279,15 @@ def weigh(machine: Launcher | None, on: On, layer: int, block: Block, draw: Draw
 
     The target is a share ``draw.bits`` of the sum, which the weights of the first block with ``choose`` replace.
     """
-    window, here = draw.choice.window, slice(block.at, block.at + block.number)
     if machine is not None:
-        radius = window.radius if draw.choice.density else -1
-        given: tuple[Any, ...] = (draw.distances, draw.distances.shape[-1], block.at, block.number, block.first)
-        given += (draw.least, window.scale, draw.own, draw.own.shape[1], draw.noise, radius, window.top)
+        window = draw.choice.window
+        given: tuple[Any, ...] = (draw.noise, window.radius if draw.choice.density else -1, window.top)
         given += (draw.sum, int(choose), draw.bits, draw.target, draw.chosen)
-        on.launch(machine, "lcpdf_weigh", layer, *given, C=draw.own.shape[0], V=machine.vector)
+        on.launch(machine, "lcpdf_weigh", layer, *draw.kept(block), *given, C=draw.own.shape[0], V=machine.vector)
         return
     active = on.active[layer]
-    d = np.concatenate([draw.least[active][None], draw.distances[active, here].T])
     own = draw.own[:, block.first : block.first + block.number, None]
-    total = np.cumsum(masses(weights(d, window.scale)[1:], own, draw.choice), 0, dtype=np.uint64)
+    total = np.cumsum(masses(draw.weights(active, block), own, draw.choice), 0, dtype=np.uint64)
     if choose and not block.first:
         draw.target[active] = TWINS[-1](draw.bits[layer, active, 0], draw.sum[active])
         draw.chosen[layer, active, 0] = -1
@@ -287,6 +297,35 @@ def weigh(machine: Launcher | None, on: On, layer: int, block: Block, draw: Draw
         beyond, old = total > draw.target[active], draw.chosen[layer, active, 0]
         found = np.where(beyond.any(0), block.first + beyond.argmax(0), -1)
         draw.chosen[layer, active, 0] = np.where(old < 0, found, old)
+
+
+@Operation
+def mode(machine: Launcher | None, on: On, layer: int, block: Block, draw: Draw, x: Array, c: int, start: bool) -> None:
+    """Add the weights (7) of a block given all channels of ``x`` but ``c``; after the last block ``x`` takes the mode.
+
+    With ``start``, ``x`` begins with ``draw.chosen``; with ``c`` -1, that is set to the first that gives most at ``x``.
+    """
+    window, (channels, n) = draw.choice.window, draw.own.shape
+    if machine is not None:
+        given: tuple[Any, ...] = (draw.gauss, window.radius, window.top + 1, draw.mass, draw.sum)
+        given += (x, x.shape[-1], c, int(start), draw.chosen)
+        on.launch(machine, "lcpdf_mode", layer, *draw.kept(block), *given, C=channels, V=machine.vector)
+        return
+    active, end = on.active[layer], block.first + block.number
+    own = draw.own[:, block.first : end].astype(np.int64)
+    if start and not block.first:
+        x[layer, active, :channels] = draw.own[:, draw.chosen[layer, active, 0]].T
+    w = weighed(x[layer, active].T, draw.weights(active, block), own, window, c)
+    if c < 0:
+        most = draw.sum[active] if block.first else np.uint64(0)
+        chosen = np.where(w.max(0) > most, block.first + w.argmax(0), draw.chosen[layer, active, 0])
+        draw.chosen[layer, active, 0], draw.sum[active] = chosen, np.maximum(w.max(0), most)
+        return
+    mass = draw.mass[active].T * np.uint64(block.first > 0)
+    np.add.at(mass, own[c], w)
+    draw.mass[active] = mass.T
+    if end == n:
+        x[layer, active, c] = spread(mass, window).argmax(0)
 
 
 @Operation

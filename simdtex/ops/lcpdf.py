@@ -222,18 +222,25 @@ def to_mode(x: NDArray[np.uint16], w: NDArray[np.uint64], pixels: NDArray[np.int
     Each channel in turn, and once more, takes the mode given the others, of several levels the lowest.
     ``w`` (slots, S) are the weights, ``pixels`` (C, slots) the grey levels of the candidates.
     """
+    for c in turns(len(x)):
+        x[c] = smoothed(pixels[c], weighed(x, w, pixels, win, c), win).argmax(0)
+    return np.asarray(weighed(x, w, pixels, win, -1).argmax(0))
 
-    def weighed(but: int) -> NDArray[np.uint64]:
-        found = w
-        for c, grey in enumerate(pixels):
-            gap = abs(grey[:, None] - x[c])
-            kernel = np.where(gap <= win.radius, win.gauss[np.minimum(gap, win.radius)], np.float32(0))
-            found = found if c == but else (found.astype(np.float32) * kernel).astype(np.uint64)
-        return found
 
-    for c in [*range(len(x))] * (2 if len(x) > 1 else 1):
-        x[c] = smoothed(pixels[c], weighed(c), win).argmax(0)
-    return np.asarray(weighed(-1).argmax(0))
+def turns(channels: int) -> list[int]:
+    """Return the channels that take the mode given the others, in their order."""
+    return [*range(channels)] * (2 if channels > 1 else 1)
+
+
+def weighed(
+    x: NDArray[Any], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: Window, but: int
+) -> NDArray[np.uint64]:
+    """Return the weights times the kernel of equation (7) at ``x`` in all channels ``but`` one, see `to_mode`."""
+    for c, grey in enumerate(pixels):
+        gap = abs(grey[:, None] - x[c])
+        kernel = np.where(gap <= win.radius, win.gauss[np.minimum(gap, win.radius)], np.float32(0))
+        w = w if c == but else (w.astype(np.float32) * kernel).astype(np.uint64)
+    return w
 
 
 @Operation
@@ -272,10 +279,15 @@ def take(
 
 def smoothed(y: NDArray[np.int64], w: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
     """Return f(x) = sum over p of w_p exp(-(x - y_p)^2 / 2h^2), (greys, S), of y (slots,) and w (slots, S)."""
-    greys = np.arange(win.top + 1)
-    mass, f = (np.zeros((greys.size, w.shape[1]), dtype) for dtype in (np.uint64, np.float32))
+    mass = np.zeros((win.top + 1, w.shape[1]), np.uint64)
     np.add.at(mass, y, w)
-    for v in np.unique(y):
+    return spread(mass, win)
+
+
+def spread(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+    """Return f(x), (greys, S), of the sums of weights of each grey level, (greys, S)."""
+    greys, f = np.arange(win.top + 1), np.zeros(mass.shape, np.float32)
+    for v in np.flatnonzero(mass.any(1)):
         gap = abs(greys - v)
         reached = gap <= win.radius
         f[reached] = fma32(mass[v].astype(np.float32), win.gauss[gap[reached], None], f[reached])
