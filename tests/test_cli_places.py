@@ -19,7 +19,8 @@ TEXTS = {
     *("host", "device", "size", "method", "preset", "relaxation", "pixel", "search", "edges", "boundary", "weights"),
     *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
     *("origin", "cell", "several", "outside", "columns", "categories", "variables"),
-    *("names", "direction", "mapping", "memory", "film", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
+    *("direction", "mapping", "memory", "film"),
+    *("names", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")
 ISING_START = ("ising", "start")  # up or random
