@@ -10,7 +10,7 @@ import click
 
 from simdtex.cli.inputs import channels, output_shape, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import SEED, given, option, output_option, report_option, size_option
+from simdtex.cli.options import SEED, given, option, output_option, paper_options, report_option, size_option
 from simdtex.cli.places import READ, WRITE
 
 
@@ -45,25 +45,7 @@ from simdtex.cli.places import READ, WRITE
     words=("16K", "64K"),
     help="Give each PE this memory; where it does not hold all distances, they are computed three times.",
 )
-@option("--order", default=18, show_default=True, help="Compare neighbours within sqrt(order) pixels.")
-@option("--levels", type=int, help="Use this many levels.  [as many as sample and output allow]")
-@option(
-    "--boundary",
-    default="torus",
-    show_default=True,
-    words=("torus", "open"),
-    help="Wrap the output around, so that it tiles (torus), or not (open).",
-)
-@option(
-    "--relaxation",
-    words=("gibbs", "icm"),
-    help="Draw from the LCPDF (gibbs), or take its mode (icm); the coarsest level always draws.  [gibbs]",
-)
-@option(
-    "--pixel",
-    words=("density", "source"),
-    help="Draw grey levels from the Parzen density, or pixels of the sample (source).  [density]",
-)
+@paper_options("order", "levels", "boundary", "relaxation", "pixel")
 @option(
     "--film",
     default="coloring,checkerboard,synchronous,raster",

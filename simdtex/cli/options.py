@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -13,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
 from simdtex.cli.places import EITHER, ENTER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
-from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
+from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
 Command = Callable[..., Any]
@@ -112,6 +113,13 @@ def job_options(job: str) -> Callable[[Command], Command]:
             if job in one.shown:
                 found.setdefault(name, {})[method if len(tables) > 1 else ""] = one
     return together(*(_option(job, name, methods) for name, methods in found.items()))
+
+
+def paper_options(*names: str) -> Callable[[Command], Command]:
+    """Return a decorator that adds to a command options of the method mrf, whose defaults are the paper's."""
+    declared = table(import_module("simdtex.methods.mrf").Options)
+    paper = {name: declared[name].default if declared[name].paper is UNSET else declared[name].paper for name in names}
+    return together(*(_option("", name, {"": replace(declared[name], default=paper[name])}) for name in names))
 
 
 def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Command], Command]:
