@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes training images of sinuous channels that meet, part and now and then end.
 
-    python benchmarks/channels.py [--shape 256 256] [--seed 1 7] [--out simdtex/experiments/ensemble/channels.png]
+    python benchmarks/channels.py [--shape 256 256] [--seed 1 7] [--out simdtex/experiments/channels.png]
 
 Writes an image for each seed, side by side. All arithmetic is in whole numbers, so that no platform's library decides
 on a pixel.
@@ -248,9 +248,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--shape", type=int, nargs=2, default=(256, 256))
     parser.add_argument("--seed", type=int, nargs="+", default=(1, 7))
-    parser.add_argument(
-        "--out", type=Path, default=HERE.parent / "simdtex" / "experiments" / "ensemble" / "channels.png"
-    )
+    parser.add_argument("--out", type=Path, default=HERE.parent / "simdtex" / "experiments" / "channels.png")
     options = parser.parse_args()
     write(options.out, np.hstack([channels(tuple(options.shape), seed) for seed in options.seed]))
 

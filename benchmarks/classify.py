@@ -36,8 +36,7 @@ from mosaics import accuracy, auroc, drawn, grey, own_fit, textures
 from skimage import data
 
 import simdtex
-from simdtex.ops.potts import WEIGHTS, potts
-from simdtex.ops.window import gaussian, window
+from simdtex.ops.classes import WEIGHTS, gaussian, potts, window
 
 ASKED = (0.01, 0.05, 0.1)  # probabilities of calling a known texture unknown
 FIELDS = [(coupling, weight) for coupling in (8, 11) for weight in (2, 4, 7, 12)]  # of the baselines; they get the best

@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-from simdtex.experiments.quality.patches import as_pair, halved, in_deviations, nearest, spread
+from simdtex.experiments.quality import as_pair, halved, in_deviations, nearest, spread
 
 SIDE, APART = 32, 16
 """The side of a patch, and how far from it at least it may come back, pixels."""

@@ -34,7 +34,7 @@ from skimage import draw
 from skimage.restoration import inpaint_biharmonic
 
 import simdtex
-from simdtex.experiments.quality.patches import as_planes, in_deviations, nearest
+from simdtex.experiments.quality import as_planes, in_deviations, nearest
 
 PATCH = 7  # side of the patches, pixels
 APART = 8  # patches nearer to one another are not compared

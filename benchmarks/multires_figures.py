@@ -21,10 +21,10 @@ from simdtex.experiments.quality import seam
 from simdtex.methods.multires.algorithm import tiled
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
-from simdtex.model.colours import source_colours, temperature_colours
+from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.stretched import TOP, Stretched
-from simdtex.ops.filters import UNIT_BITS, bank, filters
-from simdtex.report.plots import DPI, FAINT, INK, figure_png, new_figure
+from simdtex.ops.pyramids import UNIT_BITS, bank, filters
+from simdtex.report.page import DPI, FAINT, INK, figure_png, new_figure
 from simdtex.report.sheet import contact_sheet
 
 ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 0.2, 0.3, 0.4, 0.6, 1, 1.5)}

@@ -24,8 +24,8 @@ from subbands import decompose
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.ops.steerable_filters import filters
-from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
+from simdtex.ops.steerable import filters
+from simdtex.report.page import FAINT, INK, figure_png, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
 
 COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")

@@ -17,7 +17,7 @@ from skimage import data
 from subbands import decompose
 
 import simdtex
-from simdtex.report.plots import figure_png, new_figure, tidy
+from simdtex.report.page import figure_png, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.solid import view
 

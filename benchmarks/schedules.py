@@ -19,7 +19,8 @@ from tables import write
 import simdtex
 from simdtex.experiments.comparison import compare
 from simdtex.report.page import Figure
-from simdtex.report.schedules import sections, tables
+from simdtex.report.schedules import comparison_tables as tables
+from simdtex.report.schedules import sections
 from simdtex.report.tables import print_table
 
 COST = {

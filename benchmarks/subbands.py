@@ -9,7 +9,7 @@ from simdtex.io.image import check_sample
 from simdtex.machine import open_machine
 from simdtex.methods.pyramid.pyramids import Transform
 from simdtex.model.stretched import Stretched
-from simdtex.ops.fold import folded
+from simdtex.ops.pyramids import folded
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ import time
 import numpy as np
 
 import simdtex
-from simdtex.experiments.ensemble import connectivity
-from simdtex.experiments.ensemble.summary import variogram
+from simdtex.experiments.ensemble import connectivity, variogram
 
 SHARE = 0.3
 

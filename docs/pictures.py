@@ -20,7 +20,7 @@ from skimage.transform import downscale_local_mean
 
 import simdtex
 from simdtex.io.image import write
-from simdtex.model.colours import source_colours, temperature_colours
+from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, magnified
 

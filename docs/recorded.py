@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from live import Fake
 
-from simdtex.io.examples import example
+from simdtex.io.image import example
 from simdtex.live.job import Picture
 
 FILE = Path(__file__).parent / "_static" / "recording.js"

@@ -18,7 +18,7 @@ from skimage import data
 
 import simdtex
 from simdtex.io.image import write
-from simdtex.model.colours import source_colours, temperature_colours
+from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, magnified
 

@@ -15,8 +15,7 @@ from skimage import data
 
 import simdtex
 from simdtex.io.image import read
-from simdtex.report.sheet import contact_sheet
-from simdtex.report.stages import StageWriter
+from simdtex.report.sheet import StageWriter, contact_sheet
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")

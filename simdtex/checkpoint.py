@@ -24,7 +24,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.atomic import Damaged, check_target, exclusive, read_checked, write_checked
+from simdtex.io.files import Damaged, check_target, exclusive, read_checked, write_checked
 from simdtex.options import real
 from simdtex.random import as_seed
 

@@ -288,11 +288,12 @@ class Output:
         its callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``, which also adds ``kernels``, see `simdtex.machine.log.Log.take`), and
+        opened with ``profile=True``, which also adds ``kernels``, see `simdtex.machine.reference.Log.take`), and
         ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates``, ``seconds``, and the entries
         of the method below. If there is a source map, ``use`` shows how evenly the sample is used, as
-        `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and ``most_used``, the most used piece of
-        the sample: ``times_fair_share``, its first pixel (``row``, ``col``) and its size (``rows``, ``cols``), pixels.
+        `simdtex.model.source_map.effective_use`: ``effective_share``, above 0, to 1, and ``most_used``, the most used
+        piece of the sample: ``times_fair_share``, its first pixel (``row``, ``col``), and its size (``rows``,
+        ``cols``) in pixels.
         ``lattice`` of ``mrf`` is None unless the sample repeats. It has the two ``vectors`` of the output's lattice,
         (row, column) in pixels, the ``deformation`` that fits the sample's lattice to the output, 0 if none, and
         ``fitting``, the rows and columns of an output that needs less deformation.

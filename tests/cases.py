@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import ignore
+from simdtex.model.given import EXCLUDED
 from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.model.soft import EXCLUDED
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered

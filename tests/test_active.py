@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simdtex.model.lattice import Grid
-from simdtex.ops import active
+from simdtex.ops import sites as sites_module
+from simdtex.ops.sites import among, stretches, survey
 
 
 @st.composite
@@ -27,7 +28,7 @@ def test_a_survey_counts_sites_and_heat(machine, case):
     grid, t = case
     here = t[:: grid.spacing, :: grid.spacing]
     expected = int((here > 0).sum()), int(here.sum())
-    assert active.survey(REFERENCE, grid, t) == active.survey(machine, grid, machine.put(t)) == expected
+    assert survey(REFERENCE, grid, t) == survey(machine, grid, machine.put(t)) == expected
 
 
 @given(case=temperatures(), groups=st.integers(1, 9), chunk=st.sampled_from([1, 3, 256]))
@@ -39,10 +40,10 @@ def test_the_active_sites_of_a_list_stay_in_order_group_by_group(machine, case, 
     starts = np.concatenate([[0], np.sort(rng.integers(0, sites.size + 1, groups - 1)), [sites.size]])
     expected = [s[t.ravel()[s] > 0] for s in np.split(sites, starts[1:-1])]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(active, "CHUNK", chunk)
-        begins, firsts = active.stretches(starts)
+        patch.setattr(sites_module, "CHUNK", chunk)
+        begins, firsts = stretches(starts)
     for m in (REFERENCE, machine):
-        kept, bounds = active.among(m, m.put(sites), m.put(begins), firsts, m.put(t))
+        kept, bounds = among(m, m.put(sites), m.put(begins), firsts, m.put(t))
         kept = np.asarray(m.get(kept))
         assert_same_bits(kept, np.concatenate(expected).astype(np.int32))
         for group, (begin, end) in zip(expected, np.stack([bounds[:-1], bounds[1:]], 1).tolist(), strict=True):

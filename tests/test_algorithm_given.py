@@ -15,7 +15,7 @@ from simdtex.jobs.inputs import check_inputs
 from simdtex.jobs.maps import check_region
 from simdtex.machine import open_machine
 from simdtex.methods import mrf
-from simdtex.model.soft import Soft
+from simdtex.model.given import Soft
 from simdtex.options import resolve
 
 SEED = 2**40 + 3

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.model.stretched import TOP, Stretched
-from simdtex.ops.filters import bank
+from simdtex.ops.pyramids import bank
 
 WARNING = "is as large as the filters"
 sides = st.integers(1, 12)

@@ -9,7 +9,7 @@ from cases import assert_same_bits
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.machine import runtimes
+from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_source
 from simdtex.ops.arithmetic import exp32, fma32, log32
 
@@ -135,7 +135,7 @@ def test_exp32_of_0_is_1_and_it_never_exceeds_1():
 def build(machine):
     """The program above on a machine, as it builds its own."""
     headers = kernel_source("common/exp.h") + kernel_source("common/log.h")
-    kernels = runtimes.build(machine.context, headers + SOURCE, [])
+    kernels = devices.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):
         out = machine.empty(arrays[0].shape, np.float32)

@@ -10,7 +10,7 @@ from simdtex.bench.run import FULL, QUICK, Case, Sizes
 from simdtex.cli import main
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.reference import Reference
-from simdtex.report.terminal import benchmark_table
+from simdtex.report.tables import benchmark_table
 
 MRF = Case("mrf", 16, 16, 2, "exact")
 TINY = Sizes((Case("multires", 16, 16), Case("pyramid", 16, 16), Case("solid", 16, 8)), (MRF,), 0.0)

@@ -15,7 +15,7 @@ import simdtex
 from simdtex import checkpoint as checkpoints
 from simdtex import schedules
 from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
-from simdtex.io.atomic import exclusive, write_checked
+from simdtex.io.files import exclusive, write_checked
 from simdtex.methods.mrf import Options
 
 GREY, COLOUR = texture((14, 15)), texture((16, 18), 3)

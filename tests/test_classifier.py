@@ -12,7 +12,7 @@ from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import LEAST, MEANS, Region, experts_of, learn, windowed
 from simdtex.model.pictures import Pictures
 from simdtex.model.scale import Scale
-from simdtex.ops.window import gaussian
+from simdtex.ops.classes import gaussian
 
 
 def stripes(shape, turned=False, seed=0):

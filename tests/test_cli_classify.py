@@ -12,9 +12,8 @@ from test_page import assert_needs_nothing_else, read_page
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image
-from simdtex.model.colours import label_colours
-from simdtex.model.labels import read_labels, write_labels
-from simdtex.report.classification import confusion_matrix
+from simdtex.model.display import label_colours, read_labels, write_labels
+from simdtex.report.synthesis import confusion_matrix
 
 LEFT, RIGHT = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
 PICTURE = np.hstack([LEFT, RIGHT])

@@ -10,8 +10,9 @@ from click.testing import CliRunner
 from PIL import Image
 
 from simdtex.cli import main
-from simdtex.experiments.estimates import Finding
-from simdtex.report.ising import _sublattice, tables
+from simdtex.experiments.ising import Finding
+from simdtex.report.schedules import _sublattice
+from simdtex.report.schedules import ising_tables as tables
 from simdtex.report.tables import print_table
 
 PICTURES = ["energy.png", "lattices.png"]

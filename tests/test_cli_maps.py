@@ -11,7 +11,7 @@ from simdtex import checkpoint as checkpoints
 from simdtex.cli import main
 from simdtex.cli.maps import Folder
 from simdtex.io import image
-from simdtex.io.atomic import NotWritten
+from simdtex.io.files import NotWritten
 from simdtex.model.source_map import apply_source_map, load_source_map
 
 OPTIONS = {"order": 2, "device": "reference"}

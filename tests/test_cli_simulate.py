@@ -11,7 +11,7 @@ from simdtex.cli import main
 from simdtex.io import image
 from simdtex.io.grids import read_grid, write_grid
 from simdtex.io.hard_data import read_hard_data
-from simdtex.model.labels import write_labels
+from simdtex.model.display import write_labels
 from simdtex.options import DataWarning
 
 xarray = pytest.importorskip("xarray")

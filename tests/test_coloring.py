@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from simdtex import random
 from simdtex.model.lattice import Grid, coloring_sublattice
-from simdtex.ops import coloring as module
-from simdtex.ops.coloring import coloring, lattice_plan
+from simdtex.ops import sites as module
+from simdtex.ops.sites import coloring, lattice_plan
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3), (4, 2)]
 SMALL = [(6, 6), (7, 7), (8, 13), (13, 8), (12, 10), (9, 15)]

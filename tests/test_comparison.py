@@ -9,7 +9,8 @@ from cases import texture
 
 from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
 from simdtex.report.page import Figure
-from simdtex.report.schedules import sections, tables
+from simdtex.report.schedules import comparison_tables as tables
+from simdtex.report.schedules import sections
 
 
 def feed(recorder, pictures, level=0, phase="free", **more):

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import pytest
 
 from simdtex.cli.machine import render
+from simdtex.machine import devices
 from simdtex.machine import devices as device
-from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError, DeviceInfo
 
 
@@ -191,15 +191,15 @@ class NoDevices(SimpleNamespace):
 def platforms(monkeypatch):
     """Set the platforms of the loader."""
     device._enumerate.cache_clear()
-    yield lambda *found: monkeypatch.setattr(runtimes, "platforms", lambda: list(found))
+    yield lambda *found: monkeypatch.setattr(devices, "platforms", lambda: list(found))
     device._enumerate.cache_clear()
 
 
 def test_a_reason_keeps_the_error_of_a_long_message():
     name = "clBuildProgram failed: BUILD_PROGRAM_FAILURE"
     message = f"{name} - {name} - {name}\n\nCompilation started\n1438:3:16: error: a parameter is missing\nfailed\n"
-    assert runtimes.one_line(ValueError(message)) == f"{name} - 1438:3:16: error: a parameter is missing"
-    assert runtimes.one_line(ValueError()) == "ValueError"
+    assert devices.one_line(ValueError(message)) == f"{name} - 1438:3:16: error: a parameter is missing"
+    assert devices.one_line(ValueError()) == "ValueError"
 
 
 def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
@@ -228,24 +228,24 @@ def test_a_device_without_properties_is_passed_over(any_device, platforms):
 
 
 def test_a_device_that_cannot_build_has_a_reason(any_device, monkeypatch):
-    monkeypatch.setattr(runtimes, "_SOURCE", "__kernel void probe(nonsense)")
-    runtimes.failure.cache_clear()
+    monkeypatch.setattr(devices, "_SOURCE", "__kernel void probe(nonsense)")
+    devices.failure.cache_clear()
     try:
         line = device.probe(any_device)
         assert not line.usable
         assert "rror" in line.reason and "\n" not in line.reason
     finally:
-        runtimes.failure.cache_clear()
+        devices.failure.cache_clear()
 
 
 def test_a_wrong_answer_is_not_usable(any_device, monkeypatch):
-    unfused = runtimes._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -")
-    monkeypatch.setattr(runtimes, "_SOURCE", unfused)
-    runtimes.failure.cache_clear()
+    unfused = devices._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -")
+    monkeypatch.setattr(devices, "_SOURCE", unfused)
+    devices.failure.cache_clear()
     try:
         assert "wrong answer" in device.probe(any_device).reason
     finally:
-        runtimes.failure.cache_clear()
+        devices.failure.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -260,9 +260,9 @@ def test_a_wrong_answer_is_not_usable(any_device, monkeypatch):
 )
 def test_a_runtime_that_crashes_or_hangs_is_a_reason(monkeypatch, code, reason):
     run = subprocess.run
-    monkeypatch.setattr(runtimes, "_SECONDS", 2.0)
-    monkeypatch.setattr(runtimes.subprocess, "run", lambda words, **how: run([words[0], "-c", code], **how))
-    (answer,) = runtimes.failures([0])
+    monkeypatch.setattr(devices, "_SECONDS", 2.0)
+    monkeypatch.setattr(devices.subprocess, "run", lambda words, **how: run([words[0], "-c", code], **how))
+    (answer,) = devices.failures([0])
     assert answer.endswith(reason) if reason else answer == ""
 
 
@@ -311,9 +311,9 @@ def intel(monkeypatch, tmp_path):
     library = tmp_path / "lib" / "libintelocl.so"
     library.parent.mkdir()
     library.touch()
-    monkeypatch.setattr(runtimes.sys, "prefix", str(tmp_path))
-    monkeypatch.setattr(runtimes.sys, "platform", "linux")
-    for name in runtimes._ICD_VARIABLES:
+    monkeypatch.setattr(devices.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(devices.sys, "platform", "linux")
+    for name in devices._ICD_VARIABLES:
         monkeypatch.delenv(name, raising=False)
     return library
 
@@ -324,8 +324,8 @@ def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
     (conda / "named.icd").write_text("libnamed.so.1\n")
     (conda / "intel-cpu.icd").write_text("/wrong/place/libintelocl.so\n")
     (conda / "text.icd").write_bytes(b"\xff\xfe\xff")
-    assert runtimes.intel_library() == intel
-    with runtimes._icd_folder():
+    assert devices.intel_library() == intel
+    with devices._icd_folder():
         folder = Path(os.environ["OCL_ICD_VENDORS"])
         lines = [icd.read_text().strip() for icd in folder.iterdir()]
         assert str(intel) in lines
@@ -337,7 +337,7 @@ def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
 
 def test_a_folder_that_the_user_has_set_is_used(intel, monkeypatch):
     monkeypatch.setenv("OCL_ICD_VENDORS", "/my/own")
-    with runtimes._icd_folder():
+    with devices._icd_folder():
         assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
 
 
@@ -375,6 +375,6 @@ def test_threads_list_the_platforms_one_after_another(intel, monkeypatch):
 
     monkeypatch.setattr(pyopencl, "get_platforms", get_platforms)
     with ThreadPoolExecutor(6) as pool:
-        assert list(pool.map(lambda _: runtimes.platforms(), range(6))) == [[]] * 6
+        assert list(pool.map(lambda _: devices.platforms(), range(6))) == [[]] * 6
     assert len(set(seen)) == 6, "each has its own folder"
     assert "OCL_ICD_VENDORS" not in os.environ

@@ -26,8 +26,8 @@ from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
 from simdtex.model.source_map import apply_source_map
-from simdtex.ops.coloring import lattice_plan
 from simdtex.ops.neighbourhood import Field
+from simdtex.ops.sites import lattice_plan
 
 zarr = pytest.importorskip("zarr")
 

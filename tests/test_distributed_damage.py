@@ -12,7 +12,7 @@ from simdtex import distributed
 from simdtex.distributed import layout
 from simdtex.distributed.store import Store
 from simdtex.distributed.tasks import context
-from simdtex.io import atomic
+from simdtex.io import files
 from simdtex.methods.mrf.tiles import Tally
 
 zarr = pytest.importorskip("zarr")
@@ -361,7 +361,7 @@ def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
     turn, work = store.turn, store.work
     assert store.done(turn, work, 0)  # which opens the arrays
     shutil.rmtree(path)
-    with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
+    with pytest.raises(files.Damaged, match=r"zarr\.json"):
         store.note(turn, 0, Tally(np.zeros(460, np.int64), 0, 0))
     assert not path.exists()
 
@@ -378,13 +378,13 @@ def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_remov
 
 def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_path, monkeypatch):
     """Flushed in the order: the file, its new folders, and only then the row of the task."""
-    flushed, real = [], atomic._sync
+    flushed, real = [], files._sync
 
     def sync(path, *flags):
         flushed.append(str(path.relative_to(tmp_path)) if path.is_dir() else "file")
         real(path, *flags)
 
-    monkeypatch.setattr(atomic, "_sync", sync)
+    monkeypatch.setattr(files, "_sync", sync)
     distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **OPTIONS)
     turns = [n for n in range(1, 99) if f"o.zarr/work/level0/{n}/values/c/0/2" in flushed]
     for folder in (f"o.zarr/work/level0/{n}/values/c" for n in turns):
@@ -412,7 +412,7 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
     shutil.copytree(stopped("sweep", 3, 2), path)
     context.cache_clear()
     with monkeypatch.context() as patch:
-        patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+        patch.setattr(files, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "
         with pytest.raises(ValueError, match=words):
             distributed.resume(path, device=REFERENCE)

@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
 from simdtex.experiments import ensemble
-from simdtex.experiments.ensemble.summary import MARGIN, variogram
+from simdtex.experiments.ensemble import MARGIN, variogram
 
 
 def noise(seed, shape=(6, 40, 50), values=2):

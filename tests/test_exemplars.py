@@ -6,7 +6,7 @@ from cases import REFERENCE, assert_same_bits, opencl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.exemplars import TOGETHER, exemplars, stacked
+from simdtex.ops.classes import TOGETHER, exemplars, stacked
 
 
 def run(machine, features, classes):

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from volumes import loaded
 
-from simdtex.io import atomic, image, realisations, volume
-from simdtex.io.atomic import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
+from simdtex.io import files, image, volume
+from simdtex.io.files import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, write_report
-from simdtex.report.stages import StageWriter
+from simdtex.report.sheet import StageWriter
 
 
 def picture(seed, dtype=np.uint8):
@@ -51,7 +51,7 @@ WRITERS = {
     },
     "slices": lambda path, seed: volume.write(path, block(seed)),
     **{
-        f"r{suffix}": lambda path, seed: realisations.write_realisations(path, many(seed))
+        f"r{suffix}": lambda path, seed: volume.write_realisations(path, many(seed))
         for suffix in (".zarr", ".nc", ".npz", ".gslib", ".sgems")
     },
     "map.npz": lambda path, seed: save_source_map(path, np.random.default_rng(seed).integers(0, 99, (40, 40, 2))),
@@ -131,7 +131,7 @@ def test_every_call_of_the_system_fails_in_turn(tmp_path, monkeypatch, name, fau
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), args[0])
         return real(*args, **kwargs)
 
-    monkeypatch.setattr(atomic.os, fault, faulty)
+    monkeypatch.setattr(files.os, fault, faulty)
     WRITERS[name](path, 1)
     once, failed = calls, 0
     for turn in range(1, min(once, 6) + 1):

@@ -7,7 +7,7 @@ from cases import REFERENCE, assert_same_bits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.features import features
+from simdtex.ops.classes import features
 
 TOP = 4080
 

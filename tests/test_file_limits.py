@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from volumes import png
 
 from simdtex.cli import main
-from simdtex.io import decode, image, limits
+from simdtex.io import decode, files, image
 from simdtex.io.grids import read_grid
 from simdtex.io.hard_data import read_hard_data
 from simdtex.model.source_map import load_source_map
@@ -109,7 +109,7 @@ def refused(reading, path, words, peak=4 * 2**20):
     assert most < peak
 
 
-TOO_LARGE = rf"(pixels|bytes|cells|frames) and no more than \d+ are read: .*, or set {limits.VARIABLE} higher"
+TOO_LARGE = rf"(pixels|bytes|cells|frames) and no more than \d+ are read: .*, or set {files.VARIABLE} higher"
 
 
 @pytest.mark.parametrize("kind", PICTURES)
@@ -138,15 +138,15 @@ def test_more_than_pillow_allows_is_read_where_it_is_asked_for(tmp_path, monkeyp
 def test_the_environment_says_how_many(tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(saved(MANY, "PNG"))
     for text, fits in (("10099", False), ("10100", True), ("", True), (" 20000 ", True)):
-        monkeypatch.setenv(limits.VARIABLE, text)
+        monkeypatch.setenv(files.VARIABLE, text)
         if fits:
             image.read(tmp_path / "a.png")
         else:
             refused(image.read, tmp_path / "a.png", TOO_LARGE)
         image.read(tmp_path / "a.png", max_pixels=10100)
     for text in ("0", "-5", "many", "1e9", "9" * 30, "1.5"):
-        monkeypatch.setenv(limits.VARIABLE, text)
-        with pytest.raises(ValueError, match=rf"^{limits.VARIABLE} is .*: set it to a number of pixels"):
+        monkeypatch.setenv(files.VARIABLE, text)
+        with pytest.raises(ValueError, match=rf"^{files.VARIABLE} is .*: set it to a number of pixels"):
             image.read(tmp_path / "a.png")
     for number, error in ((0, ValueError), (1.5, TypeError), (True, TypeError)):
         with pytest.raises(error, match="max_pixels"):
@@ -156,7 +156,7 @@ def test_the_environment_says_how_many(tmp_path, monkeypatch):
 def test_the_command_line_says_it_in_one_sentence(tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(PICTURES["PNG"])
     done = CliRunner().invoke(main, ["synth", str(tmp_path / "a.png"), "-o", str(tmp_path / "out.png")])
-    assert done.exit_code == 2 and limits.VARIABLE in done.output and len(done.output.splitlines()) == 1
+    assert done.exit_code == 2 and files.VARIABLE in done.output and len(done.output.splitlines()) == 1
 
 
 def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):

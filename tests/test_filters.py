@@ -10,7 +10,7 @@ from scipy.ndimage import correlate
 from tolerances import HALF, TAP
 
 from simdtex.model.stretched import TOP
-from simdtex.ops.filters import bank, filters
+from simdtex.ops.pyramids import bank, filters
 
 UNIT = 2**14
 BANKS = (1, 3, 4, 6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits
 
-from simdtex.ops.fold import fold, unfold
+from simdtex.ops.pyramids import fold, unfold
 
 SHAPES = [(1, 1), (1, 2), (2, 1), (3, 3), (4, 6), (5, 4), (4, 5), (7, 9), (8, 1)]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import simdtex
-from simdtex.io.examples import example
+from simdtex.io.image import example
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -9,7 +9,7 @@ from cases import REFERENCE, texture
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.methods.pyramid.histograms import Histograms, average, averaged, histograms, spliced
+from simdtex.methods.pyramid.matcher import Histograms, average, averaged, histograms, spliced
 from simdtex.methods.pyramid.pyramids import Transform
 
 sizes = st.integers(1, 9)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from volumes import noise, png
 
 from simdtex.io import image, volume
-from simdtex.io.atomic import atomic_path
+from simdtex.io.files import atomic_path
 
 ROUND_TRIPS = [
     *[(".png", dtype, c) for dtype in ("uint8", "uint16") for c in (None, 1, 2, 3, 4)],

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from simdtex import random
-from simdtex.experiments.estimates import findings
-from simdtex.experiments.ising import Chains
-from simdtex.experiments.kaufman import CRITICAL
+from simdtex.experiments.ising import CRITICAL, Chains, findings
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.schedules import Info

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simdtex.experiments import kaufman as exact
+from simdtex.experiments import ising as exact
 
 
 def by_counting(temperature, rows, cols):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.model.stretched import TOP
-from simdtex.ops.laplacian import half, laplacian_band, laplacian_collapse, laplacian_reduce, within
+from simdtex.ops.pyramids import half, laplacian_band, laplacian_collapse, laplacian_reduce, within
 
 RANGES = {"sample": (0, TOP), "bits": (0, 1), "signed": (-TOP, TOP), "small": (-3, 3)}
 sides = st.integers(1, 9)

@@ -25,12 +25,11 @@ from simdtex.experiments.ensemble import connectivity
 from simdtex.io import volume
 from simdtex.methods import mrf
 from simdtex.model.given import around, between
-from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of
+from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of, sums_around
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.model.sums import sums_around
-from simdtex.ops.coloring import coloring
 from simdtex.ops.nearest import strip_of
+from simdtex.ops.sites import coloring
 from simdtex.ops.square import square_of
 from simdtex.run import Simulating
 

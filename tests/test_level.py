@@ -11,7 +11,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, laid_out, opencl, sweeps, texture
 
 import simdtex
-from simdtex.machine import runtimes
+from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_source
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import opened, sweep
@@ -40,7 +40,7 @@ def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
         for n, name in enumerate(fields(dtype), 1)
     )
     source = f"__kernel void look({kind} v, __global int *out) {{ out[0] = sizeof v; {lines} }}"
-    kernel = runtimes.build(machine.context, kernel_source("common/level.h") + source, [])["look"]
+    kernel = devices.build(machine.context, kernel_source("common/level.h") + source, [])["look"]
     out = machine.put(np.zeros(1 + len(fields(dtype)), np.int32))
     machine.enqueue(kernel, (1,), np.zeros((), dtype)[()], out)
     told = machine.get(out).tolist()

@@ -16,7 +16,7 @@ from browsing import AXE, browser, drop, live, missing, shown, until
 from live import png, striped, texture
 
 import simdtex
-from simdtex.io.examples import example
+from simdtex.io.image import example
 from simdtex.live import script, style
 from simdtex.live.job import LABELS
 

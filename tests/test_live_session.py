@@ -23,7 +23,7 @@ from simdtex.live.levels import Levels
 from simdtex.live.results import Results
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
-from simdtex.model.labels import read_labels
+from simdtex.model.display import read_labels
 from simdtex.model.source_map import apply_source_map
 
 

@@ -16,7 +16,7 @@ import simdtex
 from simdtex.io.image import read_bytes
 from simdtex.live import widget
 from simdtex.live.server import FILES
-from simdtex.model.colours import source_colours
+from simdtex.model.display import source_colours
 from simdtex.run import Output
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from simdtex import random
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.ops.luby import IN, UNDECIDED, luby
+from simdtex.ops.sites import IN, UNDECIDED, luby
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3)]
 SMALL = [(6, 6), (7, 5), (4, 9)]

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.machine import memory, opencl, runtimes
+from simdtex.machine import devices, memory, opencl
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
@@ -67,10 +67,10 @@ def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environm
 
 def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(runtimes, "_report", None)
+    monkeypatch.setattr(devices, "_report", None)
     short = nullcontext(SimpleNamespace(write=lambda data: len(data) // 4))
-    monkeypatch.setattr(runtimes.tempfile, "TemporaryFile", lambda **_: short)
-    runtimes._prepare_caches()
+    monkeypatch.setattr(devices.tempfile, "TemporaryFile", lambda **_: short)
+    devices._prepare_caches()
     assert os.environ["XDG_CACHE_HOME"] != str(tmp_path)
 
 
@@ -130,7 +130,7 @@ except ValueError as error:
     words = python(code, "700", str(any_device.index))
     assert " ".join(words).startswith("the address space of this process is limited to 700 MiB, and OpenCL needs")
     assert "is available" in " ".join(python(code, "3000", "reference"))
-    assert memory.available() < runtimes.address_space()
+    assert memory.available() < devices.address_space()
 
 
 # Threads and forks, in processes of their own: a race may crash, and a forked process may hang
@@ -288,5 +288,5 @@ def test_another_type_of_device_is_a_type_error(wrong):
 def test_the_compilers_warnings_are_not_printed(cl_device, capfd):
     machine = OpenCL(cl_device)
     source = f"__kernel void f(__global int *a) {{ int b; a[0] = b; 7; }} // {uuid.uuid4()}"
-    runtimes.build(machine.context, source, [])
+    devices.build(machine.context, source, [])
     assert capfd.readouterr() == ("", "")

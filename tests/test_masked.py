@@ -5,7 +5,7 @@ import pytest
 from cases import texture
 
 import simdtex
-from simdtex.experiments.ensemble.arrays import as_ensemble, as_image
+from simdtex.experiments.ensemble import as_ensemble, as_image
 from simdtex.io import image, volume
 from simdtex.model.source_map import apply_source_map, save_source_map
 

@@ -18,8 +18,8 @@ from simdtex.maspar.ising import ising
 from simdtex.maspar.machine import MP1
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.ops.coloring import coloring as engine
 from simdtex.ops.lcpdf import Key
+from simdtex.ops.sites import coloring as engine
 
 TYPES = ("int32", "uint64", "float32")
 BINARY = {

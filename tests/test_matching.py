@@ -13,8 +13,7 @@ from scipy.stats import wasserstein_distance
 from skimage.exposure import match_histograms
 from tolerances import CONTRAST
 
-from simdtex.ops.matching import distance, inverse_cdf, match_lookup, match_ranks
-from simdtex.ops.sort import sort
+from simdtex.ops.matching import distance, inverse_cdf, match_lookup, match_ranks, sort
 
 MODULE = importlib.import_module("simdtex.ops.matching")
 LOW, HIGH = -(2**31), 2**31 - 1

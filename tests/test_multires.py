@@ -14,7 +14,7 @@ from tolerances import SIGNIFICANCE
 
 import simdtex
 from simdtex.methods import multires
-from simdtex.methods.multires.levels import differences, thresholds
+from simdtex.methods.multires.analysis import differences, thresholds
 from simdtex.ops.candidates import Sampled, Structure, candidates
 
 INF = math.inf

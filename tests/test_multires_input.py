@@ -181,7 +181,7 @@ def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
         seen.append((progress, progress.image(), progress.candidates()))
 
     whole, output = run(sample, (40, 30), channel_axis=axis)
-    monkeypatch.setattr("simdtex.methods.multires.levels.LAUNCH", 1)  # so that levels come in pieces
+    monkeypatch.setattr("simdtex.methods.multires.analysis.LAUNCH", 1)  # so that levels come in pieces
     image = synthesize(sample, (40, 30), channel_axis=axis, callback=look)
     assert_same_bits(image, whole)
     fractions = [progress.fraction for progress, *_ in seen]

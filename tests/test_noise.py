@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from simdtex import random
 from simdtex.machine.opencl import kernel_folder
-from simdtex.ops.noise import noise
+from simdtex.ops.pyramids import noise
 
 seeds = st.integers(0, 2**64 - 1)
 levels = st.integers(0, 30)

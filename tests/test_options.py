@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli.ending import reporting
-from simdtex.experiments import kaufman
 from simdtex.experiments.comparison import compare
+from simdtex.experiments.ising import torus_energy
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.pyramid import solid
@@ -129,12 +129,12 @@ def test_a_temperature_that_is_none_is_refused(temperature):
     with pytest.raises(ValueError, match=r"temperature.*; give "):
         ising(Reference(), (4, 4), [temperature], "coloring", sweeps=1, burn_in=0, seeds=1)
     with pytest.raises(ValueError, match=r"temperature .*; give "):
-        kaufman.torus_energy(temperature, 4, 4)
+        torus_energy(temperature, 4, 4)
 
 
 @pytest.mark.parametrize("temperature", [1e6, 1e-6, 1e-320, 5e-324])
 def test_the_ends_of_the_range_of_temperatures_work(temperature):
-    assert -2 <= kaufman.torus_energy(temperature, 4, 5) <= 0
+    assert -2 <= torus_energy(temperature, 4, 5) <= 0
     run = ising(Reference(), (4, 4), [temperature], "coloring", sweeps=2, burn_in=0, seeds=1)
     assert np.isfinite(run.energy).all()
 

@@ -11,8 +11,7 @@ import PIL.Image
 import pytest
 
 import simdtex
-from simdtex.report.page import Figure, Section, check_folder, write_report
-from simdtex.report.plots import figure_png, new_figure, tidy
+from simdtex.report.page import Figure, Section, check_folder, figure_png, new_figure, tidy, write_report
 from simdtex.report.tables import Table, duration_text, number_text, print_table
 
 

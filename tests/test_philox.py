@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from plain_numbers import philox
 
 from simdtex import random
-from simdtex.machine import runtimes
+from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_folder, kernel_source
 
 # kat_vectors of Random123 (Salmon et al., SC 2011): counter, key, answer.
@@ -133,7 +133,7 @@ def test_another_type_of_seed_is_an_error_that_says_the_types(seed):
 
 @pytest.fixture(scope="module")
 def kernels(machine):
-    return runtimes.build(machine.context, kernel_source("common/philox.h") + SOURCE, [])
+    return devices.build(machine.context, kernel_source("common/philox.h") + SOURCE, [])
 
 
 def test_known_answers_on_a_device(machine, kernels):

@@ -5,7 +5,7 @@ from cases import REFERENCE, assert_same_bits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.potts import potts
+from simdtex.ops.classes import potts
 
 
 def run(machine, sites, evidence, votes, weight, labels):

@@ -9,11 +9,9 @@ from click.testing import CliRunner
 import simdtex
 from simdtex.cli import main
 from simdtex.io.image import write
-from simdtex.machine.log import PENDING, Log
 from simdtex.machine.opencl import OpenCL
-from simdtex.machine.reference import Reference
-from simdtex.report.tables import seconds_text
-from simdtex.report.terminal import profile_summary, profile_table
+from simdtex.machine.reference import PENDING, Log, Reference
+from simdtex.report.tables import profile_summary, profile_table, seconds_text
 
 
 class Event:

@@ -11,7 +11,7 @@ from tolerances import HALVES, KEPT, LOOKUP, PLAIN_TEXTURE, SEAM, SPREAD
 
 import simdtex
 from simdtex.experiments.quality import histogram_distance, seam
-from simdtex.ops.noise import noise
+from simdtex.ops.pyramids import noise
 
 TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int64, np.float16, np.float32, np.float64]
 

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simdtex.experiments import quality
-from simdtex.experiments.quality import figures, patches
 
 RNG_TOLERANCE = 1e-5  # single precision of centred values of a few standard deviations
 
@@ -31,7 +30,7 @@ def naive_nearest(queries, candidates, scale):
     def patches(p):
         return [p[i : i + 7, j : j + 7] for i in range(p.shape[0] - 6) for j in range(p.shape[1] - 6)]
 
-    return np.mean([min(np.sqrt(((a - b) ** 2).mean()) for b in patches(candidates)) / scale for a in patches(queries)])
+    return np.mean([min(np.sqrt(((a - b) ** 2).mean()) for b in quality(candidates)) / scale for a in quality(queries)])
 
 
 def naive_mean_nearest(queries, candidates, scale):
@@ -64,8 +63,8 @@ def test_nearest_patches_against_loops(dtype, channels):
 def test_blocks_do_not_change_the_answer(monkeypatch):
     sample, output = noise(3, (24, 31, 2)), noise(4, (33, 26, 2))
     whole = quality.plausibility(sample, output)
-    monkeypatch.setattr(patches, "BLOCK_ROWS", 13)
-    monkeypatch.setattr(patches, "BLOCK_BYTES", 4 * 98 * 17)
+    monkeypatch.setattr(quality, "BLOCK_ROWS", 13)
+    monkeypatch.setattr(quality, "BLOCK_BYTES", 4 * 98 * 17)
     assert quality.plausibility(sample, output) == pytest.approx(whole, rel=1e-12)
 
 
@@ -86,8 +85,8 @@ def test_units_do_not_matter():
 def test_many_patches_are_looked_up_in_strides(monkeypatch):
     sample, output = noise(8, (20, 20)), noise(9, (60, 60))
     every = quality.plausibility(sample, output)
-    monkeypatch.setattr(figures, "QUERIES", 1458)
-    assert np.diff(figures._every(planes(output)))[0] == 5  # 2 and 4 divide the row of 54 or its half
+    monkeypatch.setattr(quality, "QUERIES", 1458)
+    assert np.diff(quality._every(planes(output)))[0] == 5  # 2 and 4 divide the row of 54 or its half
     assert every != quality.plausibility(sample, output) == pytest.approx(every, rel=0.05)
 
 

@@ -9,9 +9,9 @@ from cases import REFERENCE, assert_same_bits, host
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.ranking import ranking
+from simdtex.ops.matching import ranking
 
-MODULE = importlib.import_module("simdtex.ops.ranking")
+MODULE = importlib.import_module("simdtex.ops.matching")
 LOW, HIGH = -(2**31), 2**31 - 1
 KINDS = {
     "all": lambda rng, shape: rng.integers(LOW, HIGH, shape, endpoint=True),

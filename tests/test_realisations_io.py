@@ -17,7 +17,7 @@ import zarr
 from simdtex import distributed
 from simdtex.cli.ending import catch_signals
 from simdtex.io.grids import read_grid
-from simdtex.io.realisations import check_realisations_path, write_realisations
+from simdtex.io.volume import check_realisations_path, write_realisations
 from simdtex.options import DataWarning
 
 SUFFIXES = [".zarr", ".nc", ".npz"]
@@ -77,7 +77,7 @@ import sys
 sys.modules["xarray"] = None
 from types import SimpleNamespace
 import numpy as np
-from simdtex.io.realisations import check_realisations_path, write_realisations
+from simdtex.io.volume import check_realisations_path, write_realisations
 coords = {"x": SimpleNamespace(values=np.arange(3))}
 check_realisations_path(sys.argv[1])
 write_realisations(sys.argv[1], SimpleNamespace(values=np.ones((2, 3, 3)), coords=coords, attrs={"seed": 1}))

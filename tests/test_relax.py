@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 import simdtex
 from simdtex.machine.opencl import OpenCL
 from simdtex.ops import lcpdf
-from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.relax import SUGGESTING, Everything, Listed, Relaxation, relax, relax_apart
+from simdtex.ops.sites import coloring
 from simdtex.schedules import Checked, Coloring
 
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.io import image
-from simdtex.model import colours
+from simdtex.model import display
 from simdtex.report import sheet
-from simdtex.report.stages import StageWriter
+from simdtex.report.sheet import StageWriter
 from simdtex.run import Relaxing, Sampling
 
 
@@ -83,23 +83,23 @@ def test_fitted_keeps_the_bound_and_the_flat(rows, cols, side):
 
 
 def test_heat_grows_in_lightness():
-    found = colours.temperature_colours(np.linspace(0, 1, 256)).astype(float)
+    found = display.temperature_colours(np.linspace(0, 1, 256)).astype(float)
     assert found.shape == (256, 3)
     grey = found @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(grey) > -1.0).all()  # rounding to 8 bits
     assert grey[0] < 30
     assert grey[-1] > 220
-    np.testing.assert_array_equal(colours.temperature_colours([-1.0, 2.0]), colours.temperature_colours([0.0, 1.0]))
+    np.testing.assert_array_equal(display.temperature_colours([-1.0, 2.0]), display.temperature_colours([0.0, 1.0]))
 
 
 def test_source_colours_tell_positions_apart():
     source = np.stack(np.indices((16, 24)), axis=-1)
-    found = colours.source_colours(source, (16, 24))
+    found = display.source_colours(source, (16, 24))
     assert len(np.unique(found.reshape(-1, 3), axis=0)) == 16 * 24
     steps = np.abs(np.diff(found.astype(int), axis=1))
     assert steps.max() < 40
     source[3, 4] = -1
-    assert (colours.source_colours(source, (16, 24))[3, 4] == 0).all()
+    assert (display.source_colours(source, (16, 24))[3, 4] == 0).all()
 
 
 def moment(level, sweep, full, end_of_sweep=True):
@@ -161,7 +161,7 @@ def test_stages_of_levels_without_sweeps(tmp_path):
     assert set(os.listdir(folder)) == names
     np.testing.assert_array_equal(image.read(folder / "level1.png").pixels, full[::2, ::2])
     few, some, most = image.read(folder / "candidates-level0.png").pixels[0, :3]
-    np.testing.assert_array_equal([few, some, most], colours.temperature_colours([0, 0.5, 1]))
+    np.testing.assert_array_equal([few, some, most], display.temperature_colours([0, 0.5, 1]))
     StageWriter(folder)  # an earlier run's files may be replaced
 
 

@@ -13,9 +13,9 @@ from test_page import assert_needs_nothing_else, read_page
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image
-from simdtex.model.colours import source_colours, temperature_colours, use_colours
+from simdtex.model.display import source_colours, temperature_colours, use_colours
 from simdtex.model.regularity import lattice_sentence
-from simdtex.model.use import counts, effective_use
+from simdtex.model.source_map import counts, effective_use
 from simdtex.report import sheet, synthesis
 from simdtex.report.page import Figure
 from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences

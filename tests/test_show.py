@@ -19,9 +19,9 @@ from simdtex.io.grids import CartesianGrid
 from simdtex.io.hard_data import HardData
 from simdtex.io.image import Image, Metadata, read, write
 from simdtex.machine.devices import DeviceInfo
-from simdtex.model.colours import category_colours
+from simdtex.model.display import category_colours
+from simdtex.report.ensemble import write_volumes
 from simdtex.report.sheet import GAP, STRIP
-from simdtex.report.volumes import write_volumes
 from simdtex.run import Progress, Stage
 
 BRICK = data.brick()[:40, :60]

@@ -7,9 +7,9 @@ import pytest
 from cases import REFERENCE, assert_same_bits
 
 import simdtex
+from simdtex.model.given import EXCLUDED, Soft
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.model.soft import EXCLUDED, Soft
 
 TRAINING = (np.add.outer(np.arange(20) // 3, np.arange(24) // 5) % 3).astype(np.uint8) * 4
 SHAPE = (14, 17)

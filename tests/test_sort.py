@@ -8,9 +8,9 @@ from cases import REFERENCE, assert_same_bits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.sort import sort
+from simdtex.ops.matching import sort
 
-MODULE = importlib.import_module("simdtex.ops.sort")
+MODULE = importlib.import_module("simdtex.ops.matching")
 LOW, HIGH = -(2**31), 2**31 - 1
 KINDS = {
     "all": lambda rng, shape: rng.integers(LOW, HIGH, shape, endpoint=True),

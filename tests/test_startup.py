@@ -155,7 +155,7 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-@pytest.mark.parametrize("module", ["simdtex.machine.runtimes", "weakref", "_weakrefset"])
+@pytest.mark.parametrize("module", ["simdtex.machine.devices", "weakref", "_weakrefset"])
 def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
     """In the search for runtimes, which would leave its temporary folder, and in callbacks of what is collected."""
     from simdtex.cli import ending

@@ -10,8 +10,7 @@ from pyrtools.pyramids import SteerablePyramidSpace
 from pyrtools.pyramids.filters import parse_filter
 from tolerances import HALF, PYRTOOLS, UNIT32
 
-from simdtex.ops.steerable import steerable_join, steerable_split
-from simdtex.ops.steerable_filters import ORIENTATIONS, UNIT, filters
+from simdtex.ops.steerable import ORIENTATIONS, UNIT, filters, steerable_join, steerable_split
 
 TOP = 2**20
 BANKS = pytest.mark.parametrize("orientations", ORIENTATIONS)

@@ -6,7 +6,7 @@ import pytest
 from cases import texture
 
 from simdtex.model.sample import STEPS, Sample, variance
-from simdtex.model.structure import REACH, distance, principal, structure
+from simdtex.model.scale import REACH, distance, principal, structure
 
 
 @pytest.mark.parametrize("shape", [(40, 37), (1, 30), (30, 1), (6, 5)])

@@ -9,7 +9,7 @@ from cases import REFERENCE, analyse, assert_same_bits, texture
 
 import simdtex
 from simdtex.methods.multires import Options
-from simdtex.methods.multires.levels import thresholds
+from simdtex.methods.multires.analysis import thresholds
 
 
 @pytest.mark.parametrize("beta", [20, 20.0, 100, 1000.0, Fraction(1, 2)])

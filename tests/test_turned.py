@@ -8,8 +8,7 @@ import pytest
 from cases import texture
 
 import simdtex
-from simdtex.model.pictures import Pictures
-from simdtex.model.turned import MOST, copy_of, turned
+from simdtex.model.pictures import MOST, Pictures, copy_of, turned
 
 
 @pytest.mark.parametrize("shape", [(5, 8), (7, 7), (1, 4)])

@@ -6,8 +6,8 @@ from cases import REFERENCE, opencl, problem, problems
 from hypothesis import given, settings
 
 import simdtex
-from simdtex.model.colours import use_colours
-from simdtex.model.use import counts, effective_use
+from simdtex.model.display import use_colours
+from simdtex.model.source_map import counts, effective_use
 from simdtex.ops.use import FairUse, use, use_penalty
 
 

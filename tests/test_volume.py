@@ -16,7 +16,7 @@ import tifffile
 from volumes import loaded, noise
 
 from simdtex.cli.inputs import Reading, read_pixels
-from simdtex.io import image, limits, volume
+from simdtex.io import files, image, volume
 
 WHOLE = ["uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"]
 HOLDS = {
@@ -372,7 +372,7 @@ def test_what_vtk_would_take_memory_for_is_refused_before(tmp_path, capfd):
 
 @pytest.mark.parametrize(("name", "library"), [("a.vti", "pyvista"), ("a.exr", "OpenEXR"), ("a.heic", "pillow_heif")])
 def test_a_sentence_names_the_extra(tmp_path, monkeypatch, name, library):
-    monkeypatch.setattr(limits, "find_spec", lambda wanted: None if wanted == library else True)
+    monkeypatch.setattr(files, "find_spec", lambda wanted: None if wanted == library else True)
     start = {"a.exr": b"\x76\x2f\x31\x01", "a.heic": b"\0\0\0\x1cftypheic"}
     (tmp_path / name).write_bytes(start.get(name, b"") + bytes(50))
     with pytest.raises(ValueError, match=r"a\.\w+ is .*: pip install 'simdtex\[(volumes|pictures)\]' to read it$"):

@@ -17,8 +17,7 @@ import pytest
 from PIL import Image
 from skimage import data
 
-from simdtex.machine import runtimes
-from simdtex.machine.devices import devices
+from simdtex.machine.devices import _copy_icd_files, devices, intel_library
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
@@ -44,7 +43,7 @@ def environment(folder):
 
 def extra():
     """Return the extra of the CPU runtime if the tests use the one of the package index."""
-    return "[cpu]" if runtimes.intel_library() else ""
+    return "[cpu]" if intel_library() else ""
 
 
 @pytest.fixture(scope="module")
@@ -169,8 +168,8 @@ def test_it_runs_from_a_folder_of_any_name(wheel, tmp_path, name, any_device):
     Image.fromarray(data.brick()[:24, :28]).save(tmp_path / "sample.png")
     words = ("synth", "sample.png", "--size", "16x12", "--order", "2", "--seed", 1, "--levels", "1")
     (tmp_path / "icd").mkdir()
-    runtimes._copy_icd_files(tmp_path / "icd")
-    if library := runtimes.intel_library():
+    _copy_icd_files(tmp_path / "icd")
+    if library := intel_library():
         (tmp_path / "icd" / "intel.icd").write_text(f"{library}\n")
     loader = {"OCL_ICD_VENDORS": str(tmp_path / "icd")}
     found = [info for info in devices(probe=False) if info.name and not info.simulated]

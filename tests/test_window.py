@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from simdtex.ops.window import TAPS, gaussian, window
+from simdtex.ops.classes import TAPS, gaussian, window
 
 
 def run(machine, labels, owner, taps, values=None):

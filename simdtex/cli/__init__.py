@@ -115,7 +115,7 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     """Print the versions that a result may depend on, and the device that would be chosen."""
     if not wanted or ctx.resilient_parsing:
         return
-    from simdtex.report.terminal import version_lines
+    from simdtex.report.tables import version_lines
 
     for line in version_lines():
         click.echo(line)

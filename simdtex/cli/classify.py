@@ -79,7 +79,7 @@ def classify(
     """
     from simdtex import classify
     from simdtex.io import image
-    from simdtex.model.labels import read_labels, write_labels
+    from simdtex.model.display import read_labels, write_labels
 
     whole = read_material([picture])
     true = None if truth is None else read_labels(truth, UNLABELLED)
@@ -114,7 +114,7 @@ def classify(
         writers.append(lambda made, run: image.write(confidence, run.fit))
 
     def report(folder: Path, made: Any, run: Any) -> None:
-        from simdtex.report.classification import write_classification
+        from simdtex.report.synthesis import write_classification
 
         write_classification(folder, pixels, made, run, true, command_line())
 

@@ -21,7 +21,7 @@ import click
 
 from simdtex.cli.places import check_places, outputs
 
-UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
+UNINTERRUPTED = ("simdtex.machine.devices", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
 """Beginnings of modules in which an exception does harm: see `postponed`."""
 
 RESUME, FAILURES = f"{__name__}.resume", f"{__name__}.failures"

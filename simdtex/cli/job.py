@@ -114,7 +114,7 @@ def job(
                 if task.more:
                     task.more(made, output)
             if profile:
-                from simdtex.report.terminal import print_profile
+                from simdtex.report.tables import print_profile
 
                 print_profile(statistics)
 
@@ -296,7 +296,7 @@ def watching(
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None
     if stages:
-        from simdtex.report.stages import StageWriter
+        from simdtex.report.sheet import StageWriter
 
         writer = StageWriter(stages, limits=limits, resumed=lambda: bool(checkpoint and checkpoint.resumed))
     with progress_bar(quiet) as show:

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     """Synthesise brick, grass and gravel from pictures of scikit-image."""
     from simdtex.io import image
-    from simdtex.io.atomic import earlier_files
-    from simdtex.io.examples import EXAMPLES, example
+    from simdtex.io.files import earlier_files
+    from simdtex.io.image import EXAMPLES, example
     from simdtex.machine import open_machine
     from simdtex.report.sheet import contact_sheet
     from simdtex.synthesis import synthesize
@@ -120,9 +120,9 @@ def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> No
     All times are from one run. Do not use the machine for other work during the run.
     """
     from simdtex.bench import run as benchmark
-    from simdtex.io.atomic import atomic_path
+    from simdtex.io.files import atomic_path
     from simdtex.io.image import check_writable
-    from simdtex.report.terminal import print_benchmark
+    from simdtex.report.tables import print_benchmark
 
     if path:
         check_writable(path, suffixes=(".json",))

@@ -38,7 +38,7 @@ class Folder:
 
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
-        from simdtex.io.atomic import earlier_files
+        from simdtex.io.files import earlier_files
 
         for path in sorted(self.found.files, key=lambda path: path != self.lead):
             maps = read_material([path]) if self.maps else lead
@@ -56,7 +56,7 @@ class Folder:
     def write(self, metadata: Metadata | None, made: NDArray[Any], run: Any) -> None:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
         from simdtex.io import image
-        from simdtex.io.atomic import atomic_folder
+        from simdtex.io.files import atomic_folder
         from simdtex.model.material import NORMALS, unit_normals
 
         lead, *others = self.maps

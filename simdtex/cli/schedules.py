@@ -61,7 +61,8 @@ def schedules(
     from simdtex.io import image
     from simdtex.options import whole
     from simdtex.report.page import check_folder
-    from simdtex.report.schedules import tables, write_comparison
+    from simdtex.report.schedules import comparison_tables as tables
+    from simdtex.report.schedules import write_comparison
     from simdtex.report.tables import print_table
 
     check_folder(output)
@@ -147,13 +148,12 @@ def ising(
 ) -> None:
     """Relax Ising spins by each schedule and compare with the exact energy."""
     from simdtex import schedules as known
-    from simdtex.experiments.estimates import findings
-    from simdtex.experiments.ising import Experiment, ising
+    from simdtex.experiments.ising import Experiment, findings, ising
     from simdtex.io import image
     from simdtex.machine import open_machine
     from simdtex.options import whole
     from simdtex.random import as_seed
-    from simdtex.report import ising as report
+    from simdtex.report import schedules as report
     from simdtex.report.page import check_folder
     from simdtex.report.tables import print_table
 
@@ -183,7 +183,7 @@ def ising(
                 pictures.append(ising(machine, once, schedule, seed=seed))
     found = findings(runs)
     if not quiet:
-        for table in report.tables(found):
+        for table in report.ising_tables(found):
             print_table(table)
         for sentence in report.conclusion(found):
             click.echo(sentence)

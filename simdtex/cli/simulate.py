@@ -71,7 +71,7 @@ def simulate(
     A realisation depends only on the seed and on its number.
     """
     from simdtex import simulate
-    from simdtex.io.realisations import write_realisations
+    from simdtex.io.volume import write_realisations
     from simdtex.run import Output
 
     how = take_reading(options, deep=True)
@@ -130,7 +130,7 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex import estimate
-    from simdtex.io.realisations import write_realisations
+    from simdtex.io.volume import write_realisations
     from simdtex.run import Output
 
     how = take_reading(options, deep=True)
@@ -159,7 +159,7 @@ def read_place(material: Material, output: Path, options: dict[str, Any], source
     As given by options, which are taken out; else of a training image that is a grid; else None.
     """
     from simdtex.io.grids import SUFFIXES, check_grid
-    from simdtex.io.realisations import check_realisations_path
+    from simdtex.io.volume import check_realisations_path
 
     lies: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
     if material.lies:  # whose z is left out if that of the other option is
@@ -182,8 +182,7 @@ def georeferenced(made: Any, crs: str) -> Any:
 
 def _report(folder: Path, material: Material, made: Any, known: Any, place: dict[str, Any]) -> None:
     from simdtex.io.hard_data import HardData, place_hard_data
-    from simdtex.report.ensemble import write_ensemble
-    from simdtex.report.volumes import write_volumes
+    from simdtex.report.ensemble import write_ensemble, write_volumes
 
     pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
     shown: dict[str, Any] = {"command": command_line(), "upward": "cell_y" in made.attrs}
@@ -202,7 +201,7 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
 
 def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
-    from simdtex.experiments.ensemble.summary import LEAST
+    from simdtex.experiments.ensemble import LEAST
     from simdtex.options import LARGEST
 
     if material.several or material.channel_axis is not None:

@@ -98,7 +98,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
             if note := lattice_sentence(statistics["lattice"]):
                 click.echo(note)
         if options["array"]:
-            from simdtex.report.terminal import print_accounting
+            from simdtex.report.tables import print_accounting
 
             print_accounting(statistics["accounting"])
 

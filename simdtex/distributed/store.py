@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import read_state, write_state
 from simdtex.distributed.description import described, restored
 from simdtex.distributed.layout import Arrays, Layout, LevelLayout, Maps, further, planned
-from simdtex.io.atomic import Damaged, write_durable
+from simdtex.io.files import Damaged, write_durable
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from simdtex.checkpoint import check_version, warn
 from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
-from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
+from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex import schedules as known
 from simdtex.driver import check_shape
-from simdtex.experiments.quality import COPIED_PATCH, measure
-from simdtex.experiments.quality.patches import as_planes
+from simdtex.experiments.quality import COPIED_PATCH, as_planes, measure
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import Options

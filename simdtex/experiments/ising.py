@@ -2,6 +2,9 @@
 """The Ising model on a torus by heat-bath relaxation under any schedule.
 
 The conditional distributions are known exactly, so any deviation of a result is due to the schedule.
+
+The exact energy of the Ising model on a torus, J = k_B = 1, no field, is that of B. Kaufman, Phys. Rev. 76, 1232
+(1949), in the form of A. E. Ferdinand and M. E. Fisher, Phys. Rev. 185, 832 (1969).
 """
 
 from __future__ import annotations
@@ -9,11 +12,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import prod
+from math import log, pi, prod, sqrt, tanh
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from simdtex import random, schedules
 from simdtex.machine import Machine, memory
@@ -21,6 +25,57 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.ops.snapshot import snapshot
 from simdtex.options import one_of, real, whole
+
+CRITICAL = 2 / log(1 + sqrt(2))
+"""T_c = 2 / ln(1 + sqrt(2)) = 2.269..., in units of J / k_B."""
+
+HOTTEST = 1e6
+"""Above this temperature 1 / T is lost in sums of order 1."""
+
+COLDEST = 0.05
+"""Below this temperature the energy is -2 to the last bit: the weight of the first excitation is exp(-8 / T)."""
+
+
+def torus_energy(temperature: float, rows: int, cols: int) -> float:
+    """Return the energy per spin of a lattice of rows x cols that wraps around.
+
+    Parameters
+    ----------
+    temperature : float
+        Above 0, at most 1e6.
+    rows, cols : int
+        2 or more. Between two sites that are neighbours both ways around (a side of 2) there are two bonds.
+
+    Returns
+    -------
+    float
+        -(1/N) d ln Z / dK with the partition function of Kaufman, a sum of four products over the columns.
+
+    Notes
+    -----
+    O(cols). The derivative is the imaginary part of ln Z at a complex K (a complex step): exact to the last bits. Sums
+    are of logarithms, so that no size overflows.
+    """
+    real("temperature", temperature, 0, HOTTEST, above=True)
+    if temperature < COLDEST:
+        return -2.0
+    coupling = 1 / temperature
+    step = 1e-30
+    k = complex(coupling, step)
+    s = np.sinh(2 * k)
+    # cosh g_l - 1 = cosh(2K)^2 / sinh(2K) - cos(l pi / cols) - 1, without cancellation near T_c
+    excess = (s - 1) ** 2 / s + 2 * np.sin(np.arange(1, 2 * cols) * pi / cols / 2) ** 2
+    gamma = np.log1p(excess + np.sqrt(excess * (excess + 2)))
+    zero = 2 * k + np.log(np.tanh(k))  # g_0 has a sign, that of T_c - T
+    sign = -1.0 if zero.real < 0 else 1.0
+    logs = []
+    for half in (rows / 2 * gamma[::2], rows / 2 * np.append(sign * zero, gamma[1::2])):
+        logs.append((half + np.log1p(np.exp(-2 * half))).sum())  # the product of 2 cosh
+        logs.append((half + np.log(-np.expm1(-2 * half))).sum())  # the product of 2 sinh
+    shifted = np.array(logs) - max(one.real for one in logs)
+    total = (np.exp(shifted) * (1, 1, 1, sign)).sum()
+    return float(-(total.imag / total.real / step / (rows * cols) + 1 / tanh(2 * coupling)))
+
 
 AT_ONCE = 2**22
 """The most relaxations in one launch, which bounds its time."""
@@ -263,3 +318,95 @@ def _measure(spins: NDArray[np.uint8]) -> NDArray[np.float64]:
     field = sum(np.roll(now, by, axis) for axis in (1, 2) for by in (1, -1))
     energy = -(now * field).mean((1, 2), dtype=np.float64) / 2
     return np.stack([energy, *(now[:, parity == odd].mean(1, dtype=np.float64) for odd in (0, 1))])
+
+
+LEVEL = 0.001
+"""Probability that at least one result of a table of correct results differs."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The result of a schedule at one temperature.
+
+    Attributes
+    ----------
+    schedule : str
+    independent : bool
+        Whether it keeps equation (14) on this lattice.
+    temperature : float
+    energy, error : float
+        Energy per spin, and one standard error: that of the means of the chains. Chains are independent, so it is
+        valid for any autocorrelation of their sweeps; its own relative error is 1 / sqrt(2 (R - 1)).
+    exact : float
+        The energy of this torus.
+    sigmas : float
+        Deviation from it in standard errors.
+    magnetisation : float
+        Mean of the absolute mean spin.
+    neighbours : float
+        Correlation of neighbouring spins beyond that of their sublattices' magnetisations, <s_r s_s> - <m_even m_odd>;
+        0 if the sublattices are independent.
+    differs : bool
+        Whether the deviation counts.
+    """
+
+    schedule: str
+    independent: bool
+    temperature: float
+    energy: float
+    error: float
+    exact: float
+    sigmas: float
+    magnetisation: float
+    neighbours: float
+    differs: bool
+
+    @property
+    def verdict(self) -> str:
+        """Whether the energy agrees, in words."""
+        return f"differs by {abs(self.sigmas):.0f} sigma" if self.differs else "agrees"
+
+
+def findings(runs: Sequence[Chains]) -> list[Finding]:
+    """Return a comparison of runs with the exact energy.
+
+    Parameters
+    ----------
+    runs : sequence of simdtex.experiments.ising.Chains
+        Of a torus, two chains or more.
+
+    Returns
+    -------
+    list of Finding
+        For each temperature, every run.
+
+    Notes
+    -----
+    A deviation counts if Student's t with R - 1 degrees of freedom gives it a probability below `LEVEL` divided by the
+    number of comparisons (Bonferroni).
+    """
+    first = runs[0]
+    count = len(first.temperatures) * len(runs)
+    least = float(stats.t.isf(LEVEL / count / 2, first.energy.shape[1] - 1))
+    return [_finding(run, t, least) for t in range(len(first.temperatures)) for run in runs]
+
+
+def _finding(run: Chains, t: int, least: float) -> Finding:
+    rows, cols = run.spins.shape[-2:]
+    temperature, means = float(run.temperatures[t]), run.energy[t].mean(1)
+    one_spin = 8 / (rows * cols * run.energy[t].size)  # turned once: frozen chains have no spread
+    error = max(float(means.std(ddof=1)) / sqrt(len(means)), one_spin)
+    energy, exact = float(means.mean()), torus_energy(temperature, rows, cols)
+    sigmas = (energy - exact) / error
+    return Finding(
+        schedule=run.schedule,
+        independent=run.independent,
+        temperature=temperature,
+        energy=energy,
+        error=error,
+        exact=exact,
+        sigmas=sigmas,
+        magnetisation=float(np.abs(run.magnetisation[t]).mean()),
+        neighbours=float(-energy / 2 - (run.even[t] * run.odd[t]).mean()),
+        differs=abs(sigmas) > least,
+    )

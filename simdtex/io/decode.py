@@ -16,7 +16,7 @@ import PIL.Image
 from numpy.typing import NDArray
 
 from simdtex.io import rasters
-from simdtex.io.limits import Refused, check_array, check_size, needs, quiet, read_npy
+from simdtex.io.files import Refused, check_array, check_size, needs, quiet, read_npy
 
 Array = NDArray[Any]
 

@@ -22,10 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.atomic import atomic_path, check_target
 from simdtex.io.brief import Brief
+from simdtex.io.files import BYTES, atomic_path, check_size, check_target, explained, reading
 from simdtex.io.image import cast
-from simdtex.io.limits import BYTES, check_size, explained, reading
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import DataWarning, check_real, require, shown
 

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.limits import Refused, check_array, needs, quiet
+from simdtex.io.files import Refused, check_array, needs, quiet
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]

@@ -104,7 +104,7 @@ def estimate(
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     require("simulate", "xarray")
-    from simdtex.model.plotted import Results, described
+    from simdtex.model.show import Results, described
 
     whole("nearest", nearest, 0, MOST)
     real("bandwidth", bandwidth, 0, above=True)

@@ -16,8 +16,7 @@ from simdtex.io.hard_data import HardData
 from simdtex.io.image import AXES, as_array
 from simdtex.jobs.inputs import Inputs, Placing, check_mask
 from simdtex.model.given import Given
-from simdtex.model.pictures import Pictures
-from simdtex.model.turned import HALVES, Turned, turned
+from simdtex.model.pictures import HALVES, Pictures, Turned, turned
 from simdtex.options import check_real
 
 ONE = 1e-3

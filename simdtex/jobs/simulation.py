@@ -26,9 +26,8 @@ from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.typed_options import SimulateOptions
-from simdtex.model.given import Given
+from simdtex.model.given import Given, Soft
 from simdtex.model.pictures import Pictures
-from simdtex.model.soft import Soft
 from simdtex.options import lists_options, require, resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
@@ -179,7 +178,7 @@ def simulate(
     {'realisation': 2, 'y': 32, 'x': 40}
     """
     require("simulate", "xarray")
-    from simdtex.model.plotted import Realisations, Results, described
+    from simdtex.model.show import Realisations, Results, described
 
     whole("n", n, 1)
     whole("first", first, 0)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.image import to_display
-from simdtex.model.colours import source_colours, temperature_colours, use_colours
-from simdtex.model.use import counts
+from simdtex.model.display import source_colours, temperature_colours, use_colours
+from simdtex.model.source_map import counts
 from simdtex.options import true_or_false, whole
 
 Array = NDArray[Any]

@@ -25,7 +25,7 @@ from simdtex.live.words import controls
 from simdtex.machine import Machine
 from simdtex.methods.classifier.model import LEAST
 from simdtex.methods.mrf.replay import Replay
-from simdtex.model.colours import label_colours
+from simdtex.model.display import label_colours
 from simdtex.options import one_of, real, shown, whole
 from simdtex.run import Output
 from simdtex.synthesis import METHODS, replay, synthesize

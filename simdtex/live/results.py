@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from simdtex.io.image import write
 from simdtex.live import frames
 from simdtex.live.job import Job
-from simdtex.model.labels import write_labels
+from simdtex.model.display import write_labels
 from simdtex.model.regularity import lattice_sentence
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of, whole
@@ -60,7 +60,7 @@ class Result:
 
     @cached_property
     def _fault_map(self) -> NDArray[np.uint8]:
-        from simdtex.experiments.quality.regular import lattice_fault_map
+        from simdtex.experiments.quality import lattice_fault_map
 
         found = lattice_fault_map(self.job.sample, self.image)
         return np.zeros(self.job.shape, np.uint8) if found is None else found.astype(np.uint8)

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.examples import EXAMPLES, example
-from simdtex.io.image import read_bytes
+from simdtex.io.image import EXAMPLES, example, read_bytes
 from simdtex.live import frames
 from simdtex.live.inside import Inside
 from simdtex.live.job import LABELS, MIN_REGION, Hint, Job, Message, Picture, file_stem
@@ -32,7 +31,7 @@ from simdtex.live.results import THUMBNAIL, Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf
-from simdtex.model.colours import temperature_colours
+from simdtex.model.display import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
 from simdtex.options import one_of, resolve

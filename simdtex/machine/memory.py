@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 
-from simdtex.machine import runtimes
+from simdtex.machine import devices
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Machine
 from simdtex.options import SMALLER
@@ -64,7 +64,7 @@ def require_host(wanted: int, remedy: str = SMALLER, of: int = 0) -> None:
 def available() -> int:
     """Return the bytes that are available to this process, within its limit and that of its control group."""
     taken = psutil.Process().memory_info()
-    found: int = min(psutil.virtual_memory().available, runtimes.address_space() - taken.vms)
+    found: int = min(psutil.virtual_memory().available, devices.address_space() - taken.vms)
     for path in LIMITS:
         with suppress(OSError, ValueError):  # no such version; or "max", which is no limit
             found = min(found, int(path.read_text()) - taken.rss)

@@ -16,9 +16,9 @@ import pyopencl as cl
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
-from simdtex.machine import runtimes
+from simdtex.machine import devices
 from simdtex.machine.devices import DeviceError, DeviceInfo
-from simdtex.machine.log import Log
+from simdtex.machine.reference import Log
 from simdtex.model.sample import BLOCK
 
 SMALL_COPY = 2**16
@@ -124,7 +124,7 @@ class OpenCL:
         split: int | None = None,
         profile: bool = False,
     ) -> None:
-        runtimes.check_fork()
+        devices.check_fork()
         self.info, self.kind, self.memory = info, info.kind, float(info.memory)
         self.name = f"{info.name.strip()} ({info.platform})"
         self.context = cl.Context([info.handle])  # type: ignore[list-item]
@@ -232,7 +232,7 @@ class OpenCL:
         return self.log.seconds
 
     def profile(self) -> dict[str, Any] | None:
-        """Return the times of the kernels launched since the last call, see `simdtex.machine.log.Log.take`."""
+        """Return the times of the kernels launched since the last call, see `simdtex.machine.reference.Log.take`."""
         with self._lock:
             self.sync()
             return self.log.take()
@@ -260,7 +260,7 @@ class OpenCL:
     @contextmanager
     def _plain_errors(self) -> Iterator[None]:
         """Raise DeviceError if the process was forked, or if the device runs out of memory."""
-        runtimes.check_fork()
+        devices.check_fork()
         try:
             yield
         except cl.Error as error:
@@ -298,7 +298,7 @@ class OpenCL:
         files = TOGETHER if file in TOGETHER and not defines else (file,)
         if (files, options) not in self._kernels:
             source = "".join(kernel_source(f"{name}.cl") for name in files)
-            self._kernels[files, options] = runtimes.build(self.context, source, options.split())
+            self._kernels[files, options] = devices.build(self.context, source, options.split())
         return self._kernels[files, options][function]
 
     def launch(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The colours of sites, equation (14), which the PEs compute themselves: those of `simdtex.ops.coloring`.
+"""The colours of sites, equation (14), which the PEs compute themselves: those of `simdtex.ops.sites`.
 
 A PE computes its colour from its row and column. Along the seam of a torus that cuts through the pattern, neighbours
 compare random keys: in each round the sites with the highest keys around take the lowest colour that is left.

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.lattice import sums_around
 from simdtex.model.pictures import unknown_in
 from simdtex.model.scale import Scale, stretch
-from simdtex.model.sums import sums_around
 
 UNKNOWN = 2**16 - 1
 """The working level of an unknown value, which has no weight (kernels/common/confidence.h)."""

@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pictures of a sample: which pixels are known, which may be used, and which variables are categories."""
+"""The pictures of a sample, and turned and scaled copies of them with the probability of each copy at each site.
+
+A sample knows which of its pixels are known, which may be used, and which variables are categories. The rotation of a
+copy is rounded to the nearest eighth of a turn, and its scale to the nearest of 2**-1, 2**-1/2, 1, 2**1/2 and 2.
+Quarter turns at the scale 1 are exact; a pixel of any other copy is the nearest pixel of the picture. Beyond the
+borders of its picture a copy is a mirror image, whose pixels are never taken.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import ceil, sqrt
 from typing import Any
 
 import numpy as np
@@ -112,3 +120,127 @@ def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
     nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     filled: NDArray[Any] = np.ascontiguousarray(picture[tuple(nearest)])
     return filled
+
+
+EIGHTHS = 8
+"""Number of rotations."""
+
+HALVES = 2
+"""The most factors of sqrt(2) by which a picture is enlarged or reduced."""
+
+MOST = 64
+"""The most copies of all pictures together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Copy:
+    """A copy of a picture.
+
+    ``image``, the number of the picture; ``row`` and ``col`` (rows, cols) int32, the position in it of each pixel of
+    the copy; ``inside`` (rows, cols), False in the mirror image.
+    """
+
+    image: int
+    row: NDArray[np.int32]
+    col: NDArray[np.int32]
+    inside: Mask
+
+    def of(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Return the copy of an array (rows, cols, ...) that belongs to the picture."""
+        return np.ascontiguousarray(pictures[self.image][self.row, self.col])
+
+
+def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Copy:
+    """Return the copy of a picture of ``shape``, turned by ``eighths`` from x to y and enlarged by sqrt(2)**halves.
+
+    x grows with the column and y with the row.
+    """
+    half = sqrt(0.5)
+    cosines = (1.0, half, 0.0, -half, -1.0, -half, 0.0, half)
+    cos, sin = cosines[eighths], cosines[(eighths - 2) % EIGHTHS]
+    by = 2.0 ** (halves // 2) * (sqrt(2.0) if halves % 2 else 1.0)
+    rows, cols = shape[:2]
+    high, wide = (abs(cos) * a + abs(sin) * b for a, b in ((rows, cols), (cols, rows)))
+    sides = [max(1, ceil(side * by - 1e-6)) for side in (high, wide)]
+    y, x = ((np.arange(side) - (side - 1) / 2) / by for side in sides)
+    down = cos * y[:, None] - sin * x[None, :] + (rows - 1) / 2
+    along = sin * y[:, None] + cos * x[None, :] + (cols - 1) / 2
+    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (down, along))  # halves up, even if inexact
+    inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
+    return Copy(image, _mirrored(row, rows), _mirrored(col, cols), inside)
+
+
+def _mirrored(at: NDArray[np.int64], side: int) -> NDArray[np.int32]:
+    at = at % (2 * side)
+    return np.minimum(at, 2 * side - 1 - at).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """The ``copies`` that maps require, and the ``probability`` (copies, H, W) of each at each site, or NaN."""
+
+    copies: tuple[Copy, ...]
+    probability: NDArray[np.float64]
+
+    def pictures(self, pictures: Pictures) -> Pictures:
+        """Return the copies of pictures as pictures."""
+        copies, unknown, usable = self.copies, None, None
+        if pictures.known:
+            unknown = tuple(one.of([~known for known in pictures.known]) for one in copies)
+        if pictures.usable or not all(one.inside.all() for one in copies):
+            everywhere = [np.ones(one.shape[:2], bool) for one in pictures.pixels]
+            usable = tuple(one.inside & one.of(pictures.usable or everywhere) for one in copies)
+        return Pictures(tuple(one.of(pictures.pixels) for one in copies), unknown, usable)
+
+    def sources(self, place: NDArray[np.int32], several: bool) -> NDArray[np.int32]:
+        """Return the source map in the pictures themselves from one of the copies; -1 stays -1.
+
+        ``place`` is (..., 3), row, column and number of the copy, or (..., 2) with one copy; with ``several`` pictures
+        the last number of the result is that of the picture.
+        """
+        number = place[..., 2] if place.shape[-1] == 3 else np.where(place[..., 0] < 0, np.int32(-1), np.int32(0))
+        found = np.full((*place.shape[:-1], 2 + several), -1, np.int32)
+        for k, one in enumerate(self.copies):
+            here = number == k
+            at = tuple(place[here][:, :2].T)
+            found[here] = np.stack([one.row[at], one.col[at], np.full(at[0].size, one.image)][: 2 + several], -1)
+        return found
+
+
+def turned(
+    pictures: Pictures,
+    images: NDArray[np.float64],
+    rotation: NDArray[np.float64] | None,
+    scale: NDArray[np.float64] | None,
+) -> Turned:
+    """Return the copies that any site requires, and their probabilities.
+
+    Parameters
+    ----------
+    pictures : Pictures
+    images : (pictures, H, W) float64 array
+        The probability of each picture, adding up to 1, or NaN.
+    rotation : (H, W) float64 array, optional
+        Degrees from x to y; NaN: any rotation of another site.
+    scale : (H, W) float64 array, optional
+        1/2 to 2; NaN: any scale of another site.
+    """
+    shape = images.shape[1:]
+    turns = np.zeros(shape) if rotation is None else np.floor(rotation / (360 / EIGHTHS) + 0.5) % EIGHTHS
+    sizes = np.zeros(shape) if scale is None else np.clip(np.floor(2 * np.log2(scale) + 0.5), -HALVES, HALVES)
+    free = np.isnan(images[0]) | np.isnan(turns) | np.isnan(sizes)
+    kind = np.where(free, 0, turns * (2 * HALVES + 1) + sizes + HALVES).astype(np.int64)
+    wanted = [(int(one), n) for one in np.unique(kind[~free]) for n in range(len(images))]
+    wanted = [(one, n) for one, n in wanted if images[n][(kind == one) & ~free].any()]
+    if not wanted:
+        raise ValueError("the maps of training images, rotation and scale have no number; leave them out")
+    if len(wanted) > MOST:
+        raise ValueError(
+            f"the maps ask for {len(wanted)} different copies of training images; round rotation and scale so that "
+            f"there are {MOST} or fewer"
+        )
+    probability = np.stack([np.where(kind == one, images[n], 0) for one, n in wanted])
+    probability[:, free] = np.nan
+    copies = [(n, one // (2 * HALVES + 1), one % (2 * HALVES + 1) - HALVES) for one, n in wanted]
+    sides = [picture.shape for picture in pictures.pixels]
+    return Turned(tuple(copy_of(n, sides[n], turn, halves) for n, turn, halves in copies), probability)

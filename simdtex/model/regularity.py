@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
-from simdtex.model.scale import stretch
-from simdtex.model.structure import principal
+from simdtex.model.scale import principal, stretch
 from simdtex.options import shown
 
 LEAST_SIDE = 32

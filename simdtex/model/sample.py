@@ -14,8 +14,7 @@ from simdtex.model.guide import AnyGuide
 from simdtex.model.lattice import parts_of
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import WAVES, Phases
-from simdtex.model.scale import Scale, highest
-from simdtex.model.structure import structure
+from simdtex.model.scale import Scale, highest, structure
 
 BLOCK = 64
 """Candidates in a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
@@ -111,7 +110,7 @@ class Sample:
         Pixels by which each picture is continued by reflection on every side, for the neighbourhoods of its outer
         pixels. The margin itself is never taken.
     weight : float
-        Weight of the structure channel (`simdtex.model.structure`), which is matched like the other channels and never
+        Weight of the structure channel (`simdtex.model.scale`), which is matched like the other channels and never
         shown; 0: none.
     step : int
         Pixels from site to site at the coarsest level; every picture begins at a multiple.

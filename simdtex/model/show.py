@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures for a notebook, a window or a file: of pictures, of realisations, and of estimates."""
+"""Figures for a notebook, a window or a file: of pictures, of realisations, and of estimates.
+
+`simulate` and `estimate` return arrays of xarray whose ``plot()`` draws maps as reports do. They are subclasses because
+an accessor cannot be registered over ``plot``. Only the call of xarray's own accessor differs, so that
+``made.plot.hist()`` and ``made.plot(x="x")`` stay what they are in xarray.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +14,18 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
 from matplotlib.backend_bases import FigureManagerBase
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
+from xarray.core.utils import UncachedAccessor
+from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
 from simdtex.io.rasters import axis_place
-from simdtex.model.colours import category_colours
+from simdtex.model.display import category_colours
 from simdtex.options import whole
 
 ACROSS, SIDE = 4, 2.6
@@ -200,3 +208,44 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     for axes in grid[len(titles) :]:
         axes.set_axis_off()
     return figure, figure.colorbar(image, ax=list(grid)) if own is how else bar
+
+
+class _ArrayPlot(DataArrayPlotAccessor):
+    def __call__(self, **keywords: Any) -> Any:  # type: ignore[override]
+        """Return a figure of the first ``number`` realisations, by default 8; xarray draws all else."""
+        own = keywords.keys() <= {"number"} and "realisation" in self._da.coords and {"y", "x"} <= set(self._da.dims)
+        return _draw(self._da, **keywords) if own else super().__call__(**keywords)
+
+
+class _DatasetPlot(DatasetPlotAccessor):
+    def __call__(self, **keywords: Any) -> Any:
+        """Return a figure of the maps, or of the first ``number`` realisations or largest categories, by default 8."""
+        return _draw(self._ds, **keywords)
+
+
+def _draw(made: Any, **keywords: Any) -> Any:
+    pass  # MERGED
+
+    return draw(made, **keywords)
+
+
+class Realisations(xr.DataArray):  # type: ignore[no-untyped-call]
+    """An array of realisations."""
+
+    __slots__ = ()
+    plot = UncachedAccessor(_ArrayPlot)
+
+
+class Results(xr.Dataset):  # type: ignore[no-untyped-call]
+    """A dataset of an estimate, or of realisations and their source maps."""
+
+    __slots__ = ()
+    plot = UncachedAccessor(_DatasetPlot)
+
+
+def described(training: Any) -> dict[str, str]:
+    """Return the attributes ``long_name`` and ``units`` of a training image of xarray, if it has them."""
+    if not hasattr(training, "coords"):
+        return {}
+    found = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+    return {name: str(value) for name, value in found.items() if value}

@@ -71,7 +71,7 @@ class Scattered(NamedTuple):
 
 
 class Kinds(NamedTuple):
-    """The cost of each kind of candidates at each site: soft data (`simdtex.model.soft`).
+    """The cost of each kind of candidates at each site: soft data (`simdtex.model.given`).
 
     ``sites`` (kinds, H, W) float32 are the costs, 0 or more; ``candidates`` (kinds of a candidate, n rounded up to
     blocks) uint16 are the kinds of each candidate, by its number.

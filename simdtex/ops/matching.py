@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Histogram matching of every segment: Heeger and Bergen's match-histogram, by rank and by lookup, in integers.
+"""Histogram matching of every segment, Heeger and Bergen's match-histogram, in integers: by rank and by lookup.
 
-Segments are rows of a (segments, n) int32 array. Each of T targets is for segments // T consecutive segments.
+Segments are rows of a (segments, n) int32 array. Each of T targets is for segments // T consecutive segments. The order
+of the values of a segment comes from a stable radix sort, with ties in a given order.
 """
 
 from __future__ import annotations
@@ -10,7 +11,58 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.ops.sort import local, run_length
+
+SCRATCH = 2**22
+"""Number of values sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
+
+DIGITS = 256
+"""Number of values of the 8 bits that a pass sorts by."""
+
+
+def run_length(machine: Launcher, segments: int, n: int) -> int:
+    """Return the number of consecutive values of a segment for a work-item; it changes no bit.
+
+    There are enough work-items to fill the device, but a run takes more work than its table of counters.
+    """
+    on_gpu = machine.info.kind == "gpu"
+    items, least = (2**13, 256) if on_gpu else (8 * max(1, machine.info.compute_units), 4096)
+    runs = max(1, min(items // segments, n // least))
+    return -(-n // runs)
+
+
+def local(machine: Launcher) -> tuple[int]:
+    """Return the work-items of a group if each takes a run; on a CPU 1, to distribute a few long runs."""
+    return (64,) if machine.info.kind == "gpu" else (1,)
+
+
+@Operation
+def sort(machine: Launcher | None, values: Array, first: Array) -> Array:
+    """Return the index in each segment of its k-th smallest value, (segments, n) int32.
+
+    ``values`` is (segments, n) int32. Equal values come in the order of the permutation ``first`` (n,) int32.
+    """
+    segments, n = values.shape
+    if machine is None:
+        return first[np.argsort(values[:, first], axis=1, kind="stable")]
+    order = machine.empty((segments, n), np.int32)
+    most = min(segments, max(1, SCRATCH // max(n, DIGITS)))
+    pairs, moved = (machine.empty((most, n, 2), np.uint32) for _ in range(2))
+    length = run_length(machine, most, n)
+    runs = -(-n // length)
+    counts, totals = machine.empty((most, runs, DIGITS), np.uint32), machine.empty((most, DIGITS), np.uint32)
+    group = local(machine)
+    for begin in range(0, segments, most):
+        pieces = min(most, segments - begin)
+        shape, size = (pieces, n, runs, length), (pieces * runs,)
+        machine.launch("sort_read", size, values, begin, first, *shape, pairs, local=group)
+        for shift in range(0, 32, 8):
+            machine.launch("sort_count", size, pairs, *shape, shift, counts, local=group)
+            machine.launch("sort_scan", (pieces * DIGITS,), pieces, runs, counts, totals)
+            moving = (pairs, *shape, shift, counts, totals, moved, shift == 24, order, begin)
+            machine.launch("sort_scatter", size, *moving, local=group)
+            pairs, moved = moved, pairs
+    return order
+
 
 FRACTION = 20
 """Number of bits of the fraction of a bin."""
@@ -50,8 +102,8 @@ def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins
 def match_ranks(machine: Launcher | None, order: Array, targets: Array) -> Array:
     """Return values with the histograms of the targets, (segments, n) int32.
 
-    ``order`` (segments, n) comes from `simdtex.ops.sort.sort`, ``targets`` (T, m) int32 are sorted. The value of rank k
-    among n becomes the target's value of rank (2 k + 1) m // (2 n) among m.
+    ``order`` (segments, n) comes from `sort`, ``targets`` (T, m) int32 are sorted. The value of rank k among n becomes
+    the target's value of rank (2 k + 1) m // (2 n) among m.
     """
     (segments, n), m = order.shape, targets.shape[1]
     each = segments // targets.shape[0]
@@ -127,3 +179,51 @@ def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int
     length = min(n, max(run_length(machine, segments, n), table))
     runs = -(-n // length)
     return runs, (segments, n, runs, length)
+
+
+COUNTERS = 3 * 2**11
+"""Counters of a segment, for 11 bits in each of three passes."""
+
+SHORT, LONG = 2**15, 2**22
+"""The most values of a segment that one work-item sorts, if segments are few and if they are many."""
+
+
+def alone(machine: Launcher, segments: int, n: int) -> bool:
+    """Return whether one work-item sorts a whole segment; it changes no bit.
+
+    It saves a dozen launches. A long segment is divided on a GPU, or if cores would be idle.
+    """
+    if machine.info.kind == "gpu":
+        return False
+    return n <= (LONG if 2 * segments >= machine.info.compute_units else SHORT)
+
+
+@Operation
+def ranking(machine: Launcher | None, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
+    """Return values (segments, n) int32 with the histograms of the targets, and the distances they have moved.
+
+    ``values`` (segments, n) int32, equal ones in the order of the permutation ``first`` (n,) int32; ``targets`` (T, m)
+    int32 are sorted. The second result, (segments,) int64, is the sum of |before - after| over each segment. Cost: two
+    to four passes over the values, and 16 bytes of scratch for each of 2**22 values together.
+    """
+    if machine is None:
+        matched = match_ranks.reference(sort.reference(values, first), targets)
+        return matched, distance.reference(values, matched)
+    segments, n = values.shape
+    if not alone(machine, segments, n):
+        matched = match_ranks(machine, sort(machine, values, first), targets)
+        return matched, distance(machine, values, matched)
+    each, m = segments // targets.shape[0], targets.shape[1]
+    most = min(segments, max(1, SCRATCH // max(n, COUNTERS // 2)))
+    pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, COUNTERS), np.uint32)
+    matched, moved = machine.empty((segments, n), np.int32), machine.empty((segments,), np.int64)
+    for begin in range(0, segments, most):
+        pieces = min(most, segments - begin)
+        machine.launch(
+            "ranking",
+            (pieces,),
+            *(values, begin, first, pieces, n),
+            *(targets, each, m, pairs, counts, matched, moved),
+            local=local(machine),
+        )
+    return matched, moved

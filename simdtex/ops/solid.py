@@ -2,7 +2,7 @@
 """Blocks of solid textures: their Laplacian pyramid in integers, their slices in other directions, their mean.
 
 Blocks are (depth, rows, cols) int32 and wrap around. A level has half the slices, rows and columns of the one below it;
-an odd number of them is folded instead, see `simdtex.ops.fold`. Results are correct if the input of a reduction is
+an odd number of them is folded instead, see `simdtex.ops.pyramids`. Results are correct if the input of a reduction is
 below 2**23 and that of an expansion below 2**25, positive or negative.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.ops.fold import folded
+from simdtex.ops.pyramids import folded
 
 MOST_ITEMS = 2**21
 """About the most work-items of a launch, so that none takes long on a slow device."""

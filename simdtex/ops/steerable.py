@@ -2,21 +2,27 @@
 """The steerable pyramid of Simoncelli and Freeman in integers: its filters, and their transposes.
 
 Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
-with an odd side, from `simdtex.ops.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
+with an odd side, from `simdtex.ops.steerable`. Sums are float32, over terms, bands, tap rows and tap columns in
 this order, each step an fma. They are rounded to integers at the end, and must fit 32 bits. Taps are multiples of
 2**-24, so each step of the twin is exact in double precision if sums stay below 2**28.
+
+The spatial filters, for 1, 2, 4 and 6 orientations, were designed by the method of Karasaridis and Simoncelli, *A
+filter design technique for steerable pyramid image transforms* (1996), for the transform of Simoncelli and Freeman,
+*The steerable pyramid* (1995). The numbers are those distributed with pyrtools as sp0, sp1, sp3 and sp5.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.ops.laplacian import within
+from simdtex.ops.pyramids import within
 
 PADDED = 2**24
 """The most float32 values that are padded together; fewer if the machine's scratch memory is smaller."""
@@ -147,3 +153,194 @@ def steerable_join(
                 defines={"V": v, "ROWS": ROWS[1]},
             )
     return picture
+
+
+ORIENTATIONS = (1, 2, 4, 6)
+"""The possible numbers of orientations."""
+
+UNIT = 2**24
+"""Taps are rounded to multiples of 2**-24, see `simdtex.ops.steerable`."""
+
+
+@dataclass(frozen=True)
+class Filters:
+    """The filters of a bank, float32, for correlation with a picture.
+
+    Attributes
+    ----------
+    high : (a, a) array
+        H0, whose output is finer than the first level.
+    low : (b, b) array
+        L0, whose output is the input of the levels. Its taps add up to 1, with six orientations to 0.99918.
+    down : (c, c) array
+        L1, between a level and the next, which has half the rows and columns. Its taps add up to 1, so numbers keep
+        their range; those of pyrtools are twice as large, so its level k and its residue are 2**k times ours.
+    bands : (orientations, d, d) array
+        B_i. Orientation i of n has the angle pi i / n, counter-clockwise from the column axis as pictures are seen, so
+        towards lower row numbers. It responds to waves along its angle: 0 to changes along a row, so to vertical lines.
+        All are odd (their sign changes when turned by 180 degrees), except that the filter of a single orientation is
+        even and has no direction. Signs are those of pyrtools.
+    """
+
+    high: NDArray[np.float32]
+    low: NDArray[np.float32]
+    down: NDArray[np.float32]
+    bands: NDArray[np.float32]
+
+
+@cache
+def filters(orientations: int) -> Filters:
+    """Return the bank with ``orientations`` orientations: 1, 2, 4 or 6.
+
+    Raises
+    ------
+    ValueError
+        There is no bank with that number of orientations.
+    """
+    if orientations not in ORIENTATIONS:
+        raise ValueError(f"orientations is {orientations}; give one of {', '.join(map(str, ORIENTATIONS))}")
+    high, low, down, *bands = (_numbers(text) for text in _BANKS[orientations])
+    if orientations == 1:
+        upright = [_even(bands[0])]
+    else:  # the second half is the first half turned by 90 degrees
+        first = [_odd(half) for half in bands]
+        if orientations == 6:
+            first.append(-first[1].T)
+        upright = first + [np.rot90(band) for band in first]
+    taps = [_even(high), _even(low), _even(down) / 2, np.array(upright)]
+    single = [np.ascontiguousarray(np.rint(a * UNIT) / UNIT, dtype=np.float32) for a in taps]
+    for a in single:
+        a.flags.writeable = False
+    return Filters(*single)
+
+
+def _numbers(text: str) -> NDArray[np.float64]:
+    """Return the numbers of a text in millionths."""
+    return np.array([float(number) for number in text.split()]) / 1e6
+
+
+def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a filter with all mirror symmetries, from its taps at 0 <= x <= y, row by row from the centre."""
+    reach = int(np.sqrt(2 * octant.size)) - 1
+    y, x = abs(np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    far, near = np.maximum(y, x), np.minimum(y, x)
+    taps: NDArray[np.float64] = octant[far * (far + 1) // 2 + near]
+    return taps
+
+
+def _odd(half: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a filter whose sign changes when turned by 180 degrees, from its taps before the centre, in rows."""
+    side = int(np.sqrt(2 * half.size + 1))
+    return np.concatenate([half, [0.0], -half[::-1]]).reshape(side, side)
+
+
+_BANKS = {
+    1: (
+        # H0
+        """
+        855489.3 -96235.94 -63009.23 -24201.38 -14373.58 -1616.65 -373.21 145.97 492.71 126.31 -240.66 -332.56
+        -332.49 -60.68 599.72
+        """,
+        # L0
+        """
+        315301.7 152493.5 64414.88 -7563.2 -13441.6 -6119.52 -3743.86 -372.58 -113.71 -451.4
+        """,
+        # L1, twice `down`
+        """
+        157650.8 134899.9 111638.8 76246.74 63062.62 32207.44 24496 17220.78 3938.62 -5260.02 -3781.6 -5236.18
+        -6720.8 -6401 -3059.76 -6948.9 -7006.74 -4596.42 -2449.06 -190.38 1417.62 -1871.92 -1031.64 -186.28 874.14
+        -56.86 -806.44 -225.7
+        """,
+        # B_0
+        """
+        946419.5 -31586.05 -17304.66 -34870.08 -24356.62 -21295.4 -9091.95 -7623.41 -7272.54 -4625.15 -10094.73
+        -7889.39 -4942.5 -1738.64 -90.66
+        """,
+    ),
+    2: (
+        # H0
+        """
+        728259.3 -156282.7 -78413.7 -5897.78 10948.66 17063.47 10980.12 9156.42 899.86 -4317.53 -1166.81 -874.26
+        -1424.72 -242.41 -957
+        """,
+        # L0
+        """
+        437625 181160.3 43813.2 -32971.37 -37694.87 -7061.29 1107.62 8224.42 7522.72 2921.58 2524.01 -503.37
+        -1601.26 -1354.28 -87.01
+        """,
+        # L1, twice `down`
+        """
+        212037.4 177365.1 144550 90580.14 68065.84 21906.6 14385.12 3955.66 -11091.7 -20229.38 -16485.68 -17508.18
+        -18847.44 -12604.2 -3530.64 -9637.22 -9056.92 -7431.7 -1777.48 3184.68 3175.78 553.82 2221.22 4112.2 3080.98
+        3761.36 2160.54 1460.78 5589.4 4287.28 2889.86 2325.54 -136.88 562.16 -581.46 446.06 1262 -420.2 -251.68
+        -1597.04 -800.64 -124.34 -677.14 120.78 -43.5
+        """,
+        # B_0
+        """
+        -6125.88 12874.16 5641.53 8957.26 0 -8957.26 -5641.53 -12874.16 6125.88 8052.6 9611.52 -4168.4 1751.17 0
+        -1751.17 4168.4 -9611.52 -8052.6 21037.14 -10235.69 23821.8 18369.09 0 -18369.09 -23821.8 10235.69 -21037.14
+        15368.9 -6009.45 53753.24 -126565.5 0 126565.5 -53753.24 6009.45 -15368.9 18514.66 -1872.62 20760.86
+        -299616.8
+        """,
+    ),
+    4: (
+        # H0
+        """
+        730386.6 -155414.16 -79501.64 -9381.22 7804.63 13962.36 7303.26 5363.22 -2755.6 -6322.27 -5101.45 -4575.18
+        -3129.53 -492.74 1296.1 -833.69 335.78 2114.53 2225.34 1405.1 1179.32 1975.51 2289.22 2562.65 2175.07
+        1587.44 774.35 -327.35 2089.87 2068.75 1923.6 1545.08 883.87 -37.83 -625.96 -404.84
+        """,
+        # L0
+        """
+        437625 181160.301 43813.2 -32971.37 -37694.87 -7061.29 1107.62 8224.42 7522.72 2921.58 2524.01 -503.37
+        -1601.26 -1354.28 -87.01
+        """,
+        # L1, twice `down`
+        """
+        212037.44 177365.12 144549.98 90580.14 68065.84 21906.6 14385.12 3955.66 -11091.7 -20229.38 -16485.68
+        -17508.18 -18847.44 -12604.2 -3530.64 -9637.22 -9056.92 -7431.7 -1777.48 3184.68 3175.78 553.82 2221.22
+        4112.2 3080.98 3761.36 2160.54 1460.78 5589.4 4287.28 2889.86 2325.54 -136.88 562.16 -581.46 446.06 1262
+        -420.2 -251.68 -1597.04 -800.64 -124.34 -677.14 120.78 -43.5
+        """,
+        # B_0
+        """
+        -811.25 3910.35 1346.27 747.01 0 -747.01 -1346.27 -3910.35 811.25 4445.16 4456.54 -3774.07 -365.22 0 365.22
+        3774.07 -4456.54 -4445.16 12316.98 -5872.43 8258.16 -22522.68 0 22522.68 -8258.16 5872.43 -12316.98 13955.88
+        -2876.08 39442.28 -110569.07 0 110569.07 -39442.28 2876.08 -13955.88 14179.45 8526.76 53605.64 -176841.93
+        """,
+        # B_1
+        """
+        0 828.47 57.11 -40.11 -4667.09 -8087.19 -14807.61 -8620.44 3122.15 -828.47 0 974.8 6971.9 2086.56 -2329.88
+        4481.49 -14917.5 -8620.44 -57.11 -974.8 0 12145.54 24427.29 -50797.06 -32785.87 4481.49 -14807.61 40.11
+        -6971.9 -12145.54 0 151055.56 82495.5 -50797.06 -2329.88 -8087.19 4667.09 -2086.56 -24427.29 -151055.56
+        """,
+    ),
+    6: (
+        # H0
+        """
+        813802 -114358.63 -70276.79 -9810.51 -6734.82 -2900.81 12612.27 6316.53 -2438.12 -3500.17 -806.39 -1335.42
+        -1714.84 -1130.93 -334.29
+        """,
+        # L0
+        """
+        403041.48 159255.7 55869.82 -38482.15 -15512.46 3416.14
+        """,
+        # L1, twice `down`
+        """
+        201930.8 163392.36 128526.66 79627.86 65540.76 27934.92 20059.76 8212 -13222.34 -10465.62 -19241.08
+        -18888.64 -7756.24 -4898.34 1708.08
+        """,
+        # B_0
+        """
+        2776.43 -9869.04 -10218.52 0 10218.52 9869.04 -2776.43 4961.94 -8930.64 -30753.56 0 30753.56 8930.64
+        -4961.94 10266.99 11898.59 -82264.45 0 82264.45 -11898.59 -10266.99 14553.99 27551.55 -117322.97
+        """,
+        # B_1
+        """
+        -3432.49 -3584.61 10477.17 7904.07 4590.34 -1280 -11669.82 -6408.15 -19775.07 14863.05 44356.47 -8539.65
+        -11611.95 -2857.23 -731.41 -40842.11 -48190.57 94542.02 53941.39 -39305.73 -1820.78 11243.21 -2282.19
+        -122272.3
+        """,
+    ),
+}
+"""H0, L0, L1 and the bands without their turned copies, in millionths: `_even` and `_odd` unfold them."""

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Launcher, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, sums_around
 from simdtex.model.sample import Candidates
-from simdtex.model.sums import sums_around
 from simdtex.ops.neighbourhood import Field
 
 CAP = 4.0

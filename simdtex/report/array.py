@@ -19,8 +19,7 @@ from simdtex import schedules
 from simdtex.jobs.array import Execution
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.report.page import Figure, Section, write_report
-from simdtex.report.plots import legend, new_figure, tidy
+from simdtex.report.page import Figure, Section, legend, new_figure, tidy, write_report
 from simdtex.report.sheet import TEXT, contact_sheet
 from simdtex.report.tables import Table, duration_text, seconds_text
 from simdtex.schedules.schedule import Masked, Setting

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of one synthesis: the picture, the use of its sample, and the source map."""
+"""The reports of one synthesis and of one classification."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from simdtex.experiments.ensemble.copies import WINDOW
+from simdtex.experiments.ensemble import WINDOW
 from simdtex.io.image import to_display
-from simdtex.model.colours import source_colours, use_colours
+from simdtex.model.display import label_colours, source_colours, temperature_colours, use_colours
 from simdtex.model.regularity import lattice_sentence
-from simdtex.model.use import counts, use_of
+from simdtex.model.source_map import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
 from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
 from simdtex.report.tables import Table
@@ -163,3 +163,99 @@ def _frame(picture: Picture, piece: dict[str, Any], factor: int) -> None:
     inside = picture[top : top + piece["rows"] * factor, left : left + piece["cols"] * factor]
     inside[[0, -1]] = FRAME
     inside[:, [0, -1]] = FRAME
+
+
+UNTOLD = np.full(3, 128, np.uint8)
+"""The colour of pixels whose true label is not known."""
+
+
+def write_classification(
+    folder: str | os.PathLike[str],
+    image: NDArray[Any],
+    labels: NDArray[np.uint8],
+    output: Output,
+    truth: NDArray[Any] | None = None,
+    command: str = "",
+) -> None:
+    """Write the report of a classification: ``index.html``, PNG pictures, ``results.json``.
+
+    Parameters
+    ----------
+    folder : path
+        See `simdtex.report.page.check_folder`.
+    image : (rows, cols[, bands]) array
+    labels : (rows, cols) uint8 array
+        The labels, 0 unknown.
+    output : simdtex.run.Output
+        The output of `simdtex.classify`.
+    truth : (rows, cols) array of integers, optional
+        The true labels, 0 to 255; a label of no class where the true one is unknown.
+    command : str
+        The command line, if there is one.
+    """
+    statistics, fit = output.statistics, output.fit
+    assert fit is not None
+    classes = statistics["classes"]
+    names, count, colours = [one["name"] for one in classes], len(classes), label_colours(256)
+    number = np.full(256, count)  # of the class of each label
+    number[[one["label"] for one in classes]] = np.arange(count)
+    picture = to_display(image.reshape(*image.shape[:2], -1))
+    shown = picture[..., :3] if picture.shape[-1] > 2 else np.repeat(picture[..., :1], 3, 2)
+    sheet = [("the picture", shown), ("the labels", colours[labels])]
+    if truth is not None:
+        known = number[truth][..., None] < count
+        sheet.append(("the truth", np.where(known, colours[truth], UNTOLD)))
+    legend = [
+        {
+            **{"Label": str(one["label"]), "Class": one["name"]},
+            **{"Colour": _hex(colours[one["label"]]), "Share": f"{one['share']:.1%}"},
+        }
+        for one in classes
+    ]
+    pictures = contact_sheet(sheet, columns=len(sheet))
+    caption = "The picture and its labels. Black is unknown; grey is where the truth is not known."
+    fits = [(name, temperature_colours(fit[..., c])) for c, name in enumerate(names[1:])]
+    limit = statistics["options"]["unknown"]
+    meaning = (
+        "The fit of each class, from 0 (near black) to 1 (pale yellow). It is the probability that a texture of the "
+        "class differs from its samples as much as the picture does around a pixel, within its segment. Where that of "
+        f"the label is below {limit:g}, the pixel is unknown."
+    )
+    sections = [
+        Section("The labels", [Figure("labels.png", pictures, caption), Table("The classes", legend)]),
+        Section(
+            "How well each class fits",
+            [Figure("fit.png", contact_sheet(fits, columns=min(4, len(fits))), meaning)],
+        ),
+    ]
+    results: dict[str, Any] = {"shape": labels.shape, "statistics": statistics}
+    if truth is not None:
+        confusion = confusion_matrix(number[labels], number[truth], count)
+        rows = [
+            {"True class": name, **{other: str(n) for other, n in zip(names, line, strict=True)}}
+            for name, line in zip(names, confusion, strict=True)
+            if line.any()
+        ]
+        right = float(np.trace(confusion) / max(1, confusion.sum()))
+        note = f"Pixels of each true class by their label; {right:.1%} are right."
+        sections.append(Section("Confusion", [Table("The confusion matrix", rows, note)]))
+        results |= {"confusion": confusion, "accuracy": right}
+    job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
+    settings = [{"What": k, "Value": str(v)} for k, v in job.items()]
+    sections.append(Section("The job", [Table("The run and its options", settings)]))
+    lead = f"{labels.shape[1]} x {labels.shape[0]} pixels and {count - 1} classes, on {statistics['device']}."
+    write_report(folder, "Which texture is where", lead, sections, results, command)
+
+
+def _hex(colour: NDArray[np.uint8]) -> str:
+    return "#" + bytes(colour).hex()
+
+
+def confusion_matrix(labels: NDArray[Any], truth: NDArray[Any], count: int) -> NDArray[np.int64]:
+    """Return the number of pixels of each true class (rows) with each label (columns), (count, count).
+
+    Classes are numbered from 0; pixels whose true class is ``count`` or more are left out.
+    """
+    known = truth < count
+    pairs = truth[known].astype(np.int64) * count + labels[known]
+    return np.bincount(pairs, minlength=count * count).reshape(count, count)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid, coloring_of_layers, parts_of
-from simdtex.ops.coloring import coloring, lattice_plan
+from simdtex.ops.sites import coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.model.lattice import Grid
-from simdtex.ops.luby import luby
+from simdtex.ops.sites import luby
 from simdtex.schedules.partition import neighbourless
 from simdtex.schedules.schedule import Active, Info, Setting
 

@@ -21,10 +21,7 @@ from simdtex.methods.classifier.model import UNITS, Model, Null, Region, learn, 
 from simdtex.methods.classifier.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
-from simdtex.ops.exemplars import exemplars
-from simdtex.ops.features import features
-from simdtex.ops.potts import WEIGHTS, potts
-from simdtex.ops.window import gaussian, window
+from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Labelling, Output
 

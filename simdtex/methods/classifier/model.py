@@ -19,9 +19,7 @@ from simdtex.methods.classifier.options import Options
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.model.scale import Scale
-from simdtex.ops.exemplars import LOGS, Exemplars, exemplars, stacked
-from simdtex.ops.features import SIXTEENTHS, features
-from simdtex.ops.window import gaussian, window
+from simdtex.ops.classes import LOGS, SIXTEENTHS, Exemplars, exemplars, features, gaussian, stacked, window
 
 SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 """Standard deviations of the Gaussians that smooth the levels, pixels."""

@@ -19,11 +19,11 @@ from simdtex.checkpoint import like
 from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, rule
 from simdtex.methods.mrf.record import Record, output
 from simdtex.model.lattice import Grid
-from simdtex.ops import active
 from simdtex.ops.commit import commit
 from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Relaxation, relax, relax_apart
+from simdtex.ops.sites import survey
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.use import use, use_penalty
@@ -100,7 +100,7 @@ class Run(Lattices):
 
 def opened(level: Level, field: Field) -> State:
     """Return the state of a level before its first sweep."""
-    count, total = active.survey(level.machine, level.grid, field.temperature)
+    count, total = survey(level.machine, level.grid, field.temperature)
     penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, None)
     memory = level.schedule.init(level.setting)
     return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)
@@ -115,7 +115,7 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
     """
     free = not state.active
     field, memory, chosen = swept(level, state, free, watch)
-    count, total = active.survey(level.machine, level.grid, field.temperature)
+    count, total = survey(level.machine, level.grid, field.temperature)
     penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, state.penalty)
     cooling, freed = state.cooling + (not free), state.free + free
     return State(*field, penalty, memory, level.number, cooling, freed, count, total), chosen

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, Planes
+from simdtex.model.given import Given, Planes, Soft
 from simdtex.model.sample import Sample
-from simdtex.model.soft import Soft
 from simdtex.options import SMALLER
 
 

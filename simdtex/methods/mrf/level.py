@@ -20,12 +20,13 @@ from simdtex.model.given import around
 from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES
 from simdtex.model.sample import BLOCK, Candidates, Places
-from simdtex.ops import active, lcpdf
+from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed, Relaxation
+from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import square_of
 from simdtex.ops.use import FairUse
 from simdtex.schedules import Setting
@@ -387,12 +388,12 @@ class Active:
         """Return the active sites of a list, found on the machine."""
         known, machine = self._level.lists, self._level.machine
         if id(sites) not in known:
-            begins, firsts = active.stretches(starts)
+            begins, firsts = stretches(starts)
             known[id(sites)] = sites, machine.put(sites), machine.put(begins), firsts
         _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
-        return active.among(machine, here, begins, firsts, self._plane)
+        return among(machine, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:

@@ -18,13 +18,12 @@ from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.level import number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, planes
+from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
-from simdtex.model.soft import Soft
 from simdtex.ops.finish import around
 from simdtex.options import within_32_bits
 

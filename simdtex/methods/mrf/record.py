@@ -18,7 +18,7 @@ from simdtex.methods.mrf.explain import Moment, explained
 from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid
-from simdtex.model.use import effective_use
+from simdtex.model.source_map import effective_use
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Listed, most_listed
 from simdtex.run import Callback, OutputWithSource, Relaxing, Stage

@@ -17,8 +17,8 @@ from simdtex.machine.interface import Machine
 from simdtex.methods.mrf.algorithm import Run, counted, opened, sweep, swept
 from simdtex.methods.mrf.level import Level, State
 from simdtex.model.lattice import Grid
-from simdtex.ops import active
 from simdtex.ops.neighbourhood import Field
+from simdtex.ops.sites import survey
 from simdtex.ops.start import start
 from simdtex.schedules.schedule import Trimmed
 
@@ -131,7 +131,7 @@ def _entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Le
 
 
 def _tally(level: Level, field: Field, grid: Grid) -> Tally:
-    return Tally(counted(level, field, grid), *active.survey(level.machine, grid, field.temperature))
+    return Tally(counted(level, field, grid), *survey(level.machine, grid, field.temperature))
 
 
 def _off(machine: Machine, field: Field) -> Field:

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.multires.analysis import Analysis, analyse
-from simdtex.methods.multires.levels import (
+from simdtex.methods.multires.analysis import (
+    Analysis,
+    analyse,
     copied,
     first_launch,
     lattice,
@@ -29,9 +30,9 @@ from simdtex.methods.multires.levels import (
     structure_of,
 )
 from simdtex.methods.multires.options import Options
-from simdtex.model.use import effective_use
+from simdtex.model.source_map import effective_use
 from simdtex.ops.candidates import Sampled, candidates
-from simdtex.ops.laplacian import laplacian_collapse
+from simdtex.ops.pyramids import laplacian_collapse
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource, Sampling, Stage, paced
 

@@ -18,7 +18,7 @@ from simdtex.driver import check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
-from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, histograms, spliced
+from simdtex.methods.pyramid.matcher import Histograms, Sorted, averaged, histograms, spliced
 from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of

@@ -8,7 +8,7 @@ from functools import partial
 
 from numpy.typing import ArrayLike
 
-from simdtex.ops.steerable_filters import ORIENTATIONS
+from simdtex.ops.steerable import ORIENTATIONS
 from simdtex.options import Choice, Other, Whole, check, documented, option, real_array
 
 KINDS = ("steerable", "laplacian")

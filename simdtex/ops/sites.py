@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colouring of a lattice so that no two neighbours share a colour: sets of i.i.d. sites, equation (14).
+"""Sets of sites, found on the machine: active sites, colours, and random sets without neighbours, equation (14).
 
-A colour is a formula of a site's row and column, except along the seam of a torus that cuts through the pattern; a list
-holds the colours of those sites. So any window of a lattice is coloured without the rest of the lattice.
+Active sites, with a temperature above 0, are counted and listed without a copy to the host. The colour of a site is a
+formula of its row and column, so that no two neighbours share a colour, except along the seam of a torus that cuts
+through the pattern; a list holds the colours of those sites. So any window of a lattice is coloured without the rest of
+it. A random maximal set of sites without neighbours takes the rounds of Luby (1986).
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import (
     Grid,
     Sublattice,
@@ -22,6 +25,62 @@ from simdtex.model.lattice import (
     coloring_sublattice,
     neighbourhood_offsets,
 )
+
+CHUNK = 256
+"""The most sites that a work-item counts."""
+
+
+@Operation
+def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[int, int]:
+    """Return the number of active sites, and the sum of their temperatures in 1/1024."""
+    if machine is None:
+        t = grid.view(temperature)
+        return int((t > 0).sum()), int(t.sum(dtype=np.int64))
+    stretches = -(-grid.size // CHUNK)
+    both = machine.empty((2, stretches), np.int32)
+    machine.launch("active_survey", (stretches,), grid.struct, temperature, CHUNK, stretches, both)
+    count, total = machine.get(both).sum(1, dtype=np.int64)
+    return int(count), int(total)
+
+
+def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the stretches, of at most `CHUNK` sites, of the groups of a list, which begin at ``starts``.
+
+    The first result is the position of each stretch's first site, and the end of the list, (stretches + 1,); the second
+    is the number of the first stretch of each group, and the number of stretches, (groups + 1,).
+    """
+    pieces = -(-np.diff(starts) // CHUNK)
+    firsts = np.concatenate([[0], np.cumsum(pieces)])
+    within = np.arange(firsts[-1]) - np.repeat(firsts[:-1], pieces)
+    begins = np.repeat(starts[:-1], pieces) + within * CHUNK
+    return np.concatenate([begins, starts[-1:]]).astype(np.int32), firsts
+
+
+@Operation
+def among(
+    machine: Launcher | None, sites: Array, starts: Array, firsts: NDArray[np.int64], temperature: Array
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the active sites of a list in its order, and the bounds of its groups among them.
+
+    ``sites`` (S,) int32 are pixel indices, group after group; ``starts`` and ``firsts`` come from `stretches`.
+    """
+    if machine is None:
+        active = temperature.ravel()[sites] > 0
+        return sites[active], np.concatenate([[0], np.cumsum(active)])[starts[firsts]]
+    stretches = starts.size - 1
+    counts = machine.empty((stretches,), np.int32)
+    machine.launch("active_count", (stretches,), sites, starts, stretches, temperature, counts)
+    before = np.concatenate([[0], np.cumsum(machine.get(counts), dtype=np.int64)])
+    if before[-1] < sites.size:
+        kept = machine.empty((int(before[-1]),), np.int32)
+        machine.launch(
+            "active_keep",
+            (stretches,),
+            *(sites, starts, stretches, temperature, machine.put(before[:-1].astype(np.int32)), kept),
+        )
+        sites = kept
+    return sites, before[firsts]
+
 
 UNCOLORED = -1
 
@@ -206,3 +265,48 @@ def _used(
     site = site[~np.isin(site, seam)]
     used[_cosets(pattern, *np.divmod(site, cols))] = True
     return used
+
+
+UNDECIDED, IN, OUT = 0, 1, 2
+
+ROUNDS = 4
+"""Rounds between two checks for the end; further rounds change nothing."""
+
+
+@Operation
+def luby(
+    machine: Launcher | None, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
+) -> NDArray[np.uint8]:
+    """Return the members of the set, (rows, cols) uint8, on the host, where a schedule needs them.
+
+    ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
+    priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
+    """
+    sites = grid.size
+    if machine is None:
+        draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
+        host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
+        while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
+            r = grid.flat.neighbours(undecided, offsets)
+            there = r >= 0
+            beaten = there & (host[r] == IN)
+            above = (draws[r] > draws[undecided]) | ((draws[r] == draws[undecided]) & (r > undecided))
+            rival = there & (host[r] == UNDECIDED) & above
+            host[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
+        return np.asarray(host == IN, np.uint8).reshape(active.shape)
+    priority = machine.empty((sites,), np.uint32)
+    state, following = (machine.empty(grid.shape, np.uint8) for _ in range(2))
+    machine.launch(
+        "luby_priority",
+        (sites,),
+        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
+    )
+    while True:
+        for _ in range(ROUNDS):
+            machine.launch(
+                "luby_round", (sites,), grid.flat.struct, offsets, offsets.shape[0], priority, state, following
+            )
+            state, following = following, state
+        host = machine.get(state)
+        if not (host == UNDECIDED).any():
+            return np.asarray(host == IN, np.uint8)
