@@ -9,7 +9,7 @@ from scipy.stats import f
 from simdtex.driver import drive
 from simdtex.methods.classifier import Options, model
 from simdtex.methods.classifier.algorithm import Plan
-from simdtex.methods.classifier.model import LEAST, MEANS, Region, experts_of, learn, windowed
+from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS, MEANS, Region, experts_of, learn, windowed
 from simdtex.model.pictures import Pictures
 from simdtex.model.scale import Scale
 from simdtex.ops.classes import gaussian
@@ -164,7 +164,9 @@ def test_a_small_sample_has_fewer_levels_and_a_tiny_one_is_refused():
     assert run(picture)[1].statistics["options"]["levels"] == 1
     large = whole(stripes((70, 70)))
     assert run(picture, [large])[1].statistics["options"]["levels"] == 2
-    with pytest.raises(ValueError, match=f"'class 0' has 4 whole neighbourhoods of 5x5 pixels, and {LEAST} are needed"):
+    with pytest.raises(
+        ValueError, match=f"'class 0' has 4 whole neighbourhoods of 5x5 pixels, and {FEWEST_NEIGHBOURHOODS} are needed"
+    ):
         run(picture, [whole(stripes((6, 6)))])
 
 
@@ -269,7 +271,7 @@ def test_covariance_and_inverse_are_those_of_linear_algebra():
 def test_the_covariance_of_a_class_has_its_share_that_of_all_and_the_drift():
     rng = np.random.default_rng(3)
     selves = [
-        model.Self(np.zeros(2), rng.integers(0, 40000, (2, 50)), rng.normal(0, scale, (parts, 2)))
+        model.OwnDistances(np.zeros(2), rng.integers(0, 40000, (2, 50)), rng.normal(0, scale, (parts, 2)))
         for scale, parts in ((0.2, 4), (0.4, 4), (0.1, 1))
     ]
     nulls, freedom = model._nulls(selves)

@@ -163,7 +163,7 @@ def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size
 
 def test_sites_are_looked_at_piece_by_piece(monkeypatch):
     whole = [colour(order, 30, 37, True) for order in (8, 18)]
-    monkeypatch.setattr(module, "TOGETHER", 500)
+    monkeypatch.setattr(module, "NEIGHBOURS_AT_ONCE", 500)
     module.lattice_plan.cache_clear()
     assert_same_bits([colour(order, 30, 37, True) for order in (8, 18)], whole)
 

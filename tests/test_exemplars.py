@@ -6,7 +6,7 @@ from cases import REFERENCE, assert_same_bits, opencl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.ops.classes import TOGETHER, exemplars, stacked
+from simdtex.ops.classes import EXEMPLAR_MULTIPLE, exemplars, stacked
 
 
 def run(machine, features, classes):
@@ -58,7 +58,7 @@ def test_the_widest_neighbourhoods_are_exact(machine):
 
 
 def test_classes_are_filled_up_by_their_own_last_exemplar():
-    known = stacked([np.ones((3, 2), np.float32), np.full((TOGETHER + 1, 2), 2, np.float32)])
-    assert known.starts.tolist() == [0, TOGETHER, 3 * TOGETHER]
-    assert (known.doubled[:TOGETHER] == -2).all() and (known.doubled[TOGETHER:] == -4).all()
-    assert known.squares.tolist() == [2.0] * TOGETHER + [8.0] * 2 * TOGETHER
+    known = stacked([np.ones((3, 2), np.float32), np.full((EXEMPLAR_MULTIPLE + 1, 2), 2, np.float32)])
+    assert known.starts.tolist() == [0, EXEMPLAR_MULTIPLE, 3 * EXEMPLAR_MULTIPLE]
+    assert (known.doubled[:EXEMPLAR_MULTIPLE] == -2).all() and (known.doubled[EXEMPLAR_MULTIPLE:] == -4).all()
+    assert known.squares.tolist() == [2.0] * EXEMPLAR_MULTIPLE + [8.0] * 2 * EXEMPLAR_MULTIPLE

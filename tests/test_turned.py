@@ -8,7 +8,7 @@ import pytest
 from cases import texture
 
 import simdtex
-from simdtex.model.pictures import MOST, Pictures, copy_of, turned
+from simdtex.model.pictures import MOST_COPIES, Pictures, copy_of, turned
 
 
 @pytest.mark.parametrize("shape", [(5, 8), (7, 7), (1, 4)])
@@ -59,7 +59,7 @@ def test_only_what_is_wanted_is_made():
 def test_too_many_copies_are_refused():
     picture = Pictures((texture((9, 14))[..., None],) * 3)
     rotation, scale = (np.arange(40) % 8 * 45.0)[None], 2.0 ** ((np.arange(40) // 8 - 2) / 2)[None]
-    with pytest.raises(ValueError, match=f"120 different copies .* round .* {MOST} or fewer"):
+    with pytest.raises(ValueError, match=f"120 different copies .* round .* {MOST_COPIES} or fewer"):
         turned(picture, np.full((3, 1, 40), 1 / 3), rotation, scale)
     with pytest.raises(ValueError, match="have no number; leave them out"):
         turned(picture, np.full((3, 1, 40), 1 / 3), rotation * np.nan, scale)

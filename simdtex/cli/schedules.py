@@ -15,7 +15,7 @@ from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import DEVICE, QUIET, given, job_options, output_option
 from simdtex.cli.places import FOLDER, READ
-from simdtex.schedules import TOGETHER
+from simdtex.schedules import PARALLEL
 
 SCHEDULES = (
     "coloring,coloring-fixed,luby,checkerboard,raster,random-scan,"
@@ -35,7 +35,7 @@ PICTURE_SWEEPS = 50
 @click.option(
     "--schedule",
     "names",
-    default=",".join(TOGETHER),
+    default=",".join(PARALLEL),
     metavar="A,B,...",
     help="Compare these schedules.  [those that relax many sites in a step]",
 )

@@ -201,7 +201,7 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
 
 def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
-    from simdtex.experiments.ensemble import LEAST
+    from simdtex.experiments.ensemble import LEAST_IMAGE_SIDE
     from simdtex.options import LARGEST
 
     if material.several or material.channel_axis is not None:
@@ -209,7 +209,9 @@ def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> Non
     if not material.known:
         raise ValueError("--report requires a training image without unknown cells; leave it out")
     given = material.pixels if known is None else [*material.pixels, known]
-    if not material.deep and min(*shape, *material.pixels[0].shape) < LEAST:
-        raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
+    if not material.deep and min(*shape, *material.pixels[0].shape) < LEAST_IMAGE_SIDE:
+        raise ValueError(
+            f"--report requires {LEAST_IMAGE_SIDE}x{LEAST_IMAGE_SIDE} pixels or more; give a larger size, or leave it out"
+        )
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")

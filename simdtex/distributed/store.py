@@ -59,7 +59,7 @@ from simdtex.ops.neighbourhood import Confidences, Field
 FORMAT = 8
 """Format of the store; all other formats are rejected."""
 
-TOGETHER = 2**22
+TALLIES_AT_ONCE = 2**22
 """The most numbers of tallies that are read together."""
 
 NODES = ("zarr.json", ".zarray", ".zgroup", ".zattrs", ".zmetadata")
@@ -389,7 +389,7 @@ class Store:
     def total(self, turn: Turn) -> Tally:
         """Return the sum of the tallies of all tasks; many rows are read together, which is faster."""
         tally = self._at(f"work/tally{turn.number}")
-        some = max(1, TOGETHER // tally.shape[1])
+        some = max(1, TALLIES_AT_ONCE // tally.shape[1])
         rows = (tally[first : first + some] for first in range(0, tally.shape[0], some))
         active, temperature_sum, *counts = sum(part.sum(0) for part in rows)
         return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))

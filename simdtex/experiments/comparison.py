@@ -296,7 +296,7 @@ class Comparison:
 def compare(
     sample: ArrayLike,
     shape: tuple[int, int],
-    schedules: Sequence[str | Schedule] = known.TOGETHER,
+    schedules: Sequence[str | Schedule] = known.PARALLEL,
     *,
     seeds: Sequence[int] = (1, 2, 3),
     channel_axis: int | None = None,

@@ -460,7 +460,7 @@ def _means(distances: Floats) -> tuple[float, float]:
     return float(pairs.mean()), float(distances[-1, :-1].mean())
 
 
-LEAST = 4
+LEAST_IMAGE_SIDE = 4
 """Smallest side of an image, pixels."""
 
 MOST_LAG = 100  # of variograms and connectivity functions, pixels; half of the shortest side is less in small images
@@ -555,8 +555,10 @@ def summary(
     known = categories_of(image, categories)
     points = _checked_data(data, array.shape[1:])
     shortest = min(*array.shape[1:], *image.shape)
-    if shortest < LEAST:
-        raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
+    if shortest < LEAST_IMAGE_SIDE:
+        raise ValueError(
+            f"an image has a side of {shortest} pixels: give at least {LEAST_IMAGE_SIDE} x {LEAST_IMAGE_SIDE}"
+        )
     moderate("an image", array, image)
     lag = min(shortest // 2, MOST_LAG)
     images, number = [*array, image], len(array)

@@ -77,7 +77,7 @@ def torus_energy(temperature: float, rows: int, cols: int) -> float:
     return float(-(total.imag / total.real / step / (rows * cols) + 1 / tanh(2 * coupling)))
 
 
-AT_ONCE = 2**22
+RELAXATIONS_AT_ONCE = 2**22
 """The most relaxations in one launch, which bounds its time."""
 
 HOST, MEASURED = 24, 40
@@ -277,7 +277,7 @@ class _Run:
 
     def _relax(self, info: schedules.Info) -> None:
         """Relax the sites of a step; all old values are read before the first new one is written."""
-        grid, most = replace(self.grid, tile=self.schedule.tile), max(1, AT_ONCE // self.chains)
+        grid, most = replace(self.grid, tile=self.schedule.tile), max(1, RELAXATIONS_AT_ONCE // self.chains)
         relaxed = []
         for k in range(0, info.sites.size, most):
             sites = self.machine.put(info.sites[k : k + most])
@@ -289,7 +289,7 @@ class _Run:
 
     def _relax_single(self) -> None:
         """Execute the postponed steps."""
-        most = min(QUEUE, max(1, 4 * AT_ONCE // self.chains))
+        most = min(QUEUE, max(1, 4 * RELAXATIONS_AT_ONCE // self.chains))
         for k in range(0, len(self.single), most):
             part = self.machine.put(np.array(self.single[k : k + most], np.uint32).view(np.int32))
             self.spins = ising_sequence(

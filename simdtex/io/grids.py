@@ -252,8 +252,10 @@ def read_grid(
             with explained(os.fspath(path), "the grid", "a grid"):
                 grid = CartesianGrid(*library(path, most))
         else:
-            found, columns, sides, lies = (_sgems if file.peek().startswith(MAGIC) else _gslib)(file, most)
-            grid = CartesianGrid(dict(zip(_apart(found), columns.reshape(-1, *sides[::-1]), strict=True)), *lies)
+            found, columns, sides, georeference = (_sgems if file.peek().startswith(MAGIC) else _gslib)(file, most)
+            grid = CartesianGrid(
+                dict(zip(_apart(found), columns.reshape(-1, *sides[::-1]), strict=True)), *georeference
+            )
         names = list(grid.values) if variables is None else list(variables)
         if strange := [name for name in names if name not in grid.values]:
             raise ValueError(f"it has no variable {strange[0]!r}: give one of {', '.join(grid.values)}")
@@ -315,7 +317,7 @@ def _gslib(file: BufferedReader, most: int) -> Read:
     at, size = (found[3:6], found[6:9]) if own else (found[6:9], found[3:6])
     if not own:  # a corner; in decimals, since a binary sum would change 0.1
         at = [str(Decimal(corner) + Decimal(width) / 2) for corner, width in zip(at, size, strict=False)]
-    lies = frame(tuple(map(float, at)) or (0.0,) * 3, tuple(map(float, size)) or (1.0,) * 3)
+    georeference = frame(tuple(map(float, at)) or (0.0,) * 3, tuple(map(float, size)) or (1.0,) * 3)
     variables = len(names)
     if realisations > 1:
         names = [f"{name}__real{k}" for k in range(realisations) for name in names]
@@ -424,7 +426,7 @@ def _sgems(file: BufferedReader, most: int) -> Read:
     names = [word() for _ in range(variables)]
     if not prod(sides) * variables:
         raise ValueError(f"it has {' x '.join(map(str, sides))} cells and {variables} properties: save one with values")
-    lies = frame(origin, size)
+    georeference = frame(origin, size)
     count = prod(sides) * variables
     check_size(count, 4 * count, most)
     if length - file.tell() < 4 * count:
@@ -477,7 +479,7 @@ def write_grid(
     centre, see `read_grid`.
     """
     arrays: dict[str, np.ma.MaskedArray[Any, Any]] = {str(name): np.ma.asanyarray(one) for name, one in values.items()}
-    lies = check_grid(path, arrays.values(), origin, cell)
+    georeference = check_grid(path, arrays.values(), origin, cell)
     shapes = {array.shape for array in arrays.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) not in (2, 3):
         raise ValueError(f"the variables have the shapes {sorted(shapes)}; give (nz, ny, nx) or (ny, nx), one for all")
@@ -485,7 +487,7 @@ def write_grid(
         if not name.strip() or not name.isprintable():
             raise ValueError(f"a variable has the name {name!r}; give one of letters, digits and signs")
     sides = (1, *next(iter(shapes)))[-3:]
-    whole = Frame(*((*one, last)[:3] for one, last in zip(lies, (0.0, 1.0), strict=True)))
+    whole = Frame(*((*one, last)[:3] for one, last in zip(georeference, (0.0, 1.0), strict=True)))
     layers = {name: np.ma.MaskedArray(one, np.isnan(one.data)).reshape(sides) for name, one in arrays.items()}
     if _suffix(path) == ".tif":
         if sides[0] > 1:
@@ -505,14 +507,14 @@ def check_grid(
     if _suffix(path) not in SUFFIXES:
         raise ValueError(f"{target} names no format of grids: end its name in one of {', '.join(SUFFIXES)}")
     check_target(target)
-    lies = frame(origin, cell)
+    georeference = frame(origin, cell)
     if _suffix(path) == ".tif":
         require("rasters", "rasterio")
         return lies
     for array in arrays:
         _check_values(target, np.ma.asanyarray(array))
     if _suffix(path) == ".sgems":
-        for axis, at, size in zip("xyz", *lies, strict=False):
+        for axis, at, size in zip("xyz", *georeference, strict=False):
             if not abs(float(np.float32(at)) - at) <= size / 1000:
                 raise ValueError(
                     f"{target} would hold {axis} = {at} as a 32-bit float, more than a thousandth of a cell beside it: "
@@ -547,10 +549,10 @@ def _suffix(path: PathLike) -> str:
     return Path(path).suffix.lower()
 
 
-def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame) -> Iterator[bytes]:
+def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference: Frame) -> Iterator[bytes]:
     """Yield the text of a grid."""
-    sizes = [Decimal(repr(size)) for size in lies.cell]
-    corners = [Decimal(repr(at)) - size / 2 for at, size in zip(lies.origin, sizes, strict=True)]
+    sizes = [Decimal(repr(size)) for size in georeference.cell]
+    corners = [Decimal(repr(at)) - size / 2 for at, size in zip(georeference.origin, sizes, strict=True)]
     yield f"{' '.join(map(str, (*sides, *sizes, *corners)))}\n{len(layers)}\n".encode()
     yield "".join(f"{name}\n" for name in layers).encode()
     for layer in range(sides[2]):
@@ -566,7 +568,7 @@ def _words(row: np.ma.MaskedArray[Any, Any]) -> list[str]:
     return found
 
 
-def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame) -> Iterator[bytes]:
+def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference: Frame) -> Iterator[bytes]:
     """Yield the parts of a binary grid of SGeMS."""
 
     def word(text: str) -> bytes:
@@ -574,7 +576,7 @@ def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame)
         return struct.pack(">I", len(data)) + data
 
     yield MAGIC + word("Cgrid") + word("grid") + struct.pack(">i", 100)
-    yield struct.pack(">3I6fI", *sides, *lies.cell, *lies.origin, len(layers))
+    yield struct.pack(">3I6fI", *sides, *georeference.cell, *georeference.origin, len(layers))
     yield b"".join(map(word, layers))
     for array in layers.values():
         yield array.astype(">f4").filled(NO_DATA).tobytes()

@@ -140,17 +140,17 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
     name, target = os.fspath(path), Path(path)
     if target.is_dir():
         with explained(name, "the volume"):
-            values, lies = _slices(target, max_pixels_or_default(max_pixels))
+            values, georeference = _slices(target, max_pixels_or_default(max_pixels))
     else:
         with reading(path, "the volume", max_pixels, kind="a volume") as most, quiet():
-            values, lies = _READERS[target.suffix.lower()](target, most)
+            values, georeference = _READERS[target.suffix.lower()](target, most)
     found: dict[str, Array] = {}
     for key, one in values.items():
         if one.ndim not in (3, 4) or one.size == 0 or one.dtype.kind not in "buif":
             raise ValueError(f"{name} has the shape {one.shape} and the type {one.dtype}: give numbers of three axes")
         parts = [one] if one.ndim == 3 else np.moveaxis(one, -1, 0)
         found |= {key if len(parts) == 1 else f"{key}_{k}": native(part) for k, part in enumerate(parts)}
-    return CartesianGrid(found, *lies)
+    return CartesianGrid(found, *georeference)
 
 
 _Read = tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]

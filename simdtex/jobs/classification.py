@@ -17,7 +17,7 @@ from simdtex.driver import drive, execute
 from simdtex.jobs.inputs import check_mask, check_picture, is_several
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
-from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
+from simdtex.methods.classifier.model import BANDS, CLASSES, FEWEST_NEIGHBOURHOODS, Model, Region, learn
 from simdtex.methods.classifier.options import Options
 from simdtex.methods.typed_options import ClassifierOptions, ClassifyOptions
 from simdtex.model.pictures import Mask, check_alike, completed
@@ -192,8 +192,8 @@ def _painted(painted: Sequence[tuple[NDArray[Any], Mask, Any]]) -> dict[int, lis
     _check_count(len(regions), painted[0][0].shape[-1])
     found = dict(sorted(regions.items()))
     for label, own in found.items():
-        if (count := sum(int(one.sites.sum()) for one in own)) < LEAST:
-            raise ValueError(f"label {label} is painted on {count} pixels; paint {LEAST} or more")
+        if (count := sum(int(one.sites.sum()) for one in own)) < FEWEST_NEIGHBOURHOODS:
+            raise ValueError(f"label {label} is painted on {count} pixels; paint {FEWEST_NEIGHBOURHOODS} or more")
     return found
 
 

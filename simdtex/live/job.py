@@ -23,7 +23,7 @@ from simdtex.jobs.hole_replay import HoleReplay
 from simdtex.live import frames
 from simdtex.live.words import controls
 from simdtex.machine import Machine
-from simdtex.methods.classifier.model import LEAST
+from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS
 from simdtex.methods.mrf.replay import Replay
 from simdtex.model.display import label_colours
 from simdtex.options import one_of, real, shown, whole
@@ -216,8 +216,8 @@ class Job:
             done = f"only label {self.classes[0]} is painted" if self.classes else "no label is painted yet"
             raise Hint(f"{done}; paint over two or more textures of the picture, each with a label of its own")
         few = min(self.classes, key=lambda label: int(counts[label]))
-        if counts[few] < LEAST:
-            raise Hint(f"label {few} is painted on {counts[few]} pixels; paint {LEAST} or more")
+        if counts[few] < FEWEST_NEIGHBOURHOODS:
+            raise Hint(f"label {few} is painted on {counts[few]} pixels; paint {FEWEST_NEIGHBOURHOODS} or more")
         self.output = "labels.png"
         self.files["strokes.png"] = strokes
         self.labelled = (self.output, "strokes.png")

@@ -37,7 +37,7 @@ NONE: Mapping[str, int | str] = {}
 SMALL_GROUP = 4
 """Work-group size on a CPU for kernels with much work in each item: few sites still occupy all cores."""
 
-TOGETHER = ("active", "start")
+ONE_PROGRAM = ("active", "start")
 """Kernel files without -D constants that every run of ``mrf`` needs, compiled as one program: each takes about 50 ms to
 load on PoCL."""
 
@@ -295,7 +295,7 @@ class OpenCL:
         words = function.split("_")
         file = "/".join(words[:2]) if words[0] == "maspar" else words[0]
         options = " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
-        files = TOGETHER if file in TOGETHER and not defines else (file,)
+        files = ONE_PROGRAM if file in ONE_PROGRAM and not defines else (file,)
         if (files, options) not in self._kernels:
             source = "".join(kernel_source(f"{name}.cl") for name in files)
             self._kernels[files, options] = devices.build(self.context, source, options.split())

@@ -126,7 +126,7 @@ def read_labels(path: PathLike, transparent: int = 0) -> NDArray[Any]:
     return np.where(gone, transparent, labels) if gone.any() else labels
 
 
-SIDE = 512
+DISPLAYED_SIDE = 512
 """The longest side of a displayed picture, pixels; larger pictures are displayed by every n-th row and column."""
 
 CELL = 12
@@ -193,7 +193,7 @@ def choice_html(
 
 
 def _thinned(array: NDArray[Any]) -> NDArray[Any]:
-    step = -(-max(array.shape[:2]) // SIDE)
+    step = -(-max(array.shape[:2]) // DISPLAYED_SIDE)
     return array[::step, ::step]
 
 

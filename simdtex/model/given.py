@@ -213,7 +213,7 @@ UNIT = 1 / 16
 STEPS = 1024
 """Steps of ln(p / q) in 1, so that the last bit of a platform's logarithm does not matter."""
 
-LEAST = 1e-3
+LEAST_SHARE = 1e-3
 """The least fair share of the output for each training image."""
 
 
@@ -257,7 +257,7 @@ class Soft:
         if self.images is None:
             return None
         told = self.images[:, ~np.isnan(self.images[0])]
-        return tuple(max(LEAST, float(one.sum()) / max(1, one.size)) for one in told)
+        return tuple(max(LEAST_SHARE, float(one.sum()) / max(1, one.size)) for one in told)
 
     def kinds(self, sample: Sample, source: NDArray[np.integer]) -> NDArray[np.uint16]:
         """Return the kinds of pixels (n,) of the sample as indices of rows of `costs`, (kinds of a pixel, n)."""

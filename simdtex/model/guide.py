@@ -26,7 +26,7 @@ UNKNOWN = 2**16 - 1
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
 """A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
-MOST = 16
+MOST_CATEGORIES = 16
 """The most channels of working levels of a variable: one for each category."""
 
 
@@ -126,7 +126,7 @@ class Colocated:
     @property
     def channels(self) -> int:
         """The largest number of channels: those of all variables, each with its categories."""
-        return int(self.known.shape[-1]) * MOST
+        return int(self.known.shape[-1]) * MOST_CATEGORIES
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """Return the channels of the known variables."""

@@ -128,7 +128,7 @@ EIGHTHS = 8
 HALVES = 2
 """The most factors of sqrt(2) by which a picture is enlarged or reduced."""
 
-MOST = 64
+MOST_COPIES = 64
 """The most copies of all pictures together."""
 
 
@@ -234,10 +234,10 @@ def turned(
     wanted = [(one, n) for one, n in wanted if images[n][(kind == one) & ~free].any()]
     if not wanted:
         raise ValueError("the maps of training images, rotation and scale have no number; leave them out")
-    if len(wanted) > MOST:
+    if len(wanted) > MOST_COPIES:
         raise ValueError(
             f"the maps ask for {len(wanted)} different copies of training images; round rotation and scale so that "
-            f"there are {MOST} or fewer"
+            f"there are {MOST_COPIES} or fewer"
         )
     probability = np.stack([np.where(kind == one, images[n], 0) for one, n in wanted])
     probability[:, free] = np.nan

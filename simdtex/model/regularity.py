@@ -60,7 +60,7 @@ WAVES = 4
 ROUND, FINE = 2.0**20, 2.0**16
 """Cosines are rounded to 1 / ROUND, vectors to 1 / FINE of a pixel: libraries differ in their last bits by less."""
 
-TOGETHER = 32
+CACHED_ROWS = 32
 """Number of rows whose cosines are computed together, so that they stay in the processor's cache."""
 
 SMALLEST = 4
@@ -175,8 +175,8 @@ class Waves(NamedTuple):
         row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
         col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
         found = np.empty((WAVES, grid.rows, grid.cols), np.uint16)
-        for first in range(0, grid.rows, TOGETHER):
-            some = slice(first, first + TOGETHER)
+        for first in range(0, grid.rows, CACHED_ROWS):
+            some = slice(first, first + CACHED_ROWS)
             found[:, some] = self._levels(self.output, row[some, None], col[None, :])
         return found
 

@@ -28,10 +28,10 @@ from simdtex.io.rasters import axis_place
 from simdtex.model.display import category_colours
 from simdtex.options import whole
 
-ACROSS, SIDE = 4, 2.6
+ACROSS, MAP_INCHES = 4, 2.6
 """The most maps in a row, and the longer side of a map, inches."""
 
-LEAST, GAP = 256, 24
+ENLARGED_SIDE, GAP = 256, 24
 """The side up to which pictures are enlarged by a whole factor, and the space around them, pixels."""
 
 
@@ -102,7 +102,7 @@ def show(
     shown = [_pixels(one, channel_axis) for one in pictures]
     if tiled:
         shown = [np.tile(one, (3, 3, 1)) for one in shown]
-    scale = max(1, LEAST // max(max(one.shape[:2]) for one in shown))
+    scale = max(1, ENLARGED_SIDE // max(max(one.shape[:2]) for one in shown))
     sides = [(scale * len(one), scale * one.shape[1]) for one in shown]
     high, wide = GAP + max(rows for rows, _ in sides) + GAP, GAP + sum(cols + GAP for _, cols in sides)
     figure, left = new_figure(wide / plt.rcParams["figure.dpi"], high / plt.rcParams["figure.dpi"]), GAP
@@ -192,11 +192,13 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     extent = (left - wide / 2, left + wide * (cols - 0.5), *(ends if ground else ends[::-1]))
     down = -(-len(titles) // ACROSS)
     across = -(-len(titles) // down)
-    inches = SIDE / max(rows * high, cols * wide)
+    inches = MAP_INCHES / max(rows * high, cols * wide)
     size = (across * (inches * cols * wide + 0.8) + 1, down * (inches * rows * high + 0.7))
     figure = new_figure(*size, layout="compressed")
     grid = figure.subplots(down, across, squeeze=False).ravel()
-    smooth = "antialiased" if max(rows, cols) > 100 * SIDE else "nearest"  # smaller maps have a pixel for each cell
+    smooth = (
+        "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
+    )  # smaller maps have a pixel for each cell
     where = {"origin": "lower" if ground else "upper", "extent": extent, "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
         own = how if isinstance(how, dict) else how[n]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 
-TOGETHER = 2**22
+DISTANCES_AT_ONCE = 2**22
 """The most pixels times candidates that the twin processes together."""
 
 
@@ -117,7 +117,7 @@ def candidates(
     """
     if machine is None:
         begin = int(sampled.lattice[level, 2])
-        step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
+        step = max(1, DISTANCES_AT_ONCE // (4 * int(structure.lattice[level + 1, :2].prod())))
         for first in range(sites.start, sites.stop, step):
             here = np.arange(first, min(sites.stop, first + step))
             choice, counts = _drawn(structure, sampled, level, here, match, seed)

@@ -52,7 +52,7 @@ def _axes(sites: Array, offsets: Array, rows: int, cols: int) -> tuple[tuple[Arr
     return (row, offsets[:, 0], rows), (col, offsets[:, 1], cols)
 
 
-TOGETHER = 4
+EXEMPLAR_MULTIPLE = 4
 """The number of exemplars of a class is a multiple of this (kernels/exemplars.cl)."""
 
 LOGS = 256
@@ -79,7 +79,7 @@ class Exemplars(NamedTuple):
 
 def stacked(classes: list[NDArray[np.float32]]) -> Exemplars:
     """Return the exemplars of classes, each (n, K), in NumPy."""
-    filled = [np.concatenate([one, np.repeat(one[-1:], -len(one) % TOGETHER, 0)]) for one in classes]
+    filled = [np.concatenate([one, np.repeat(one[-1:], -len(one) % EXEMPLAR_MULTIPLE, 0)]) for one in classes]
     y = np.concatenate(filled)
     starts = np.cumsum([0, *map(len, filled)]).astype(np.int32)
     return Exemplars(-2 * y, (y * y).sum(1), starts)

@@ -173,7 +173,7 @@ UNIT_BITS = 14
 """Taps are integer multiples of 2**-14."""
 
 
-SIDE, SIGMA = 3, 0.7
+FILTER_SIDE, SIGMA = 3, 0.7
 """Rows and columns of a filter, and the standard deviation of its Gaussian, pixels."""
 
 
@@ -185,11 +185,11 @@ def bank(orientations: int) -> NDArray[np.int32]:
 
     Returns
     -------
-    (2 n, `SIDE`, `SIDE`) int32 array
+    (2 n, `FILTER_SIDE`, `FILTER_SIDE`) int32 array
         Filters for correlation in units of 2**-14, the n first derivatives first. The positive taps of a filter add up
         to about 1, and all its taps to 0.
     """
-    y, x = np.mgrid[:SIDE, :SIDE] - SIDE // 2
+    y, x = np.mgrid[:FILTER_SIDE, :FILTER_SIDE] - FILTER_SIDE // 2
     gauss = np.exp(-(x * x + y * y) / (2 * SIGMA * SIGMA))
     taps = []
     for degree in (1, 2):
@@ -200,9 +200,9 @@ def bank(orientations: int) -> NDArray[np.int32]:
             if degree == 2:
                 f -= gauss * f.sum() / gauss.sum()
             whole = np.rint(f / f[f > 0].sum() * 2**UNIT_BITS).astype(np.int32)
-            whole[SIDE // 2, SIDE // 2] -= whole.sum()
+            whole[FILTER_SIDE // 2, FILTER_SIDE // 2] -= whole.sum()
             taps.append(whole)
-    return np.array(taps, np.int32).reshape(-1, SIDE, SIDE)
+    return np.array(taps, np.int32).reshape(-1, FILTER_SIDE, FILTER_SIDE)
 
 
 @Operation

@@ -89,7 +89,7 @@ VAST = 2**17
 
 It has a few more colours, but the greedy colouring takes minutes."""
 
-TOGETHER = 2**20
+NEIGHBOURS_AT_ONCE = 2**20
 """The most neighbours that are processed together."""
 
 
@@ -199,7 +199,7 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
     """Return sites in pieces that are small enough to process all their neighbours together."""
-    return np.array_split(sites, 1 + sites.size * neighbours // TOGETHER)
+    return np.array_split(sites, 1 + sites.size * neighbours // NEIGHBOURS_AT_ONCE)
 
 
 def _greedy(

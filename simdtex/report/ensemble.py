@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 SHOWN = 5  # realisations shown with the training image
 MOST_PANELS = 6  # categories drawn, those with the largest shares of the training image
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
-SIDE = 3.4  # of a map's longer side, inches
+MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
 
 
@@ -188,7 +188,7 @@ def _maps(
     rows, cols = found.open.shape
     across = 2 if len(panels) == 4 else min(3, len(panels))
     down = -(-len(panels) // across)
-    wide, high = SIDE * cols / max(rows, cols), SIDE * rows / max(rows, cols)
+    wide, high = MAP_INCHES * cols / max(rows, cols), MAP_INCHES * rows / max(rows, cols)
     figure = new_figure(across * max(wide, 1.6) + 1.2, down * (max(high, 1.0) + 0.45))
     grid = figure.subplots(down, across, squeeze=False).ravel()
     for axes in grid[len(panels) :]:

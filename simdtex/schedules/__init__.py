@@ -61,7 +61,7 @@ SCHEDULES: dict[str, Callable[[], Schedule]] = {
 }
 """The schedules by name."""
 
-TOGETHER = ("coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
+PARALLEL = ("coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
 """The schedules that relax many sites in a step."""
 
 GROUP = "simdtex.schedules"

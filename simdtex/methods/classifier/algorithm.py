@@ -28,7 +28,7 @@ from simdtex.run import Callback, Labelling, Output
 WORK = 2**32
 """About the number of multiply-adds of a step."""
 
-AT_ONCE = 2**19
+SITES_AT_ONCE = 2**19
 """The most sites whose fits are computed together."""
 
 STEPS = 64
@@ -62,7 +62,7 @@ class Plan:
         shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
-        part = min(sites, AT_ONCE)
+        part = min(sites, SITES_AT_ONCE)
         device = sites * (16 * count + experts * bands) + part * 14 * experts
         memory.require(
             machine, device, sites * (count * (2 * experts + 20) + 24 * bands + 64) + part * (10 * experts + 24)
@@ -238,7 +238,7 @@ class Run:
         rejected = np.zeros((rows, cols), bool)
         freedom, size = self.model.freedom, self._size
         limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
-        band, margin = max(1, AT_ONCE // cols), len(self._taps) // 2 + size // 2
+        band, margin = max(1, SITES_AT_ONCE // cols), len(self._taps) // 2 + size // 2
         for first in range(0, rows, band):
             slab, here = slice(max(0, first - margin), first + band + margin), slice(first, first + band)
             labels = state.labels[slab]

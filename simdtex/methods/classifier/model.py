@@ -24,13 +24,13 @@ from simdtex.ops.classes import LOGS, SIXTEENTHS, Exemplars, exemplars, features
 SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 """Standard deviations of the Gaussians that smooth the levels, pixels."""
 
-SIDE = 32
+LEAST_SAMPLE_SIDE = 32
 """The least side of a sample at level 0, pixels; each further level doubles it."""
 
 TEMPERATURE = 0.5
 """Evidence is the mean logarithm of squared distances divided by this."""
 
-LEAST = 16
+FEWEST_NEIGHBOURHOODS = 16
 """The fewest neighbourhoods of a class at a level."""
 
 BANDS = 14
@@ -160,7 +160,7 @@ def learn(
 ) -> Model:
     """Return the model of classes, each given by regions of pictures of one type.
 
-    Raises ValueError if a class has fewer than `LEAST` neighbourhoods.
+    Raises ValueError if a class has fewer than `FEWEST_NEIGHBOURHOODS` neighbourhoods.
     """
     regions = [region for one in classes for region in one]
     scale = Scale(Pictures(tuple(region.pixels for region in regions)), 512)  # values of up to 12 bits
@@ -186,16 +186,16 @@ def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Seq
     """Return the number of levels at which all classes have enough sites; raise if it is 0."""
     regions = [region for one in classes for region in one]
     side = min(min(region.sites.shape) for region in regions)
-    most = max(1, sum(side >= SIDE << level for level in range(options.levels)))
+    most = max(1, sum(side >= LEAST_SAMPLE_SIDE << level for level in range(options.levels)))
     for levels in range(most, 0, -1):
         reach = experts_of(options, levels)[-1].reach
         counts = [sum(int(_centres(region, reach).sum()) for region in one if not region.judged) for one in classes]
-        if min(counts) >= LEAST:
+        if min(counts) >= FEWEST_NEIGHBOURHOODS:
             return levels
     few = int(np.argmin(counts))
     raise ValueError(
         f"class {names[few]!r} has {counts[few]} whole neighbourhoods of {2 * reach + 1}x{2 * reach + 1} "
-        f"pixels, and {LEAST} are needed; give a larger sample of it"
+        f"pixels, and {FEWEST_NEIGHBOURHOODS} are needed; give a larger sample of it"
     )
 
 
@@ -223,7 +223,7 @@ class _Part(NamedTuple):
     sites: Mask
 
 
-class Self(NamedTuple):
+class OwnDistances(NamedTuple):
     """The distances of the parts of a class from the rest of it.
 
     ``mean`` (E,) of the logarithms in natural units; ``windows`` (E, n) int64, mean logarithms over windows; ``parts``
@@ -272,7 +272,7 @@ class _Class:
         placed, offsets = machine.put(sites.astype(np.int32)), machine.put(expert.offsets)
         return np.asarray(machine.get(features(machine, levels[expert.level], placed, offsets, expert.contrast)))
 
-    def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> Self:
+    def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> OwnDistances:
         """Return the distances of the parts of the class from the rest of it, for each expert."""
         taps = gaussian(options.window)
         windows, parts = [], []
@@ -290,7 +290,7 @@ class _Class:
                 parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
             windows.append(windowed(machine, logs, judged, taps, judged)[0])
         means = np.concatenate(windows, 1)
-        return Self(np.array(parts).mean(0), means, np.array(parts))
+        return OwnDistances(np.array(parts).mean(0), means, np.array(parts))
 
 
 TOO_FEW = 8
@@ -337,7 +337,7 @@ def windowed(
     return (MEANS * sums + counts // 2) // np.maximum(counts, 1), counts > 0
 
 
-def _nulls(selves: Sequence[Self]) -> tuple[list[Null], int]:
+def _nulls(selves: Sequence[OwnDistances]) -> tuple[list[Null], int]:
     """Return the distribution of each class, and the degrees of freedom of their covariances.
 
     The covariance is that of the class between windows, shrunk to the mean of all classes, plus the drift between parts

@@ -19,7 +19,7 @@ from simdtex.methods.multires.mend import mend
 from simdtex.methods.multires.options import Options
 from simdtex.model.stretched import Stretched
 from simdtex.ops.candidates import Sampled, Structure
-from simdtex.ops.pyramids import SIDE, bank, filters, half, laplacian_band, laplacian_reduce
+from simdtex.ops.pyramids import FILTER_SIDE, bank, filters, half, laplacian_band, laplacian_reduce
 
 _log = logging.getLogger(__name__)
 
@@ -119,7 +119,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
     if options.edges == "mend":
         sample = Stretched(pixels.reshape(-1, channels)[place])
     shapes = _level_shapes((rows, cols), options.levels)
-    fits = [min(shape) >= SIDE for shape in shapes]
+    fits = [min(shape) >= FILTER_SIDE for shape in shapes]
     taps = bank(options.orientations)
     memory.require(machine, rows * cols * (16 * (channels + (channels > 1)) + 3 * width))
 
@@ -138,7 +138,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
         _log.warning(
             "no level above the finest of a sample of %d rows x %d columns is as large as the filters, %d x %d: "
             "candidates are compared by their bands alone",
-            *(*shapes[0], SIDE, SIDE),
+            *(*shapes[0], FILTER_SIDE, FILTER_SIDE),
         )
     return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus, place)
 
