@@ -210,8 +210,7 @@ def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> Non
         raise ValueError("--report requires a training image without unknown cells; leave it out")
     given = material.pixels if known is None else [*material.pixels, known]
     if not material.deep and min(*shape, *material.pixels[0].shape) < LEAST_IMAGE_SIDE:
-        raise ValueError(
-            f"--report requires {LEAST_IMAGE_SIDE}x{LEAST_IMAGE_SIDE} pixels or more; give a larger size, or leave it out"
-        )
+        least = f"{LEAST_IMAGE_SIDE}x{LEAST_IMAGE_SIDE} pixels"
+        raise ValueError(f"--report requires {least} or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")

@@ -327,7 +327,7 @@ def _gslib(file: BufferedReader, most: int) -> Read:
     if os.fstat(file.fileno()).st_size - file.tell() < 2 * count - 1:  # a digit for each, and blanks between them
         raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
     blocks = _parsed(file, count, what, line).reshape(realisations, prod(sides), variables)
-    return names, blocks.transpose(0, 2, 1), tuple(sides), lies
+    return names, blocks.transpose(0, 2, 1), tuple(sides), georeference
 
 
 def _geone_header(file: BufferedReader) -> dict[str, str]:
@@ -438,7 +438,7 @@ def _sgems(file: BufferedReader, most: int) -> Read:
     rest = file.read(16)
     if rest and not rest.startswith(_BLOCKS):
         raise ValueError("it is longer than its header says: get it again, or save it again")
-    return names, columns, sides, lies
+    return names, columns, sides, georeference
 
 
 def write_grid(
@@ -510,7 +510,7 @@ def check_grid(
     georeference = frame(origin, cell)
     if _suffix(path) == ".tif":
         require("rasters", "rasterio")
-        return lies
+        return georeference
     for array in arrays:
         _check_values(target, np.ma.asanyarray(array))
     if _suffix(path) == ".sgems":
@@ -520,7 +520,7 @@ def check_grid(
                     f"{target} would hold {axis} = {at} as a 32-bit float, more than a thousandth of a cell beside it: "
                     "end its name in .gslib, or give coordinates nearer to 0"
                 )
-    return lies
+    return georeference
 
 
 def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
