@@ -275,7 +275,7 @@ def test_a_folder_of_stages_with_leftovers_is_used_again(tmp_path):
 def test_a_folder_that_was_taken_away_comes_back(tmp_path):
     """A process is killed between taking the old folder away and putting the new one there."""
     volume.write(tmp_path / "a", block(1))
-    kill = "import os, sys; from pathlib import Path; from simdtex.io import atomic, volume; import numpy as np\n"
+    kill = "import os, sys; from pathlib import Path; from simdtex.io import volume; import numpy as np\n"
     kill += "rename = Path.rename\n"
     kill += "Path.rename = lambda self, to: rename(self, to) if 'old' in to.name else os.kill(os.getpid(), 9)\n"
     kill += "volume.write(sys.argv[1], np.ones((2, 3, 4), np.uint8))\n"
