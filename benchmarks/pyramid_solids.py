@@ -18,8 +18,7 @@ from subbands import decompose
 
 import simdtex
 from simdtex.report.page import figure_png, new_figure, tidy
-from simdtex.report.sheet import contact_sheet
-from simdtex.report.solid import view
+from simdtex.report.sheet import contact_sheet, view
 
 
 def isotropic(making):
