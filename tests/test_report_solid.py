@@ -29,7 +29,10 @@ def test_faces_are_those_of_the_block(shape):
     np.testing.assert_array_equal(cube[behind : behind + rows, :cols], block[0])
     for away in range(1, behind + 1):  # of two slices that share a pixel the nearer is in front
         z = 2 * away
-        above, right = cube[behind - away, away : away + cols], cube[behind - away : rows + behind - away, cols + away - 1]
+        above, right = (
+            cube[behind - away, away : away + cols],
+            cube[behind - away : rows + behind - away, cols + away - 1],
+        )
         np.testing.assert_array_equal(above, block[z, 0] // 4 * 3)
         np.testing.assert_array_equal(right, block[z, :, -1] // 4 * 3)
     if behind:
