@@ -16,23 +16,21 @@ unknown      the area under the curve (AUROC) of fits: of each class alone, its 
              of every other texture; and in mosaics of which one class was not learned.
 calibration  the shares of pixels called unknown that are of a known texture, by the probability asked for.
 order        accuracy by the order of neighbourhoods; of whole ones, and of the pixel given its neighbours: equation
-             (6) with the bandwidth of equation (8), by `simdtex.lcpdf` at every fourth row and column.
-defaults     accuracy with other values of the options.
+             (6) with the bandwidth of equation (8), by `simdtex.lcpdf` at every fourth row and column. Half the draws.
+defaults     accuracy with other values of the options. Half the draws.
 time         512x512 against five samples of 128x128 (by --side), seconds on the device by kernel, best of three;
              and how much faster than the NumPy reference a small case is.
 """
 
-import argparse
-import time
-import timeit
+from collections import defaultdict
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import common
 import numpy as np
-import tables
-from baselines import FEATURES, probabilities
-from mosaics import accuracy, auroc, drawn, grey, own_fit, textures
+from mosaics import FEATURES, accuracy, auroc, drawn, grey, own_fit, probabilities, textures
 from skimage import data
 
 import simdtex
@@ -42,13 +40,7 @@ ASKED = (0.01, 0.05, 0.1)  # probabilities of calling a known texture unknown
 FIELDS = [(coupling, weight) for coupling in (8, 11) for weight in (2, 4, 7, 12)]  # of the baselines; they get the best
 ORDERS = (1, 2, 4, 8, 18)
 STEP = 4  # rows and columns between the sites that the density of a pixel is computed at
-DEFAULTS = {
-    "typical": (0.0, 0.6),
-    "levels": (1, 2),
-    "exemplars": (500, 4000),
-    "coupling": (4.0, 12.0),
-    "weight": (3.0, 12.0),
-}
+DEFAULTS = {"typical": (0.0, 0.6), "levels": (1, 2), "exemplars": (500, 4000), "coupling": (4, 12), "weight": (3, 12)}
 UNITS = 2**18  # of evidence and votes
 SHARES = ["straight, away", "straight, all", "curved, away", "curved, all"]
 
@@ -58,28 +50,28 @@ class Bench(NamedTuple):
 
     machine: Any
     known: dict
-    draws: int = 10
-    seed: int = 1
-    side: int = 256
+    draws: int
+    seed: int
+    side: int
 
-    def pairs(self, draws=None):
-        """Two mosaics, straight and curved, for each draw."""
-        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(draws or self.draws)]
+    def pairs(self, part=1):
+        """Two mosaics, straight and curved, for each draw or for a part of the draws."""
+        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(-(-self.draws // part))]
 
 
 def labelled(bench, picture, samples, colour=False, **options):
     """Labels and output of the classifier, for pictures with three bands, which are made grey unless in colour."""
-    kind, axis = (np.asarray, -1) if colour else (grey, None)
-    given = {name: kind(one) for name, one in samples.items()}
-    if "validation" in options:
-        options["validation"] = {name: kind(one) for name, one in options["validation"].items()}
-    given = {"rng": 1, "device": bench.machine, "channel_axis": axis} | options | {"textures": given}
+    kind = np.asarray if colour else grey
+    given = {"rng": 1, "device": bench.machine, "channel_axis": -1 if colour else None} | options
+    for name, pictures in {"textures": samples, "validation": options.get("validation")}.items():
+        if pictures:
+            given[name] = {texture: kind(one) for texture, one in pictures.items()}
     return simdtex.classify(kind(picture), full_output=True, **given)
 
 
-def training(textures):
-    """The parts of textures to learn from, by name."""
-    return {name: one.training for name, one in textures.items()}
+def parts(textures, part="training"):
+    """A part of every texture, by name."""
+    return {name: getattr(one, part) for name, one in textures.items()}
 
 
 def field(machine, evidence, coupling, weight, sweeps=10):
@@ -100,33 +92,26 @@ def field(machine, evidence, coupling, weight, sweeps=10):
 
 def measure_accuracy(bench):
     """Accuracy of the classifier and of the baselines, and in how many mosaics each is ahead of the classifier."""
-    found = {}
-
-    def note(method, pair, labels):
-        found.setdefault(method, []).append([accuracy(one, m.truth) for m, one in zip(pair, labels, strict=True)])
-
-    pairs = bench.pairs()
+    found, pairs = defaultdict(list), bench.pairs()
     for pair in pairs:
-        samples = training(pair[0].textures)
-        for kind in ("grey", "colour"):
-            for text, weight in (("", {}), (", no field", {"weight": 0})):
-                options = {"colour": kind == "colour", "unknown": 0, **weight}
-                labels = [labelled(bench, m.picture, samples, **options)[0] for m in pair]
-                note(f"classify, {kind}{text}", pair, labels)
-        parts, pictures = [grey(one) for one in samples.values()], [grey(m.picture) for m in pair]
-        for name, features in FEATURES.items():
-            for size in (4, 10):
-                chances = probabilities(parts, pictures, features, size)
-                note((name, size), pair, [1 + one.argmax(0) for one in chances])
-                for setting in FIELDS:
-                    labels = [field(bench.machine, one, *setting) for one in chances]
-                    note((name, size, *setting), pair, labels)
+        samples, pictures = parts(pair[0].textures), [grey(m.picture) for m in pair]
+
+        def note(method, labels, pair=pair):
+            found[method].append([accuracy(one, m.truth) for m, one in zip(pair, labels, strict=True)])
+
+        for kind, (text, weight) in product(("grey", "colour"), (("", {}), (", no field", {"weight": 0}))):
+            options = {"colour": kind == "colour", "unknown": 0, **weight}
+            note(f"classify, {kind}{text}", [labelled(bench, m.picture, samples, **options)[0] for m in pair])
+        for name, size in product(FEATURES, (4, 10)):
+            chances = probabilities([grey(one) for one in samples.values()], pictures, FEATURES[name], size)
+            note((name, size), [1 + one.argmax(0) for one in chances])
+            for setting in FIELDS:
+                note((name, size, *setting), [field(bench.machine, one, *setting) for one in chances])
     kept = {method: np.array(shares) for method, shares in found.items() if isinstance(method, str)}
-    for name in FEATURES:
-        for size in (4, 10):
-            kept[f"{name}, window {size}, no field"] = np.array(found[name, size])
-            best = max(FIELDS, key=lambda setting: np.mean(found[name, size, *setting]))
-            kept[f"{name}, window {size}, field {best[0]}, {best[1]}"] = np.array(found[name, size, *best])
+    for name, size in product(FEATURES, (4, 10)):
+        kept[f"{name}, window {size}, no field"] = np.array(found[name, size])
+        best = max(FIELDS, key=lambda setting: np.mean(found[name, size, *setting]))
+        kept[f"{name}, window {size}, field {best[0]}, {best[1]}"] = np.array(found[name, size, *best])
     reference = kept["classify, grey"][..., 1]
     for method, shares in kept.items():
         for draw, curved in np.argwhere(shares[..., 1] > reference) if "classify" not in method else ():
@@ -141,8 +126,7 @@ def measure_accuracy(bench):
 
 def measure_unknown(bench):
     """AUROC of the fit of each class alone, and of the labels' own in mosaics of which one class was not learned."""
-    cases = {"one class, other pictures": {}, "a class left out of a mosaic": {}}
-    alone, left = cases.values()
+    alone, left = {}, {}
 
     def judged(strange, known):
         return auroc(strange, known), (strange < ASKED[1]).mean()
@@ -150,45 +134,43 @@ def measure_unknown(bench):
     for name, own in bench.known.items():
         classifier = simdtex.TextureClassifier(rng=1, device=bench.machine)
         classifier.fit(grey(own.training), np.ones(own.training.shape[:2], int))
-        others = [
-            classifier.predict_fit(grey(picture))[::4, ::4].ravel()
-            for other, texture in bench.known.items()
-            for picture in (texture.training, texture.test)
-            if other != name
-        ]
-        alone[name] = judged(np.concatenate(others), classifier.predict_fit(grey(own.test))[..., 0])
+        others = [one for other, one in bench.known.items() if other != name]
+        whole = [picture for one in others for picture in (one.training, one.test)]
+        strange = np.concatenate([classifier.predict_fit(grey(picture))[::4, ::4].ravel() for picture in whole])
+        alone[name] = judged(strange, classifier.predict_fit(grey(own.test))[..., 0])
     for number, pair in enumerate(bench.pairs()):
         mosaic = pair[number % 2]
         for label, missing in enumerate(mosaic.textures, 1):
-            samples = {name: one for name, one in training(mosaic.textures).items() if name != missing}
+            samples = {name: one for name, one in parts(mosaic.textures).items() if name != missing}
             fit, strange = own_fit(labelled(bench, mosaic.picture, samples)[1]), mosaic.truth == label
             left[f"{missing} (draw {number + 1})"] = judged(fit[strange], fit[~strange])
     rows = []
-    for case, values in cases.items():
-        worst = sorted(values, key=values.get)[:3]
-        told = ", ".join(f"{one} {values[one][0]:.3f}" for one in worst)
+    for case, values in {"one class, other pictures": alone, "a class left out of a mosaic": left}.items():
+        worst = ", ".join(f"{one} {values[one][0]:.3f}" for one in sorted(values, key=values.get)[:3])
         area, share = np.mean([*values.values()], 0)
-        rows.append([case, f"{area:.3f}", told, f"{100 * share:.0f} %"])
+        rows.append([case, f"{area:.3f}", worst, f"{100 * share:.0f} %"])
     return ["case", "AUROC, mean", "worst", "called unknown at 5 %"], rows
 
 
 def measure_calibration(bench):
     """The shares of known textures that are called unknown, by problem and by the probability that was asked for."""
-    found = {}
+    found = defaultdict(list)
 
     def note(problem, fits):
-        found.setdefault(problem, []).append([np.mean([(fit < asked).mean() for fit in fits]) for asked in ASKED])
+        found[problem].append([np.mean([(fit < asked).mean() for fit in fits]) for asked in ASKED])
 
+    def held(textures, **options):
+        samples = parts(textures)
+        return [own_fit(labelled(bench, rest, samples, **options)[1]) for rest in parts(textures, "rest").values()]
+
+    groups = [("five classes", pair[0].textures) for pair in bench.pairs()]
+    groups += [("one class", {name: one}) for name, one in bench.known.items()]
+    for problem, group in groups:
+        note(problem, held(group))
+        note(f"{problem}, with validation", held(group, validation=parts(group, "further")))
     for number, pair in enumerate(bench.pairs()):
-        samples, problems = training(pair[0].textures), {"": {}}
-        problems[", with validation"] = {"validation": {name: one.further for name, one in pair[0].textures.items()}}
-        for text, options in problems.items():
-            held = [own_fit(labelled(bench, t.rest, samples, **options)[1]) for t in pair[0].textures.values()]
-            note(f"five classes{text}", held)
-        note("five classes, in mosaics", [own_fit(labelled(bench, pair[number % 2].picture, samples)[1])])
-    for name, one in bench.known.items():
-        for text, options in (("", {}), (", with validation", {"validation": {name: one.further}})):
-            note(f"one class{text}", [own_fit(labelled(bench, one.rest, {name: one.training}, **options)[1])])
+        output = labelled(bench, pair[number % 2].picture, parts(pair[0].textures))[1]
+        note("five classes, in mosaics", [own_fit(output)])
     return ["problem", *(f"{100 * asked:g} %" for asked in ASKED), "most at 5 %"], [
         [problem, *(f"{100 * share:.1f} %" for share in np.mean(shares, 0)), f"{100 * np.max(shares, 0)[1]:.0f} %"]
         for problem, shares in sorted(found.items())
@@ -201,47 +183,41 @@ def densities(bench, mosaic, order):
     sites = np.stack(np.mgrid[: picture.shape[0] : STEP, : picture.shape[1] : STEP], -1)
     flat, values = sites.reshape(-1, 2), picture[::STEP, ::STEP].ravel()
     options = {"order": order, "boundary": "open", "device": bench.machine}
-    logs = []
-    for one in mosaic.textures.values():
-        density = simdtex.lcpdf(picture, grey(one.training), flat, **options)[np.arange(len(flat)), values]
-        logs.append(np.log(np.maximum(density, 1e-9)).reshape(sites.shape[:2]))
-    return np.array(logs)
+    found = [simdtex.lcpdf(picture, grey(one), flat, **options) for one in parts(mosaic.textures).values()]
+    own = np.array(found)[:, np.arange(len(flat)), values]
+    return np.log(np.maximum(own, 1e-9)).reshape(-1, *sites.shape[:2])
 
 
 def measure_order(bench):
     """Accuracy by order, for whole neighbourhoods and for the pixel given its neighbours, without and with a field."""
     rows = []
-    pairs = bench.pairs(-(-bench.draws // 2))
-    mosaics = [mosaic for pair in pairs for mosaic in pair]
     for order in ORDERS:
-        shares = {}
-        for mosaic in mosaics:
+        shares = defaultdict(list)
+        for mosaic in (mosaic for pair in bench.pairs(2) for mosaic in pair):
             options = {"order": order, "weight": 0, "unknown": 0}
-            labels, output = labelled(bench, mosaic.picture, training(mosaic.textures), **options)
+            labels, output = labelled(bench, mosaic.picture, parts(mosaic.textures), **options)
             evidence = np.log(np.maximum(np.moveaxis(output.probability, -1, 0), 1e-30))
-            for name, found in (("whole", labels), ("whole, field", field(bench.machine, evidence, 8, 7))):
-                shares.setdefault(name, []).append((found == mosaic.truth).mean())
             logs, truth = densities(bench, mosaic, order), mosaic.truth[::STEP, ::STEP]
-            shares.setdefault("pixel", []).append((1 + logs.argmax(0) == truth).mean())
-            for setting in FIELDS:
-                labels = field(bench.machine, logs, setting[0] / STEP, setting[1])
-                shares.setdefault(setting, []).append((labels == truth).mean())
+            shares["whole"].append((labels == mosaic.truth).mean())
+            shares["whole, field"].append((field(bench.machine, evidence, 8, 7) == mosaic.truth).mean())
+            shares["pixel"].append((1 + logs.argmax(0) == truth).mean())
+            for coupling, weight in FIELDS:
+                labels = field(bench.machine, logs, coupling / STEP, weight)
+                shares[coupling, weight].append((labels == truth).mean())
         mean = {name: np.mean(values) for name, values in shares.items()}
-        best = max(FIELDS, key=mean.get)
-        found = (mean["whole"], mean["whole, field"], mean["pixel"], mean[best])
+        found = (mean["whole"], mean["whole, field"], mean["pixel"], max(mean[setting] for setting in FIELDS))
         rows.append([order, *(f"{share:.3f}" for share in found)])
     return ["order", "whole, no field", "whole, field", "pixel, no field", "pixel, field"], rows
 
 
 def measure_defaults(bench):
     """Accuracy with the defaults, and with one option changed."""
-    settings = {"defaults": {}}
+    settings, rows = {"defaults": {}}, []
     settings |= {f"{name} {value:g}": {name: value} for name, values in DEFAULTS.items() for value in values}
-    pairs, rows = bench.pairs(-(-bench.draws // 2)), []
     for text, options in settings.items():
         shares = [
-            [accuracy(labelled(bench, m.picture, training(m.textures), unknown=0, **options)[0], m.truth) for m in pair]
-            for pair in pairs
+            [accuracy(labelled(bench, m.picture, parts(m.textures), unknown=0, **options)[0], m.truth) for m in pair]
+            for pair in bench.pairs(2)
         ]
         rows.append([text, *(f"{share:.3f}" for share in np.mean(shares, 0).ravel())])
     return ["options", *SHARES], rows
@@ -258,22 +234,17 @@ def large(side, size):
 
 def measure_time(bench):
     """Seconds of a run on the device by kernel, and the ratio to the NumPy reference."""
-    machine = bench.machine
-    picture, samples = large(2 * bench.side, bench.side // 2)
-    runs = []
-    for _ in range(4):  # the first compiles
-        began = time.perf_counter()
-        _, output = simdtex.classify(picture, samples, rng=1, device=machine, full_output=True)
-        runs.append((time.perf_counter() - began, output.statistics.get("kernels", [])))
-    seconds, kernels = min(runs[1:], key=lambda run: run[0])
+
+    def fastest(side, size, machine):
+        job = partial(simdtex.classify, *large(side, size), rng=1, device=machine, full_output=True)
+        (_, output), seconds = min(common.in_turns(3, {"": partial(common.timed, job)})[""], key=lambda run: run[1])
+        return seconds, output.statistics.get("kernels", [])
+
+    seconds, kernels = fastest(2 * bench.side, bench.side // 2, bench.machine)
     rows = [[f"{2 * bench.side}x{2 * bench.side}, the whole call", "", f"{seconds:.2f} s"]]
     rows += [[one["name"], one["calls"], f"{one['seconds']:.3f} s"] for one in kernels]
     side, size = bench.side // 4, bench.side * 3 // 16
-    picture, samples = large(side, size)
-    plain, fast = (
-        min(timeit.repeat(partial(simdtex.classify, picture, samples, rng=1, device=device), number=1, repeat=3))
-        for device in (simdtex.open_machine("reference"), machine)
-    )
+    plain, fast = (fastest(side, size, machine)[0] for machine in (simdtex.open_machine("reference"), bench.machine))
     rows.append([f"{side}x{side}, five samples of {size}x{size}", "", f"{fast:.3f} s"])
     rows.append(["the same by the reference", "", f"{plain:.3f} s, {plain / fast:.0f} times"])
     return ["what", "launches", "time"], rows
@@ -289,32 +260,16 @@ PARTS = {
 }
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("samples", type=Path, help="folder of pictures, each a texture")
-    parser.add_argument("--only", default="", help="names or patterns of its files, brick,*.png")
-    parser.add_argument("--parts", default=",".join(PARTS))
-    parser.add_argument("--draws", type=int, default=10, help="of five textures; order and defaults take half of them")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--side", type=int, default=256, help="of mosaics, pixels")
-    parser.add_argument("--out", type=Path, help="folder for the tables")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    parts = options.parts.split(",")
-    if strange := [part for part in parts if part not in PARTS]:
-        parser.error(f"there is no part {strange[0]}: choose of {', '.join(PARTS)}")
-    try:
-        known = textures(options.samples, options.only)
-    except ValueError as error:
-        parser.error(str(error))
-    bench = Bench(simdtex.open_machine(options.device, profile=True), known, options.draws, options.seed, options.side)
-    print(f"device: {bench.machine.name}; textures: {len(known)}")
-    for part in parts:
-        began = time.perf_counter()
-        header, rows = PARTS[part](bench)
-        tables.show(f"{part}, {time.perf_counter() - began:.0f} s", header, rows)
-        if options.out:
-            tables.write(options.out / f"{part}.csv", header, rows)
+@common.command
+def main(samples, only="", parts="", draws=10, seed=1, side=256, out=Path, device=None):
+    chosen, known = common.chosen(PARTS, parts), textures(samples, only)
+    bench = Bench(common.opened(device, profile=True), known, draws, seed, side)
+    print(f"textures: {len(known)}")
+    for part, measure in chosen.items():
+        (header, rows), seconds = common.timed(measure, bench)
+        common.show(f"{part}, {seconds:.0f} s", header, rows)
+        if out:
+            common.write(out / f"{part}.csv", header, rows)
 
 
 if __name__ == "__main__":

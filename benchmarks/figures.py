@@ -19,13 +19,6 @@ ODD = 0.005
 """Share of the sample's pixels that count as odd."""
 
 
-def enlarged(picture, shape, step):
-    """A decimated picture at a size, each of its pixels as a square of `step` pixels a side without smoothing."""
-    limits = zip(shape, picture.shape[:2], strict=True)
-    rows, cols = (np.minimum((np.arange(length) / step).astype(int), limit - 1) for length, limit in limits)
-    return picture[rows[:, np.newaxis], cols]
-
-
 def repeats(sample, output):
     """Return the shares of the 32 x 32 patches of output and sample that occur elsewhere in the same picture, 0 to 1.
 

@@ -17,17 +17,12 @@ seam    mean absolute step between a pixel of the hole and a known one beside it
 step    the same between two pixels of the hole: below 1 the filling is blurred.
 """
 
-import argparse
-import sys
-import time
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
+import common
 import numpy as np
-import over_folder
-import samples
-import tables
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import gaussian_filter
 from skimage import draw
@@ -43,24 +38,23 @@ FAR = 1e3  # what is unknown, in sample standard deviations: no patch with it is
 FIGURES = ("rim", "inside", "seam", "step")
 
 
-def holes(shape):
+def hole_shapes(shape):
     """Holes of four shapes in a picture of that shape, by name: (rows, cols) bool arrays."""
     rows, cols = shape
     row, col = np.indices(shape)
-    found = {}
-    found["rectangle"] = (abs(row - rows * 0.5) < rows * 0.13) & (abs(col - cols * 0.5) < cols * 0.16)
     noise = gaussian_filter(np.random.default_rng(3).standard_normal(shape), min(shape) / 16)
     away = np.hypot((row / rows - 0.48) / 0.2, (col / cols - 0.52) / 0.2)
-    found["blob"] = away + 0.35 * noise / noise.std() < 1
-    found["scratch"] = np.zeros(shape, bool)
-    waypoints = [(0.2, 0.12), (0.35, 0.4), (0.62, 0.55), (0.8, 0.9)]
-    corners = [(round(r * rows), round(c * cols)) for r, c in waypoints]
+    scratch = np.zeros(shape, bool)
+    corners = [(round(r * rows), round(c * cols)) for r, c in [(0.2, 0.12), (0.35, 0.4), (0.62, 0.55), (0.8, 0.9)]]
     for first, second in pairwise(corners):
         for down in (-1, 0, 1):
-            line = draw.line(first[0] + down, first[1], second[0] + down, second[1])
-            found["scratch"][line] = True
-    found["border"] = (abs(row - rows * 0.55) < rows * 0.17) & (col >= cols * 0.78)
-    return found
+            scratch[draw.line(first[0] + down, first[1], second[0] + down, second[1])] = True
+    return {
+        "rectangle": (abs(row - rows * 0.5) < rows * 0.13) & (abs(col - cols * 0.5) < cols * 0.16),
+        "blob": away + 0.35 * noise / noise.std() < 1,
+        "scratch": scratch,
+        "border": (abs(row - rows * 0.55) < rows * 0.17) & (col >= cols * 0.78),
+    }
 
 
 def score(original, picture, hole):
@@ -69,9 +63,8 @@ def score(original, picture, hole):
     known = planes.copy()
     known[hole] = FAR
     share = sliding_window_view(hole, (PATCH, PATCH)).mean((2, 3)).ravel()
-    kinds = {"known": share == 0, "rim": (share > 0) & (share < 1), "inside": share == 1}
     distance = {}
-    for kind, which in kinds.items():
+    for kind, which in {"known": share == 0, "rim": (share > 0) & (share < 1), "inside": share == 1}.items():
         asked = np.flatnonzero(which)
         if kind == "known":
             asked = asked[:: -(-len(asked) // QUERIES)]
@@ -91,7 +84,7 @@ def score(original, picture, hole):
 
 def biharmonic(picture, hole):
     """The hole filled by the biharmonic equation, in the picture's type."""
-    found = inpaint_biharmonic(picture / 255, hole, channel_axis=-1 if picture.ndim == 3 else None)
+    found = inpaint_biharmonic(picture / 255, hole, channel_axis=common.axis(picture))
     return np.rint(found.clip(0, 1) * 255).astype(picture.dtype)
 
 
@@ -112,76 +105,51 @@ def fillings(picture, hole, settings, seeds, machine):
     """What the hole is filled with, in turn: label, seed, picture, seconds."""
     for label, given in settings.items():
         for seed in range(1, seeds + 1):
-            began = time.perf_counter()
-            options = {"channel_axis": -1 if picture.ndim == 3 else None} | given
-            made = simdtex.fill(picture, hole, rng=seed, device=machine, **options)
-            yield label, seed, made, time.perf_counter() - began
-    for label, method in {"biharmonic": biharmonic, "telea": telea}.items():
+            options = {"channel_axis": common.axis(picture), "rng": seed, "device": machine} | given
+            yield label, seed, *common.timed(simdtex.fill, picture, hole, **options)
+    for method in (biharmonic, telea):
         with suppress(ModuleNotFoundError):
-            began = time.perf_counter()
-            made = method(picture, hole)
-            yield label, 1, made, time.perf_counter() - began
+            yield method.__name__, 1, *common.timed(method, picture, hole)
     yield "original", 1, picture, 0.0
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=Path, help="folder of pictures, each a texture")
-    parser.add_argument("--only", default="", help="names of textures, brick,wood")
-    parser.add_argument("--holes", default="", help="shapes, rectangle,blob; all unless given")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--options", action="append", default=[], help="NAME=VALUE,NAME=VALUE; may be given again")
-    parser.add_argument("--out", type=Path, help="folder for the sheets")
-    parser.add_argument("--csv", type=Path, help="a file for the table, a line for each texture and filling")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    try:
-        settings = {"fill": {}} | {text: over_folder.parsed(text) for text in options.options}
-        known = samples.chosen(options.samples, options.only)
-    except ValueError as error:
-        parser.error(str(error))
-    machine = simdtex.open_machine(options.device)
-    print(f"device: {machine.name}")
-    results = []
+def report(results, path, figures=FIGURES):
+    """Print the means over seeds and holes, and write them as a table; results are picture, shape, label, figures."""
+    names, shapes, labels = (list(dict.fromkeys(each)) for each in list(zip(*results, strict=True))[:3])
+    groups = [(name, [r for r in results if r[0] == name]) for name in names]
+    groups += [(f"all, {shape}", [r for r in results if r[1] == shape]) for shape in shapes if len(shapes) > 1]
+    lines = []
+    for title, group in [*groups, ("all", results)]:
+        for label in labels:
+            values = [[r[3][figure] for r in group if r[2] == label and figure in r[3]] for figure in figures]
+            lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
+    header = ["picture", "filling", *figures]
+    common.show("Means over seeds and holes", header, lines)
+    if path:
+        common.write(path, header, lines)
+
+
+@common.command
+def main(samples=Path, only="", holes="", seeds=1, options=list, out=Path, csv=Path, device=None):
+    settings = {"fill": {}} | {text: common.parsed(text) for text in options or ()}
+    known, results = common.samples(samples, only), []
+    machine = common.opened(device)
     for name, picture in known.items():
         cells = []
-        for shape, hole in holes(picture.shape[:2]).items():
-            if options.holes and shape not in options.holes.split(","):
-                continue
+        for shape, hole in common.chosen(hole_shapes(picture.shape[:2]), holes).items():
             cells.append((f"{name}, {shape}", cut(picture, hole), ""))
-            for label, seed, made, seconds in fillings(picture, hole, settings, options.seeds, machine):
+            for label, seed, made, seconds in fillings(picture, hole, settings, seeds, machine):
                 if not (made[~hole] == picture[~hole]).all():
-                    sys.exit(f"{label} changed known pixels of {name}")
+                    raise AssertionError(f"{label} changed known pixels of {name}")
                 figures = score(picture, made, hole)
-                results.append((name, shape, label, seed, figures))
-                told = "  ".join(f"{figure} {value:.2f}" for figure, value in figures.items())
-                print(f"{name:12} {shape:10} {label:20} seed {seed}  {told}  {seconds:.1f} s", flush=True)
+                results.append((name, shape, label, figures))
+                line = f"{name:12} {shape:10} {label:20} seed {seed}  {common.told(figures)}  {seconds:.1f} s"
+                print(line, flush=True)
                 if seed == 1:
-                    cells.append((label, made, told))
-        if options.out:
-            options.out.mkdir(parents=True, exist_ok=True)
-            over_folder.sheet(options.out / f"fill-{name}.png", cells, 3 + len(settings))
-    report(results, options.csv)
-
-
-def report(results, path, figures=FIGURES):
-    """Print the means over seeds and holes, and write them as a table."""
-    labels = list(dict.fromkeys(label for _, _, label, _, _ in results))
-    names = list(dict.fromkeys(name for name, *_ in results))
-    shapes = list(dict.fromkeys(shape for _, shape, *_ in results))
-    header = ["picture", "filling", *figures]
-    lines = []
-    groups = [(name, lambda r, name=name: r[0] == name) for name in names]
-    groups += [(f"all, {shape}", lambda r, shape=shape: r[1] == shape) for shape in shapes if len(shapes) > 1]
-    groups += [("all", lambda r: True)]
-    for title, of in groups:
-        for label in labels:
-            those = [r[4] for r in results if of(r) and r[2] == label]
-            values = [[one[figure] for one in those if figure in one] for figure in figures]
-            lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
-    tables.show("Means over seeds and holes", header, lines)
-    if path:
-        tables.write(path, header, lines)
+                    cells.append((label, made, common.told(figures)))
+        if out:
+            common.sheet(out / f"fill-{name}.png", cells, 3 + len(settings))
+    report(results, csv)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mosaics of textures, with training parts that lie apart from what is shown, and figures of their labels."""
+"""Mosaics of textures with training parts that lie apart, figures of their labels, and classifiers to compare with.
+
+These learn from features of windows, by a random forest of scikit-learn.
+"""
 
 from typing import NamedTuple
 
+import common
 import numpy as np
-import samples
 from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.signal import fftconvolve
 from scipy.stats import rankdata
 from skimage import data
+from skimage.feature import local_binary_pattern
+from skimage.filters import gabor_kernel
 
 LUMA = (0.299, 0.587, 0.114)
 NUMBER = 5  # textures of a mosaic
+PATTERNS = ((8, 1), (8, 2), (16, 3))  # points and radius of local binary patterns
+FREQUENCIES, DIRECTIONS = (0.05, 0.1, 0.2, 0.35), 6  # of Gabor filters; cycles a pixel
+SHOWN = 3000  # pixels of each class that a forest learns from
+LEAST = 0.01  # added to a forest's probabilities, which may be 0
 AWAY = 16  # pixels from a border beyond which a pixel lies away from it
 
 
@@ -49,7 +59,7 @@ def parted(picture):
 
 def textures(folder, only=""):
     """The textures of a folder, and brick, grass and gravel of scikit-image, by name."""
-    found = samples.folder(folder, only)
+    found = common.folder(folder, only)
     found |= {name: getattr(data, name)() for name in ("brick", "grass", "gravel")}
     return {name: parted(picture) for name, picture in found.items()}
 
@@ -108,3 +118,50 @@ def auroc(unknown, known):
 def own_fit(output):
     """The fit of each pixel's most probable class, (rows, cols)."""
     return np.take_along_axis(output.fit, output.probability.argmax(-1)[..., None], -1)[..., 0]
+
+
+def averaged(planes, picture, window):
+    """Means of planes over Gaussian windows, with the mean and the contrast of the picture, (..., features)."""
+    values = picture.astype(np.float32)
+    mean, square = (gaussian_filter(one, window) for one in (values, values * values))
+    means = [gaussian_filter(np.asarray(plane, np.float32), window) for plane in planes]
+    return np.stack([*means, mean, np.sqrt(np.maximum(square - mean * mean, 0))], -1)
+
+
+def patterns(picture):
+    """Where each local binary pattern occurs in a grey picture."""
+    for points, radius in PATTERNS:
+        code = local_binary_pattern(picture, points, radius, "uniform")
+        yield from (code == value for value in range(points + 2))
+
+
+def energies(picture):
+    """The energy of each Gabor filter in a grey picture."""
+    values = picture / 255
+    for frequency in FREQUENCIES:
+        for turn in range(DIRECTIONS):
+            kernel = gabor_kernel(frequency, theta=np.pi * turn / DIRECTIONS)
+            rows, cols = (length // 2 for length in kernel.shape)
+            padded = np.pad(values, ((rows, rows), (cols, cols)), mode="symmetric")
+            yield abs(fftconvolve(padded, kernel, mode="valid"))
+
+
+FEATURES = {"binary patterns": patterns, "Gabor energies": energies}
+
+
+def probabilities(training, pictures, features, window):
+    """Logarithms of probabilities by a random forest, (classes, rows, cols) for each of grey pictures."""
+    try:
+        from sklearn.ensemble import RandomForestClassifier
+    except ModuleNotFoundError:
+        raise SystemExit("the baselines need scikit-learn: pip install -e '.[benchmarks]'") from None
+
+    def pixels(picture):
+        found = averaged(features(picture), picture, window)
+        return found.reshape(-1, found.shape[-1])
+
+    rng = np.random.default_rng(1)
+    shown = [rng.permutation(pixels(one))[:SHOWN] for one in training]
+    forest = RandomForestClassifier(100, n_jobs=2, random_state=1, min_samples_leaf=3)
+    forest.fit(np.concatenate(shown), np.repeat(np.arange(len(shown)), [len(one) for one in shown]))
+    return [np.log(forest.predict_proba(pixels(one)).T.reshape(-1, *one.shape) + LEAST) for one in pictures]

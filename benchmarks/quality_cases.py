@@ -6,28 +6,18 @@
 The sample is 128 x 128 pixels of the gravel of scikit-image, the pictures are 256 x 256.
 """
 
-import argparse
-from pathlib import Path
-
+import common
 import numpy as np
-import tables
 from figures import further
 from scipy.ndimage import gaussian_filter
 from skimage import data
 
 import simdtex
 
-FIGURES = {
-    "plausibility": "plausibility",
-    "coverage": "coverage",
-    "copying": "copying",
-    "repeats": "repeats",
-    "salt": "salt",
-    "contrast": "contrast",
-    "histogram_distance": "histogram",
-    "seam": "seam",
-    "effective_share": "effective share",
-}
+FIGURES = (
+    *("plausibility", "coverage", "copying", "repeats", "salt", "contrast"),
+    *("histogram_distance", "seam", "effective_share"),
+)
 
 
 def cases(photograph, sample, device):
@@ -35,35 +25,33 @@ def cases(photograph, sample, device):
     rng = np.random.default_rng(1)
     rows, cols = sample.shape
     real = photograph[-2 * rows :, -2 * cols :]
-    row, col = np.indices(real.shape)
     yield "another part of the photograph", real, None
     made, output = simdtex.synthesize(sample, real.shape, rng=1, device=device, full_output=True)
     yield "``mrf`` with its defaults", made, output.source
-    tiled = np.stack([row % rows, col % cols], -1)
-    yield "the sample, tiled", np.tile(sample, (2, 2)), tiled
-    corner = tiled % 32
-    yield "32 x 32 pixels of it, tiled", sample[corner[..., 0], corner[..., 1]], corner
-    places = rng.integers(0, (rows, cols), (*real.shape, 2))
-    yield "its pixels in no order", sample[places[..., 0], places[..., 1]], places
+    tiled = np.stack(np.indices(real.shape), -1) % (rows, cols)
+    places = {
+        "the sample, tiled": tiled,
+        "32 x 32 pixels of it, tiled": tiled % 32,
+        "its pixels in no order": rng.integers(0, (rows, cols), (*real.shape, 2)),
+    }
+    for name, source in places.items():
+        yield name, sample[source[..., 0], source[..., 1]], source
     yield "the photograph, blurred", np.rint(gaussian_filter(real.astype(float), 1.5)).astype(np.uint8), None
     salted = np.where(rng.random(real.shape) < 0.03, rng.permutation(real.ravel()).reshape(real.shape), real)
     yield "the photograph, 3 % of its pixels moved", salted, None
     yield "the photograph, at 3/4 of its brightness", (real * 0.75).astype(np.uint8), None
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "study" / "quality.csv")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    photograph = data.gravel()
+@common.command
+def main(out=common.DOCS / "study" / "quality.csv", device=None):
+    photograph, table = data.gravel(), []
     sample = photograph[:128, :128]
-    table = []
-    for name, picture, source in cases(photograph, sample, options.device):
+    for name, picture, source in cases(photograph, sample, device):
         found = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
         table.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
         print(*table[-1], sep="  ", flush=True)
-    tables.write(options.out, ["picture", *FIGURES.values()], table)
+    headings = [figure.removesuffix("_distance").replace("_", " ") for figure in FIGURES]
+    common.write(out, ["picture", *headings], table)
 
 
 if __name__ == "__main__":

@@ -12,18 +12,13 @@ tiles   `simdtex.quality.seam`: the step across the seam of the picture laid sid
 rim, inside, seam, step    of what is new, as in fill.py.
 """
 
-import argparse
-import time
 from pathlib import Path
 
+import common
 import fill
 import numpy as np
-import over_folder
-import samples
 
 import simdtex
-
-FIGURES = ("tiles", *fill.FIGURES)
 
 
 def frame(shape, band):
@@ -35,8 +30,7 @@ def frame(shape, band):
 
 def seamless(picture, band):
     """The figures of a picture that was made seamless: it is seen with as much of its repetition as was made anew."""
-    around = ((band, band), (band, band), (0, 0))[: picture.ndim]
-    wrapped = np.pad(picture, around, mode="wrap")
+    wrapped = np.pad(picture, ((band, band), (band, band), (0, 0))[: picture.ndim], mode="wrap")
     found = fill.score(wrapped, wrapped, np.pad(frame(picture.shape[:2], band), band, constant_values=True))
     return {"tiles": simdtex.quality.seam(picture)} | found
 
@@ -53,51 +47,31 @@ def twice(picture):
     return np.tile(picture, (2, 2, 1)[: picture.ndim])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=Path, help="folder of pictures, each a texture")
-    parser.add_argument("--only", default="", help="names of textures, brick,wood")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--bands", default="4,8,16,32", help="widths, pixels; none that takes up a picture")
-    parser.add_argument("--add", type=int, default=64, help="how much is added to the right and below, pixels")
-    parser.add_argument("--options", default="", help="NAME=VALUE,NAME=VALUE")
-    parser.add_argument("--out", type=Path, help="folder for the sheets")
-    parser.add_argument("--csv", type=Path, help="a file for the table, a line for each texture and band")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    try:
-        given = over_folder.parsed(options.options)
-        bands = [int(width) for width in options.bands.split(",")]
-        known = samples.chosen(options.samples, options.only)
-    except ValueError as error:
-        parser.error(str(error))
-    machine = simdtex.open_machine(options.device)
-    print(f"device: {machine.name}")
-    results = []
+@common.command
+def main(samples=Path, only="", seeds=1, bands="4,8,16,32", add=64, options="", out=Path, csv=Path, device=None):
+    known, results = common.samples(samples, only), []
+    given = common.parsed(options) | {"device": common.opened(device)}
     for name, picture in known.items():
-        channels = {"channel_axis": -1 if picture.ndim == 3 else None}
-        cells = [(f"{name}, 2 x 2", twice(picture), f"tiles {simdtex.quality.seam(picture):.2f}")]
-        results.append((name, "", "as it is", 1, {"tiles": simdtex.quality.seam(picture)}))
-        jobs = [
-            (f"band {band}", {"seamless": True, "band": band}) for band in bands if 3 * band < min(picture.shape[:2])
-        ]
-        jobs += [("continued", {"right": options.add, "bottom": options.add})] if options.add else []
-        for label, what in jobs:
-            for seed in range(1, options.seeds + 1):
-                began = time.perf_counter()
-                made = simdtex.extend(picture, rng=seed, device=machine, **what, **channels, **given)
-                seconds = time.perf_counter() - began
-                tiled = "seamless" in what
+        own = {"tiles": simdtex.quality.seam(picture)}
+        cells = [(f"{name}, 2 x 2", twice(picture), common.told(own))]
+        results.append((name, "", "as it is", own))
+        widths = [band for band in map(int, bands.split(",")) if 3 * band < min(picture.shape[:2])]
+        jobs = {f"band {band}": {"seamless": True, "band": band} for band in widths}
+        if add:
+            jobs["continued"] = {"right": add, "bottom": add}
+        for label, what in jobs.items():
+            for seed in range(1, seeds + 1):
+                more = {"rng": seed, "channel_axis": common.axis(picture), **what, **given}
+                made, seconds = common.timed(simdtex.extend, picture, **more)
+                tiled = "band" in what
                 figures = seamless(made, what["band"]) if tiled else continued(made, picture.shape[:2])
-                results.append((name, "", label, seed, figures))
-                told = "  ".join(f"{figure} {value:.2f}" for figure, value in figures.items())
-                print(f"{name:12} {label:10} seed {seed}  {told}  {seconds:.1f} s", flush=True)
+                results.append((name, "", label, figures))
+                print(f"{name:12} {label:10} seed {seed}  {common.told(figures)}  {seconds:.1f} s", flush=True)
                 if seed == 1:
-                    cells.append((label, twice(made) if tiled else made, told))
-        if options.out:
-            options.out.mkdir(parents=True, exist_ok=True)
-            over_folder.sheet(options.out / f"tile-{name}.png", cells, 3)
-    fill.report(results, options.csv, FIGURES)
+                    cells.append((label, twice(made) if tiled else made, common.told(figures)))
+        if out:
+            common.sheet(out / f"tile-{name}.png", cells, 3)
+    fill.report(results, csv, ("tiles", *fill.FIGURES))
 
 
 if __name__ == "__main__":

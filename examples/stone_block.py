@@ -7,7 +7,7 @@ Synthesise stone with the method ``pyramid``: ``python stone_block.py [FOLDER] [
 
 * flat.png is a larger picture of the grain.
 * iterations.png shows how noise converges to grain.
-* solid.png shows a block of the grain, whole and cut, a ball carved from it, and slices.
+* solid.png shows a block of the grain, and three slices of it.
 * mixed.png is the grain in the colours of wood.
 """
 
@@ -20,8 +20,7 @@ from skimage.transform import downscale_local_mean
 
 import simdtex
 from simdtex.io.image import write
-from simdtex.report.sheet import contact_sheet
-from simdtex.report.solid import view
+from simdtex.report.sheet import contact_sheet, view
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")

@@ -95,12 +95,10 @@ def test_the_field_removes_a_spot(classify):
 
 
 def test_the_tables(classify, mosaics, folder, monkeypatch, capsys):
-    import baselines
-
     small = SimpleNamespace(**{name: lambda n=n: texture((128, 128), seed=n) for n, name in enumerate(NAMES)})
     monkeypatch.setattr(mosaics, "data", small)
     monkeypatch.setattr(classify, "data", small)
-    monkeypatch.setattr(baselines, "SHOWN", 100)
+    monkeypatch.setattr(mosaics, "SHOWN", 100)
     parts = [part for part in classify.PARTS if part != "accuracy" or find_spec("sklearn")]
     for name, values in (("ORDERS", (2,)), ("FIELDS", [(8, 2)]), ("DEFAULTS", {"typical": (0.0,)})):
         monkeypatch.setattr(classify, name, values)
@@ -114,9 +112,7 @@ def test_the_tables(classify, mosaics, folder, monkeypatch, capsys):
         assert rows and all(len(row) == len(header) for row in rows), part
 
 
-def test_missing_baselines_are_told(classify, monkeypatch):
-    import baselines
-
+def test_missing_baselines_are_told(mosaics, monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
     with pytest.raises(SystemExit, match="pip install"):
-        baselines.probabilities([], [], baselines.patterns, 4)
+        mosaics.probabilities([], [], mosaics.patterns, 4)

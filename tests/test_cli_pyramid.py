@@ -12,7 +12,7 @@ import simdtex
 from simdtex.cli import main
 from simdtex.cli.inputs import last_iteration
 from simdtex.io import image
-from simdtex.report.solid import view
+from simdtex.report.sheet import view
 
 GREY, COLOUR = texture((32, 28)), texture((32, 28), 3, seed=1)
 OTHER, START = texture((30, 34), 3, seed=2), texture((24, 40), seed=3)

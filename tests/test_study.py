@@ -17,11 +17,11 @@ QUICK = "order=2"
 
 
 @pytest.fixture
-def over_folder(monkeypatch):
+def study(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import over_folder
+    import study
 
-    return over_folder
+    return study
 
 
 @pytest.fixture
@@ -120,11 +120,11 @@ def test_bad_input_gets_one_sentence(folder, monkeypatch, capsys, words, says):
     assert says in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_the_worst_is_far_from_what_is_best(over_folder):
+def test_the_worst_is_far_from_what_is_best(study):
     def result(name, **figures):
-        return over_folder.Result(name, "after", 1, None, figures)
+        return study.Result(name, "after", 1, None, figures)
 
-    found = over_folder.summary(
+    found = study.summary(
         [
             result("a", salt=0.25, coverage=0.1, effective_share=0.3),
             result("b", salt=3.0, coverage=0.4, effective_share=0.2),

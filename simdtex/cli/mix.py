@@ -104,7 +104,7 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     group=OUTPUTS,
     type=WRITE,
     metavar="PNG",
-    help="Write a picture of the block: a cube, a sphere and three slices.",
+    help="Write a picture of the block: the block itself and its three middle slices.",
 )
 @stages_option("the middle slice of every iteration")
 @PROFILE
@@ -114,7 +114,7 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | No
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
     """
     from simdtex.io import image, volume
-    from simdtex.report.solid import view
+    from simdtex.report.sheet import view
     from simdtex.synthesis import synthesize_solid
 
     shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")

@@ -18,7 +18,7 @@ import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.files import earlier_files
-from simdtex.io.image import to_display, write
+from simdtex.io.image import check_writable, to_display, write
 from simdtex.model.display import temperature_colours
 from simdtex.run import Progress
 
@@ -77,6 +77,57 @@ def _scaled(picture: Picture, scale: int | None) -> Picture:
         scale = -(-LEAST_SIDE // max(picture.shape[:2]))
         picture = fitted(picture, MOST_SIDE)
     return magnified(picture, scale)
+
+
+def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Picture:
+    """Return pictures of a solid texture on one sheet: its first faces as a cube, and its middle slices.
+
+    Parameters
+    ----------
+    volume : array_like, (depth, rows, cols) or (depth, rows, cols, channels)
+        Types other than uint8 are stretched over their own range. Of three channels or more the first three are shown
+        as colours, else the first as grey.
+    path : path, optional
+        A file for the sheet; the suffix names the format.
+    size : int
+        The most pixels of the longest side of a picture, 96 to 1024.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols, 3)
+        The block with its first slice in front, its first rows above and its last columns to the right, two slices
+        deep for each pixel; then the middle x-y, x-z and y-z slices. All have one scale.
+
+    Raises
+    ------
+    ValueError
+        The volume has another number of axes or is empty, `size` is out of range, or `path` cannot be written.
+    """
+    block = np.asarray(volume)
+    if block.ndim not in (3, 4) or block.size == 0:
+        raise ValueError(
+            f"the volume has the shape {block.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
+        )
+    if not LEAST_SIDE <= size <= MOST_SIDE:
+        raise ValueError(f"size is {size}: give {LEAST_SIDE} to {MOST_SIDE} pixels")
+    if path is not None:
+        check_writable(path, np.uint8, 3)  # before the work
+    block = to_display(block[..., : 3 if block.shape[3] >= 3 else 1] if block.ndim == 4 else block)
+    (rows, cols), behind = block.shape[1:3], (len(block) - 1) // 2
+    cube = np.full((behind + rows, behind + cols, 3), 255, np.uint8)
+    for z in reversed(range(len(block))):  # those in front hide the others but for their first rows and last columns
+        cube[behind - z // 2 :, z // 2 :][:rows, :cols] = rgb(block[z]) if z == 0 else rgb(block[z]) // 4 * 3
+    z, y, x = (n // 2 for n in block.shape[:3])
+    pictures = {
+        "block": cube,
+        f"x-y slice, z = {z}": rgb(block[z]),
+        f"x-z slice, y = {y}": rgb(block[:, y]),
+        f"y-z slice, x = {x}": rgb(block[:, :, x]),
+    }
+    longest = max(*cube.shape[:2], len(block))
+    least, most = -(-longest // size), max(1, size // longest)  # whole factors that reduce and enlarge all
+    shown = [(name, magnified(fitted(one, -(-max(one.shape[:2]) // least)), most)) for name, one in pictures.items()]
+    return contact_sheet(shown, path, columns=4, scale=1)
 
 
 def rgb(picture: ArrayLike) -> Picture:
