@@ -100,6 +100,7 @@ def test_the_field_removes_a_spot(classify):
     assert (classify.field(machine, evidence, 4, 0) == 2).sum() == 9
 
 
+@pytest.mark.slow
 def test_the_tables(classify, mosaics, folder, monkeypatch, capsys):
     import baselines
 
@@ -169,6 +170,7 @@ def test_a_bright_filling_has_a_seam_and_a_blurred_one_small_steps(fill, cut):
     assert fill.score(soft, raised, hole)["seam"] > 3
 
 
+@pytest.mark.slow
 def test_one_command_gives_the_table_and_the_sheets(fill, tmp_path, monkeypatch, capsys):
     (tmp_path / "in").mkdir()
     write(tmp_path / "in" / "red.png", texture((20, 20), 3))

@@ -231,7 +231,7 @@ numpy.save(labels, joblib.load(file).predict(numpy.load(picture)))
 """
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize("dtype", [np.uint8, pytest.param(np.float32, marks=pytest.mark.slow)])
 def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(machine, tmp_path, dtype):
     picture = PICTURE.astype(dtype)
     found = simdtex.TextureClassifier(**QUICK | {"device": machine, "levels": 1}).fit(picture, STROKES)
@@ -320,9 +320,9 @@ def test_the_estimator_says_what_is_wrong():
 
 # -- ``simdtex classify``, end to end: labels, fits, the report, and what is refused.
 
-LEFT_COMMAND, RIGHT_COMMAND = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
-PICTURE_COMMAND = np.hstack([LEFT_COMMAND, RIGHT_COMMAND])
-TRUTH_COMMAND = np.repeat([1, 2], 20)[None].repeat(24, 0).astype(np.uint8)
+LEFT_RGB, RIGHT_RGB = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
+PICTURE_RGB = np.hstack([LEFT_RGB, RIGHT_RGB])
+TRUTH_BYTES = np.repeat([1, 2], 20)[None].repeat(24, 0).astype(np.uint8)
 OPTIONS = {"exemplars": 100, "coupling": 2.0}
 WORDS = ["--exemplars", 100, "--coupling", 2, "--seed", 5, "--device", "reference"]
 SAMPLES = ["--texture", "left=left.png", "--texture", "right=right.png"]
@@ -331,16 +331,16 @@ SAMPLES = ["--texture", "left=left.png", "--texture", "right=right.png"]
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    image.write("picture.png", PICTURE_COMMAND)
-    image.write("left.png", LEFT_COMMAND[:18])
-    image.write("right.png", RIGHT_COMMAND[6:])
-    image.write("grey.png", LEFT_COMMAND[..., 0])
-    image.write("truth.png", np.where(np.arange(40) < 2, 255, TRUTH_COMMAND).astype(np.uint8))
-    image.write("small.png", TRUTH_COMMAND[:3])
-    image.write("far.png", TRUTH_COMMAND * 9)
+    image.write("picture.png", PICTURE_RGB)
+    image.write("left.png", LEFT_RGB[:18])
+    image.write("right.png", RIGHT_RGB[6:])
+    image.write("grey.png", LEFT_RGB[..., 0])
+    image.write("truth.png", np.where(np.arange(40) < 2, 255, TRUTH_BYTES).astype(np.uint8))
+    image.write("small.png", TRUTH_BYTES[:3])
+    image.write("far.png", TRUTH_BYTES * 9)
     alpha = np.where(np.arange(40) < 20, 255, 0).astype(np.uint8)[None].repeat(24, 0)
-    image.write("cut.png", np.dstack([PICTURE_COMMAND, alpha]))
-    write_labels("strokes.png", np.where(TRUTH_COMMAND == 1, 1, 0).astype(np.uint8))
+    image.write("cut.png", np.dstack([PICTURE_RGB, alpha]))
+    write_labels("strokes.png", np.where(TRUTH_BYTES == 1, 1, 0).astype(np.uint8))
     return tmp_path
 
 
@@ -352,8 +352,8 @@ def test_the_command_gives_the_bytes_of_the_function(folder):
     result = run("picture.png", *SAMPLES, "-o", "labels.png", "--confidence", "fit.tif", "--unknown", 0.02)
     assert result.exit_code == 0, result.output
     wanted, output = simdtex.classify(
-        PICTURE_COMMAND,
-        {"left": LEFT_COMMAND[:18], "right": RIGHT_COMMAND[6:]},
+        PICTURE_RGB,
+        {"left": LEFT_RGB[:18], "right": RIGHT_RGB[6:]},
         channel_axis=-1,
         rng=5,
         device="reference",
@@ -427,12 +427,18 @@ def test_several_samples_of_a_class_and_transparent_parts(folder):
     words = ["--texture", "left=cut.png,left.png", "--texture", "right=right.png", "--validation", "right=right.png"]
     result = run("picture.png", *words, "-o", "labels.png", "--unknown", 0)
     assert result.exit_code == 0, result.output
-    hidden = np.ma.MaskedArray(PICTURE_COMMAND, np.arange(40)[None, :, None].repeat(24, 0).repeat(3, 2) >= 20)
-    textures = {"left": [hidden, LEFT_COMMAND[:18]], "right": RIGHT_COMMAND[6:]}
+    hidden = np.ma.MaskedArray(PICTURE_RGB, np.arange(40)[None, :, None].repeat(24, 0).repeat(3, 2) >= 20)
+    textures = {"left": [hidden, LEFT_RGB[:18]], "right": RIGHT_RGB[6:]}
     wanted = simdtex.classify(
-        PICTURE_COMMAND, textures, validation={"right": RIGHT_COMMAND[6:]}, channel_axis=-1, rng=5, device="reference", unknown=0.0,
+        PICTURE_RGB,
+        textures,
+        validation={"right": RIGHT_RGB[6:]},
+        channel_axis=-1,
+        rng=5,
+        device="reference",
+        unknown=0.0,
         **OPTIONS,
-    )  # fmt: skip
+    )
     assert (read_labels("labels.png") == wanted).all()
 
 
@@ -457,7 +463,7 @@ def test_the_report_shows_a_grey_picture(folder):
     result = run("grey.png", "--texture", "left=grey.png", "-o", "labels.png", "--report", "page", "--unknown", 0)
     assert result.exit_code == 0, result.output
     shown = image.read(folder / "page/labels.png").pixels.reshape(-1, 3)
-    assert set(map(tuple, np.repeat(LEFT_COMMAND[..., 0].reshape(-1, 1), 3, 1))) <= set(map(tuple, shown))
+    assert set(map(tuple, np.repeat(LEFT_RGB[..., 0].reshape(-1, 1), 3, 1))) <= set(map(tuple, shown))
 
 
 def test_confusion_leaves_out_what_is_not_known():
@@ -476,9 +482,16 @@ def test_resume_writes_what_the_command_writes(folder):
     kept = Checkpoint("state", every=0, command=line)
     with pytest.raises(KeyboardInterrupt):
         simdtex.classify(
-            PICTURE_COMMAND, {"left": [LEFT_COMMAND[:18]], "right": [RIGHT_COMMAND[6:]]}, channel_axis=-1, rng=5, device="reference",
-            callback=lambda progress: kept.stop(), checkpoint=kept, validation={}, **OPTIONS,
-        )  # fmt: skip
+            PICTURE_RGB,
+            {"left": [LEFT_RGB[:18]], "right": [RIGHT_RGB[6:]]},
+            channel_axis=-1,
+            rng=5,
+            device="reference",
+            callback=lambda progress: kept.stop(),
+            checkpoint=kept,
+            validation={},
+            **OPTIONS,
+        )
     result = CliRunner().invoke(main, ["resume", "state"])
     assert result.exit_code == 0, result.output
     assert (folder / "labels.png").read_bytes() == wanted
@@ -507,7 +520,7 @@ BAD_COMMAND = {
 @pytest.mark.parametrize("case", BAD_COMMAND)
 def test_what_is_wrong_is_said_in_one_sentence(folder, case):
     args, words = BAD_COMMAND[case]
-    image.write("labels.png" if case == "an input overwritten" else "other.png", LEFT_COMMAND)
+    image.write("labels.png" if case == "an input overwritten" else "other.png", LEFT_RGB)
     before = sorted(path.name for path in folder.iterdir())
     result = run("picture.png", *args, "-o", "labels.png")
     assert result.exit_code == 2, result.output

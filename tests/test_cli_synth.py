@@ -6,11 +6,10 @@ import numpy as np
 import PIL.Image
 import pytest
 from cases import texture
-from click.testing import CliRunner
+from commands import names, pixels, refused, run
 from volumes import loaded
 
 import simdtex
-from simdtex.cli import main
 from simdtex.cli.inputs import last_iteration
 from simdtex.io import image
 from simdtex.model.source_map import load_source_map
@@ -19,11 +18,12 @@ from simdtex.report.solid import view
 # -- ``simdtex synth`` with several samples, masks, known values and guides, end to end.
 
 OPTIONS = {"order": 2, "rng": 5, "device": "reference"}
+QUICK = ["--order", 2, "--seed", 5, "--device", "reference"]
 RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 
 
 @pytest.fixture
-def folder(tmp_path):
+def folder(tmp_path, monkeypatch):
     """Samples, masks, tables, pictures of known values, and guides."""
     rng = np.random.default_rng(2)
     noise = rng.integers(0, 256, (24, 20), dtype=np.uint8)
@@ -53,51 +53,32 @@ def folder(tmp_path):
     open_ = np.dstack([wanted, np.where(np.arange(18) < 12, np.uint8(255), np.uint8(0)) * np.ones((16, 1), np.uint8)])
     write |= {"labels.png": labels, "wanted.png": wanted, "strange.png": strange, "open.png": open_}
     write["labels2.png"] = np.broadcast_to(np.array(BLUE, np.uint8), (16, 28, 3))
-    for name, pixels in write.items():
-        image.write(tmp_path / name, pixels)
+    monkeypatch.chdir(tmp_path)
+    for name, one in write.items():
+        image.write(name, one)
     (tmp_path / "wells.csv").write_text("x,y,value\n3,4,200\n10.4,7,17\n")
     return tmp_path
 
 
-def run(folder, *args):
-    """Run a command; what ends like a file is one of the folder."""
-    placed = [placed_in(folder, str(arg)) for arg in args]
-    return CliRunner().invoke(main, placed)
+def synth(*words):
+    return run("synth", *words, *QUICK)
 
 
-def placed_in(folder, text):
-    if not text.endswith((".png", ".tif", ".npz", ".npy", ".csv")):
-        return text
-    return "=".join(",".join(f"{folder}/{name}" for name in part.split(",")) for part in text.split("="))
-
-
-def synth(folder, *args):
-    return run(folder, "synth", *args, "--order", 2, "--seed", 5, "--device", "reference")
-
-
-def made(folder, *args):
-    result = synth(folder, *args)
+def made(*words):
+    result = synth(*words)
     assert result.exit_code == 0, result.output
-    return pixels(folder, "out.tif")
-
-
-def pixels(folder, name):
-    return image.read(folder / name).pixels
-
-
-def listing(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+    return pixels("out.tif")
 
 
 def test_several_samples_and_maps_of_them(folder):
     args = ["sample.png", "second.png", "-o", "out.tif", "--size", "18x16", "--shares", "1,2", "--finish", 0]
     also = ["--also", "normal.png,normal2.png=carried.png", "--source-map", "s.npz"]
-    out = made(folder, *args, *also)
-    samples = [pixels(folder, "sample.png"), pixels(folder, "second.png")]
+    out = made(*args, *also)
+    samples = [pixels("sample.png"), pixels("second.png")]
     assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), shares=(1, 2), finish=0.0, **OPTIONS))
     source = load_source_map(folder / "s.npz")
-    maps = [pixels(folder, "normal.png"), pixels(folder, "normal2.png")]
-    carried = pixels(folder, "carried.png")
+    maps = [pixels("normal.png"), pixels("normal2.png")]
+    carried = pixels("carried.png")
     assert set(np.unique(source[..., 2])) == {0, 1}
     for k, other in enumerate(maps):
         here = source[..., 2] == k
@@ -106,51 +87,50 @@ def test_several_samples_and_maps_of_them(folder):
 
 def test_a_mask_says_what_may_be_used(folder):
     args = ["sample.png", "-o", "out.tif", "--size", "22x18", "--sample-mask", "left.png", "--source-map", "s.npz"]
-    out = made(folder, *args)
+    out = made(*args)
     assert load_source_map(folder / "s.npz")[..., 1].max() < 10
-    mask = pixels(folder, "left.png") > 0
-    assert np.array_equal(out, simdtex.synthesize(pixels(folder, "sample.png"), (18, 22), mask=mask, **OPTIONS))
+    mask = pixels("left.png") > 0
+    assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (18, 22), mask=mask, **OPTIONS))
 
 
 def test_each_sample_has_its_mask(folder):
     masks = ["--sample-mask", "none.png", "--sample-mask", "all.png"]
-    made(folder, "sample.png", "second.png", "-o", "out.tif", "--size", 20, *masks, "--source-map", "s.npz")
+    made("sample.png", "second.png", "-o", "out.tif", "--size", 20, *masks, "--source-map", "s.npz")
     assert (load_source_map(folder / "s.npz")[..., 2] == 1).all()
 
 
 def test_a_sample_may_be_unknown_in_parts(folder):
-    unknown = pixels(folder, "unknown.tif")
-    out = made(folder, "unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--size", "24x20")
+    unknown = pixels("unknown.tif")
+    out = made("unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--size", "24x20")
     assert np.array_equal(out, simdtex.synthesize(unknown, (20, 24), **OPTIONS))
     assert (out == 7.5).all()
-    refused = synth(folder, "unknown.tif", "-o", "again.tif", "--method", "multires")
-    assert refused.exit_code == 2 and "known everywhere" in refused.output
+    refused("known everywhere", "synth", "unknown.tif", "-o", "again.tif", "--method", "multires", *QUICK)
 
 
 def test_a_table_is_kept(folder):
     args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv"]
-    out = made(folder, *args, "--source-map", "s.npz")
+    out = made(*args, "--source-map", "s.npz")
     assert out[4, 3] == 200 and out[7, 10] == 17
     known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")
-    sample = pixels(folder, "sample.png")
+    sample = pixels("sample.png")
     assert np.array_equal(out, simdtex.synthesize(sample, (14, 20), known=known, **OPTIONS))
     assert (load_source_map(folder / "s.npz")[4, 3] == -1).all()
 
 
 @pytest.mark.parametrize("name", ["known.png", "known.tif"])
 def test_a_picture_says_what_is_known_and_how_large_the_output_is(folder, name):
-    out = made(folder, "sample.png", "-o", "out.tif", "--known", name)
-    known = pixels(folder, "known.tif")
+    out = made("sample.png", "-o", "out.tif", "--known", name)
+    known = pixels("known.tif")
     there = ~np.isnan(known)
     assert out.shape == (14, 20) and out.dtype == np.uint8
     assert np.array_equal(out[there], known[there])
-    assert np.array_equal(out, simdtex.synthesize(pixels(folder, "sample.png"), (14, 20), known=known, **OPTIONS))
+    assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (14, 20), known=known, **OPTIONS))
 
 
 def test_categories_are_never_mixed(folder):
     args = ["facies.tif", "-o", "out.tif", "--size", 16]
-    out = made(folder, *args, "--categorical")
-    facies = pixels(folder, "facies.tif")
+    out = made(*args, "--categorical")
+    facies = pixels("facies.tif")
     assert set(np.unique(out)) <= {0, 3}
     assert np.array_equal(out, simdtex.synthesize(facies, (16, 16), categorical=True, **OPTIONS))
 
@@ -164,37 +144,37 @@ def indexed(path, indices, colours, **options):
 
 @pytest.mark.parametrize("command", ["synth", "extend", "fill", "fill --sample"])
 def test_a_palette_is_categories_and_is_kept(folder, command):
-    facies = pixels(folder, "facies.tif")
+    facies = pixels("facies.tif")
     indexed(folder / "facies.png", facies, [RED, RED, GREEN, BLUE])
     more = {"synth": ["--size", 16], "extend": ["--right", 3]}.get(command, ["--mask", "hole.png"])
     image.write(folder / "hole.png", np.pad(np.full((4, 4), 255, np.uint8), ((9, 11), (8, 8))))
     for name in ("facies.png", "facies.tif"):
         words = [*command.split(), name, *[name][: " " in command], *more, "-o", name.replace("facies", "out")]
         words += ["--order", 2, "--seed", 5, "--categorical"]
-        result = run(folder, *words, "--device", "reference")
+        result = run(*words, "--device", "reference")
         assert result.exit_code == 0, result.output
     with PIL.Image.open(folder / "out.png") as made:
-        assert made.mode == "P" and np.array_equal(made, pixels(folder, "out.tif"))
+        assert made.mode == "P" and np.array_equal(made, pixels("out.tif"))
         assert made.getpalette()[:12] == [*RED, *RED, *GREEN, *BLUE]
 
 
 def test_known_categories_have_the_palette_of_the_sample(folder):
-    facies, colours = pixels(folder, "facies.tif"), [RED, RED, GREEN, BLUE]
+    facies, colours = pixels("facies.tif"), [RED, RED, GREEN, BLUE]
     known = np.where(np.arange(20) % 7, np.uint8(1), facies[:16])
     indexed(folder / "facies.png", facies, colours)
     indexed(folder / "known.png", known, colours[:3], transparency=1)
     args = ["facies.png", "--known", "known.png", "--size", "20x16", "-o", "out.tif", "--categorical"]
     hidden = np.ma.MaskedArray(known, known == 1)
     found = simdtex.synthesize(facies, (16, 20), known=hidden, categorical=True, **OPTIONS)
-    assert np.array_equal(made(folder, *args), found)
+    assert np.array_equal(made(*args), found)
     indexed(folder / "known.png", known, colours[::-1], transparency=1)
-    result = synth(folder, *args)
+    result = synth(*args)
     assert result.exit_code == 2 and "facies.png have different palettes; save both with the same" in result.output
 
 
 def test_guides_with_palettes_are_labels_by_their_colours(folder):
     """However many there are, and in whatever order; or by their indices, beside numbers."""
-    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "wanted.png"))
+    sample, labels, wanted = (pixels(name) for name in ("sample.png", "labels.png", "wanted.png"))
     options = {"guide_weight": 4.0, "labels": True} | OPTIONS
     spread = (np.arange(480).reshape(24, 20) // 8).astype(np.uint8)  # too many for other colours to be labels
     tones = np.stack([np.arange(256), np.arange(256)[::-1], np.full(256, 7)], -1)
@@ -202,11 +182,11 @@ def test_guides_with_palettes_are_labels_by_their_colours(folder):
     indexed(folder / "wanted.png", 255 - spread[:16, :18], tones[::-1])
     args = ["sample.png", "-o", "out.tif", "--guide-weight", 4, "--guide"]
     found = simdtex.synthesize(sample, (16, 18), guide=(spread, spread[:16, :18]), **options)
-    assert np.array_equal(made(folder, *args, "labels.png=wanted.png"), found)
+    assert np.array_equal(made(*args, "labels.png=wanted.png"), found)
     indexed(folder / "wanted.png", numbered(wanted), [GREEN, RED])
     image.write(folder / "labels.tif", numbered(labels))
     found = simdtex.synthesize(sample, (16, 18), guide=(numbered(labels), numbered(wanted)), **options)
-    assert np.array_equal(made(folder, *args, "labels.tif=wanted.png"), found)
+    assert np.array_equal(made(*args, "labels.tif=wanted.png"), found)
 
 
 def numbered(picture):
@@ -215,8 +195,8 @@ def numbered(picture):
 
 def test_colours_are_labels(folder):
     args = ["sample.png", "-o", "out.tif", "--guide", "labels.png=wanted.png", "--source-map", "s.npz"]
-    out = made(folder, *args, "--guide-weight", 4, "--novelty", 0)
-    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "wanted.png"))
+    out = made(*args, "--guide-weight", 4, "--novelty", 0)
+    sample, labels, wanted = (pixels(name) for name in ("sample.png", "labels.png", "wanted.png"))
     guide = numbered(labels), numbered(wanted)
     found = simdtex.synthesize(sample, (16, 18), guide=guide, guide_weight=4.0, novelty=0.0, **OPTIONS)
     assert np.array_equal(out, found)
@@ -226,26 +206,26 @@ def test_colours_are_labels(folder):
 
 def test_colours_are_numbers_where_it_says_so(folder):
     args = ["sample.png", "-o", "out.tif", "--guide", "labels.png=strange.png", "--no-labels"]
-    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "strange.png"))
+    sample, labels, wanted = (pixels(name) for name in ("sample.png", "labels.png", "strange.png"))
     found = simdtex.synthesize(sample, (16, 18), guide=(labels, wanted), labels=False, **OPTIONS)
-    assert np.array_equal(made(folder, *args), found)
+    assert np.array_equal(made(*args), found)
 
 
 def test_what_is_transparent_in_the_guide_of_the_output_is_left_open(folder):
-    out = made(folder, "sample.png", "-o", "out.tif", "--guide", "labels.png=open.png")
-    wanted = numbered(pixels(folder, "wanted.png")).astype(float)
+    out = made("sample.png", "-o", "out.tif", "--guide", "labels.png=open.png")
+    wanted = numbered(pixels("wanted.png")).astype(float)
     wanted[:, 12:] = np.nan
-    guide = numbered(pixels(folder, "labels.png")), wanted
-    sample = pixels(folder, "sample.png")
+    guide = numbered(pixels("labels.png")), wanted
+    sample = pixels("sample.png")
     assert np.array_equal(out, simdtex.synthesize(sample, (16, 18), guide=guide, labels=True, **OPTIONS))
 
 
 def test_each_sample_has_its_guide(folder):
     args = ["sample.png", "second.png", "-o", "out.tif", "--guide", "labels.png,labels2.png=wanted.png"]
-    out = made(folder, *args)
-    samples = [pixels(folder, "sample.png"), pixels(folder, "second.png")]
-    guides = [numbered(pixels(folder, name)) for name in ("labels.png", "labels2.png")]
-    guide = guides, numbered(pixels(folder, "wanted.png"))
+    out = made(*args)
+    samples = [pixels("sample.png"), pixels("second.png")]
+    guides = [numbered(pixels(name)) for name in ("labels.png", "labels2.png")]
+    guide = guides, numbered(pixels("wanted.png"))
     assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), guide=guide, **OPTIONS))
 
 
@@ -275,111 +255,29 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
     args, words = BAD[case]
-    before = listing(folder)
-    result = synth(folder, *args)
-    assert result.exit_code == 2, result.output
-    assert words in result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert listing(folder) == before
+    refused(words, "synth", *args, *QUICK)
 
 
 def test_known_values_of_a_vast_picture_are_not_placed(folder, monkeypatch):
     monkeypatch.setattr("simdtex.machine.memory.available", lambda: 2**30)
     monkeypatch.setattr("simdtex.io.hard_data.place_hard_data", lambda *_: pytest.fail("which takes 4 GiB"))
-    result = synth(folder, *ONE, "--known", "wells.csv", "--size", "46341x46341")
+    result = synth(*ONE, "--known", "wells.csv", "--size", "46341x46341")
     assert result.exit_code == 2 and "4096 MiB of this computer's memory and 1024 MiB is available" in result.output
 
 
-# -- ``simdtex synth --method multires``, end to end.
-
-
-@pytest.fixture
-def folder_multires(tmp_path):
-    """A folder with a small grey sample, one in colour, and nothing else."""
-    image.write(tmp_path / "sample.png", texture((16, 12)))
-    image.write(tmp_path / "colour.png", texture((16, 12), 3))
-    return tmp_path
-
-
-def run_multires(*args):
-    return CliRunner().invoke(main, [str(arg) for arg in args])
-
-
-def synth_multires(folder, *args):
-    arguments = ["synth", folder / "sample.png", "-o", folder / "out.png", "--method", "multires", "--seed", 5]
-    return run_multires(*arguments, "--device", "reference", *args)
-
-
-def files(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-
-
-def test_everything_at_once(folder_multires):
-    args = ["--size", "30x26", "--alpha", "0.6", "--orientations", 3]
-    args += ["--levels", 4, "--boundary", "open", "--preset", "paper"]
-    args += ["--stages", folder_multires / "st"]
-    result = synth_multires(
-        folder_multires,
-        *args,
-        "--source-map",
-        folder_multires / "s.npz",
-        "--also",
-        f"{folder_multires}/colour.png={folder_multires}/c.png",
-    )
-    assert result.exit_code == 0, result.output
-    made = image.read(folder_multires / "out.png").pixels
-    options = {"alpha": 0.6, "orientations": 3, "levels": 4, "boundary": "open", "preset": "paper"}
-    options |= {"rng": 5, "device": "reference"}
-    expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
-    np.testing.assert_array_equal(made, expected)
-    source, colour = load_source_map(folder_multires / "s.npz"), texture((16, 12), 3)
-    np.testing.assert_array_equal(image.read(folder_multires / "c.png").pixels, colour[source[..., 0], source[..., 1]])
-    stages = {f"{kind}level{level}.png" for kind in ("", "candidates-") for level in range(4)}
-    assert set(files(folder_multires / "st")) == stages
-    assert "candidates per level, coarse to fine: " in result.output
-
-
-def test_alpha_0_tiles(folder_multires):
-    assert synth_multires(folder_multires, "--alpha", 0, "--size", "24x32", "--edges", "keep").exit_code == 0
-    np.testing.assert_array_equal(image.read(folder_multires / "out.png").pixels, np.tile(texture((16, 12)), (2, 2)))
-    assert synth_multires(folder_multires, "--alpha", "inf").exit_code == 0
-    assert synth_multires(folder_multires, "-q").output == ""
-
-
-BAD_MULTIRES = {
-    "negative alpha": (["--alpha", -1], "alpha is -1.0; give a number of at least 0"),
-    "an option of mrf": (["--order", 8], "choose from: preset, alpha, beta"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_MULTIRES)
-def test_bad_options_get_one_sentence_and_write_nothing(folder_multires, case, monkeypatch):
-    monkeypatch.chdir(folder_multires)
-    args, words = BAD_MULTIRES[case]
-    result = synth_multires(folder_multires, *args, "--stages", folder_multires / "st")
-    assert result.exit_code == 2
-    assert words in result.output and result.output.count("\n") == 1
-    assert files(folder_multires) == ["colour.png", "sample.png"]
-
-
-def test_an_option_of_multires_is_none_of_mrf(folder_multires):
-    result = run_multires("synth", folder_multires / "sample.png", "-o", folder_multires / "out.png", "--alpha", 0.2)
-    assert result.exit_code == 2 and "unknown option 'alpha' of the method 'mrf'" in result.output
-
-
-# -- ``simdtex synth --method pyramid``, ``simdtex solid`` and ``simdtex mix``, end to end.
+# -- The methods multires and pyramid, ``simdtex solid`` and ``simdtex mix``
 
 GREY, COLOUR = texture((32, 28)), texture((32, 28), 3, seed=1)
 OTHER, START = texture((30, 34), 3, seed=2), texture((24, 40), seed=3)
 FILES = ["colour.png", "grey.png", "other.png", "start.png", "wide.png"]
 SAME = {"rng": 5, "device": "reference"}
 SEEDED = ["--seed", 5, "--device", "reference"]
-QUICK = ["--levels", 1, "--iterations", 2]
+FEW = ["--levels", 1, "--iterations", 2]
 EACH = {"levels": 1, "iterations": 2}
 
 
 @pytest.fixture
-def folder_pyramid(tmp_path, monkeypatch):
+def textures(tmp_path, monkeypatch):
     """A folder with samples and nothing else; the present one."""
     pictures = {"grey": GREY, "colour": COLOUR, "other": OTHER, "start": START, "wide": texture((32, 28), 3, np.uint16)}
     for name, picture in pictures.items():
@@ -388,36 +286,41 @@ def folder_pyramid(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run_pyramid(*args):
-    return CliRunner().invoke(main, [str(arg) for arg in args])
+PYRAMID = ["synth", "grey.png", "-o", "out.png", "--method", "pyramid", *SEEDED]
+SOLID = ["solid", "grey.png", "-o", "out.npz", *SEEDED]
+MIX = ["mix", "colour.png", "other.png", "-o", "out.png", *SEEDED]
 
 
-def synth_pyramid(*args, sample="grey.png"):
-    return run_pyramid("synth", sample, "-o", "out.png", "--method", "pyramid", *SEEDED, *args)
+MULTIRES = ["synth", "grey.png", "-o", "out.png", "--method", "multires", *SEEDED]
 
 
-def solid(*args, sample="grey.png", output="out.npz"):
-    return run_pyramid("solid", sample, "-o", output, *SEEDED, *args)
+def test_everything_at_once(textures):
+    args = ["--size", "44x36", "--alpha", "0.6", "--orientations", 3]
+    args += ["--levels", 4, "--boundary", "open", "--preset", "paper"]
+    result = run(*MULTIRES, *args, "--stages", "st", "--source-map", "s.npz", "--also", "colour.png=c.png")
+    assert result.exit_code == 0, result.output
+    options = {"alpha": 0.6, "orientations": 3, "levels": 4, "boundary": "open", "preset": "paper"} | SAME
+    np.testing.assert_array_equal(pixels("out.png"), simdtex.synthesize(GREY, (36, 44), method="multires", **options))
+    source = load_source_map("s.npz")
+    np.testing.assert_array_equal(pixels("c.png"), COLOUR[source[..., 0], source[..., 1]])
+    assert names("st") == sorted(f"{kind}level{level}.png" for kind in ("", "candidates-") for level in range(4))
+    assert "candidates per level, coarse to fine: " in result.output
 
 
-def mix(*args, samples=("colour.png", "other.png")):
-    return run_pyramid("mix", *samples, "-o", "out.png", *SEEDED, *args)
+def test_alpha_0_tiles(textures):
+    assert run(*MULTIRES, "--alpha", 0, "--size", "56x64", "--edges", "keep").exit_code == 0
+    np.testing.assert_array_equal(pixels("out.png"), np.tile(GREY, (2, 2)))
+    assert run(*MULTIRES, "--alpha", "inf").exit_code == 0
+    assert run(*MULTIRES, "-q").output == ""
 
 
-def files_pyramid(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+def test_bad_options_of_multires_get_one_sentence_and_write_nothing(textures):
+    refused("alpha is -1.0; give a number of at least 0", *MULTIRES, "--alpha", -1, "--stages", "st")
+    refused("choose from: preset, alpha, beta", *MULTIRES, "--order", 8, "--stages", "st")
+    refused("unknown option 'alpha' of the method 'mrf'", "synth", "grey.png", "-o", "out.png", "--alpha", 0.2)
 
 
-def picture(path="out.png"):
-    return image.read(path).pixels
-
-
-def assert_one_sentence(result, words, folder):
-    """The command has failed with these words in one line, and written nothing."""
-    assert result.exit_code == 2, result.output
-    assert words in result.output and result.output.count("\n") == 1, result.output
-    assert files_pyramid(folder) == FILES
-
+# -- ``simdtex synth --method pyramid``, ``simdtex solid`` and ``simdtex mix``
 
 OPTIONS_PYRAMID = {
     "plain": ([], {}),
@@ -426,7 +329,7 @@ OPTIONS_PYRAMID = {
         {"orientations": 2, "levels": 2, "edges": "wrap", "iterations": 1},
     ),
     "tables": (
-        ["--pyramid", "laplacian", "--preset", "paper", *QUICK],
+        ["--pyramid", "laplacian", "--preset", "paper", *FEW],
         {"pyramid": "laplacian", "match": "lookup", **EACH},
     ),
     "no iterations": (["--iterations", 0], {"iterations": 0}),
@@ -434,28 +337,28 @@ OPTIONS_PYRAMID = {
 
 
 @pytest.mark.parametrize("case", OPTIONS_PYRAMID)
-def test_synth_is_what_python_makes(folder_pyramid, case):
+def test_synth_is_what_python_makes(textures, case):
     args, options = OPTIONS_PYRAMID[case]
-    result = synth_pyramid("--size", "44x40", *args)
+    result = run(*PYRAMID, "--size", "44x40", *args)
     assert result.exit_code == 0, result.output
-    expected, run = simdtex.synthesize(GREY, (40, 44), method="pyramid", full_output=True, **options, **SAME)
-    np.testing.assert_array_equal(picture(), expected)
+    expected, output = simdtex.synthesize(GREY, (40, 44), method="pyramid", full_output=True, **options, **SAME)
+    np.testing.assert_array_equal(pixels("out.png"), expected)
     first, second = result.output.splitlines()[-2:]
     assert re.fullmatch(r"out\.png: 44x40 from 28x32 in [\d.]+ s on .+, seed 5", first)
-    assert second == last_iteration(run.statistics)
-    assert files_pyramid(folder_pyramid) == sorted([*FILES, "out.png"])
+    assert second == last_iteration(output.statistics)
+    assert names() == sorted([*FILES, "out.png"])
 
 
-def test_stages_of_synth_replace_those_of_an_earlier_run(folder_pyramid):
-    (folder_pyramid / "st").mkdir()
+def test_stages_of_synth_replace_those_of_an_earlier_run(textures):
+    (textures / "st").mkdir()
     image.write("st/level3.png", GREY)
     image.write("st/iteration09.png", GREY)
-    assert synth_pyramid("--stages", "st", *QUICK).exit_code == 0
-    assert files_pyramid(folder_pyramid / "st") == ["iteration01.png", "iteration02.png"]
-    np.testing.assert_array_equal(np.sort(picture("st/iteration02.png"), None), np.sort(picture(), None))
-    (folder_pyramid / "st" / "mine.txt").write_text("kept")
-    again = synth_pyramid("--stages", "st", *QUICK)
-    assert again.exit_code == 2 and again.output.count("\n") == 1 and (folder_pyramid / "st" / "mine.txt").exists()
+    assert run(*PYRAMID, "--stages", "st", *FEW).exit_code == 0
+    assert names("st") == ["iteration01.png", "iteration02.png"]
+    np.testing.assert_array_equal(np.sort(pixels("st/iteration02.png"), None), np.sort(pixels("out.png"), None))
+    (textures / "st" / "mine.txt").write_text("kept")
+    again = run(*PYRAMID, "--stages", "st", *FEW)
+    assert again.exit_code == 2 and again.output.count("\n") == 1 and (textures / "st" / "mine.txt").exists()
 
 
 BAD_PYRAMID = {
@@ -478,35 +381,37 @@ BAD_SYNTH = BAD_PYRAMID | {
 
 
 @pytest.mark.parametrize("case", BAD_SYNTH)
-def test_bad_synth_gets_one_sentence_and_writes_nothing(folder_pyramid, case):
+def test_bad_synth_gets_one_sentence_and_writes_nothing(textures, case):
     args, words = BAD_SYNTH[case]
     stages = [] if "--stages" in args else ["--stages", "st"]
-    assert_one_sentence(synth_pyramid(*stages, *args), words, folder_pyramid)
+    refused(words, *PYRAMID, *stages, *args)
 
 
-def test_solid_is_what_python_makes(folder_pyramid):
-    args = ["--preset", "paper", "--orientations", 2, "--edges", "wrap", *QUICK]
-    result = solid("--size", "6x10x8", "-o", "out.nrrd", "-o", "out.tif", "-o", "slices", "--view", "v.png", *args)
+def test_solid_is_what_python_makes(textures):
+    args = ["--preset", "paper", "--orientations", 2, "--edges", "wrap", *FEW]
+    result = run(
+        *SOLID, "--size", "6x10x8", "-o", "out.nrrd", "-o", "out.tif", "-o", "slices", "--view", "v.png", *args
+    )
     assert result.exit_code == 0, result.output
     options = {"solids": "average", "slices": "each", "match": "lookup", "orientations": 2, "edges": "wrap", **EACH}
-    expected, run = simdtex.synthesize_solid(GREY, (6, 10, 8), full_output=True, **options, **SAME)
+    expected, output = simdtex.synthesize_solid(GREY, (6, 10, 8), full_output=True, **options, **SAME)
     for name in ("out.npz", "out.nrrd", "out.tif", "slices"):
         np.testing.assert_array_equal(loaded(name), expected)
-    np.testing.assert_array_equal(picture("v.png"), view(expected))
+    np.testing.assert_array_equal(pixels("v.png"), view(expected))
     first, second = result.output.splitlines()[-2:]
-    names = r"out\.npz, out\.nrrd, out\.tif, slices, v\.png"
-    assert re.fullmatch(rf"{names}: 6x10x8 from 28x32 in [\d.]+ s on .+, seed 5", first)
-    assert second == last_iteration(run.statistics)
+    written = r"out\.npz, out\.nrrd, out\.tif, slices, v\.png"
+    assert re.fullmatch(rf"{written}: 6x10x8 from 28x32 in [\d.]+ s on .+, seed 5", first)
+    assert second == last_iteration(output.statistics)
 
 
-def test_stages_of_a_solid_are_its_middle_slice(folder_pyramid):
-    (folder_pyramid / "st").mkdir()
+def test_stages_of_a_solid_are_its_middle_slice(textures):
+    (textures / "st").mkdir()
     image.write("st/iteration09.png", GREY)
-    assert solid("--size", "5x12x9", "--stages", "st", *QUICK, sample="colour.png").exit_code == 0
-    assert files_pyramid(folder_pyramid / "st") == ["iteration01.png", "iteration02.png"]
+    assert run("solid", "colour.png", *SOLID[2:], "--size", "5x12x9", "--stages", "st", *FEW).exit_code == 0
+    assert names("st") == ["iteration01.png", "iteration02.png"]
     made = loaded("out.npz")
     assert made.shape == (5, 12, 9, 3)
-    np.testing.assert_array_equal(picture("st/iteration02.png"), made[2])
+    np.testing.assert_array_equal(pixels("st/iteration02.png"), made[2])
 
 
 SOLID_SIZES = ["0", "4x5", "4x5x6x7", "1.5"]
@@ -527,10 +432,10 @@ BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PIC
 
 
 @pytest.mark.parametrize("case", BAD_SOLID)
-def test_bad_solids_get_one_sentence_and_write_nothing(folder_pyramid, case):
+def test_bad_solids_get_one_sentence_and_write_nothing(textures, case):
     args, words = BAD_SOLID[case]
     size = [] if "--size" in args else ["--size", "8"]
-    assert_one_sentence(solid(*size, "--stages", "st", *args), words, folder_pyramid)
+    refused(words, *SOLID, *size, "--stages", "st", *args)
 
 
 MIXTURES = {
@@ -551,24 +456,24 @@ MIXTURES = {
 
 
 @pytest.mark.parametrize("case", MIXTURES)
-def test_mix_is_what_python_makes(folder_pyramid, case):
+def test_mix_is_what_python_makes(textures, case):
     args, options = MIXTURES[case]
-    result = mix("--size", "44x40", "--orientations", 2, *QUICK, *args)
+    result = run(*MIX, "--size", "44x40", "--orientations", 2, *FEW, *args)
     assert result.exit_code == 0, result.output
     options = {"orientations": 2, "channel_axis": -1, **EACH, **options}
-    expected, run = simdtex.mix([COLOUR, OTHER], (40, 44), full_output=True, **options, **SAME)
-    np.testing.assert_array_equal(picture(), expected)
+    expected, output = simdtex.mix([COLOUR, OTHER], (40, 44), full_output=True, **options, **SAME)
+    np.testing.assert_array_equal(pixels("out.png"), expected)
     first, second = result.output.splitlines()[-2:]
     assert re.fullmatch(r"out\.png: 44x40 from 2 samples in [\d.]+ s on .+, seed 5", first)
-    assert second == last_iteration(run.statistics)
+    assert second == last_iteration(output.statistics)
 
 
-def test_a_path_wins_over_a_number(folder_pyramid):
+def test_a_path_wins_over_a_number(textures):
     image.write("1.png", GREY)
-    (folder_pyramid / "1.png").rename("2")
-    assert mix("--pattern", "2", *QUICK, samples=("2", "start.png")).exit_code == 0
+    (textures / "1.png").rename("2")
+    assert run("mix", "2", "start.png", *MIX[3:], "--pattern", "2", *FEW).exit_code == 0
     expected = simdtex.mix([GREY, START], (64, 56), pattern=0, **EACH, **SAME)
-    np.testing.assert_array_equal(picture(), expected)
+    np.testing.assert_array_equal(pixels("out.png"), expected)
 
 
 P = "give the path of one as in the command, or its number, 1 to 2"
@@ -586,10 +491,10 @@ BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | 
 
 
 @pytest.mark.parametrize("case", BAD_MIX)
-def test_bad_mixtures_get_one_sentence_and_write_nothing(folder_pyramid, case):
+def test_bad_mixtures_get_one_sentence_and_write_nothing(textures, case):
     args, words = BAD_MIX[case]
     stages = [] if "--stages" in args else ["--stages", "st"]
-    assert_one_sentence(mix(*stages, *args), words, folder_pyramid)
+    refused(words, *MIX, *stages, *args)
 
 
 @pytest.mark.parametrize(
@@ -601,8 +506,8 @@ def test_bad_mixtures_get_one_sentence_and_write_nothing(folder_pyramid, case):
         (("four.png", "colour.png"), "sample 1 has 3 channels and another 4; give all the same, or grey ones"),
     ],
 )
-def test_samples_that_do_not_mix(folder_pyramid, samples, words, monkeypatch):
+def test_samples_that_do_not_mix(textures, samples, words, monkeypatch):
     if "four.png" in samples:
         pictures = {"four.png": texture((20, 20), 4), "colour.png": COLOUR}
         monkeypatch.setattr(image, "read", lambda path, palette: image.Image(pictures[str(path)], -1))
-    assert_one_sentence(mix(samples=samples), words, folder_pyramid)
+    refused(words, "mix", *samples, *MIX[3:])

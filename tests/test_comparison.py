@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from cases import texture
-from click.testing import CliRunner
+from commands import names, run
 from pages import assert_needs_nothing_else, embedded, read_page
 
-from simdtex.cli import main
 from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
 from simdtex.io import image
 from simdtex.report.page import Figure
@@ -111,16 +110,16 @@ def test_a_device_gives_what_the_reference_gives(found, any_device):
 
 def test_runs_are_what_the_statistics_say(found):
     for entry in found.entries:
-        assert [run.seed for run in entry.runs] == [3, 5]
-        for run in entry.runs:
-            finest = run.levels[-1]
-            assert len(run.finest) == finest["sweeps"] and run.finest[-1].steps == finest["steps"]
-            cooling = [sweep for sweep in run.finest if sweep.phase == "relax"]
-            assert run.figures["steps"] == cooling[-1].steps == finest["equilibrium"]["steps"]
-            assert run.figures["sweeps"] == len(cooling)
+        assert [one.seed for one in entry.runs] == [3, 5]
+        for one in entry.runs:
+            finest = one.levels[-1]
+            assert len(one.finest) == finest["sweeps"] and one.finest[-1].steps == finest["steps"]
+            cooling = [sweep for sweep in one.finest if sweep.phase == "relax"]
+            assert one.figures["steps"] == cooling[-1].steps == finest["equilibrium"]["steps"]
+            assert one.figures["sweeps"] == len(cooling)
             assert cooling[0].before == 0.75 and cooling[-1].left == 0
-            assert run.image.shape == (12, 14) and run.figures["seconds"] > 0
-            assert 0 < run.figures["utilisation"] <= 1
+            assert one.image.shape == (12, 14) and one.figures["seconds"] > 0
+            assert 0 < one.figures["utilisation"] <= 1
     synchronous = found.entries[1].runs[0]
     assert synchronous.figures["steps"] == synchronous.figures["sweeps"]
 
@@ -229,23 +228,15 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run(*args):
-    return CliRunner().invoke(main, ["schedules", *(str(arg) for arg in args)])
-
-
 def small(folder, *args):
     job = ["--order", 2, "--size", "12x10", "--device", "reference", "--schedule", "coloring,synchronous"]
-    return run(folder / "sample.png", "-o", folder / "report", *job, "--seeds", 2, *args)
-
-
-def listing(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+    return run("schedules", folder / "sample.png", "-o", folder / "report", *job, "--seeds", 2, *args)
 
 
 def test_a_report(folder):
     result = small(folder)
     assert result.exit_code == 0, result.output
-    assert listing(folder / "report") == FILES
+    assert names(folder / "report") == FILES
     reader = read_page(folder / "report" / "index.html")
     assert_needs_nothing_else(reader)
     beside = {path.read_bytes() for path in (folder / "report").glob("*.png")}
@@ -289,11 +280,11 @@ def test_options_reach_the_runs(folder):
 
 def test_without_a_sample_it_is_brick(any_device, tmp_path):
     args = ["--order", 2, "--size", "9x9", "--seeds", 1, "--schedule", "coloring", "--device", any_device.index, "-q"]
-    result = run("-o", tmp_path / "report", *args)
+    result = run("schedules", "-o", tmp_path / "report", *args)
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "report" / "results.json").read_text(encoding="utf-8"))
     assert found["sample_shape"] == [128, 128]
-    assert "seeds.png" not in listing(tmp_path / "report")
+    assert "seeds.png" not in names(tmp_path / "report")
 
 
 BAD = {
@@ -316,9 +307,9 @@ def assert_refused(result, words):
 @pytest.mark.parametrize("case", BAD)
 def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
     args, words = BAD[case]
-    before = listing(folder)
+    before = names(folder)
     assert_refused(small(folder, *args), words)
-    assert listing(folder) == before
+    assert names(folder) == before
 
 
 @pytest.mark.parametrize(
@@ -329,10 +320,10 @@ def test_bad_folders_are_refused_before_the_work(folder, report, words):
     (folder / "file").touch()
     (folder / "full").mkdir()
     (folder / "full" / "notes.txt").touch()
-    before = listing(folder)
-    result = run(folder / "sample.png", "-o", folder / report, "--order", 2)
+    before = names(folder)
+    result = run("schedules", folder / "sample.png", "-o", folder / report, "--order", 2)
     assert_refused(result, words)
-    assert listing(folder) == before
+    assert names(folder) == before
 
 
 def test_ctrl_c_leaves_no_report(folder, monkeypatch):
@@ -342,4 +333,4 @@ def test_ctrl_c_leaves_no_report(folder, monkeypatch):
     monkeypatch.setattr("simdtex.experiments.comparison.synthesize", stop)
     result = small(folder)
     assert result.exit_code == 130 and "stopped" in result.output
-    assert listing(folder) == ["sample.png"]
+    assert names(folder) == ["sample.png"]

@@ -331,8 +331,8 @@ def test_data_beyond_the_sample_are_warned_about():
 
 # -- Masked arrays: where a mask would be lost, and with it which values are there, they are refused.
 
-GREY_MASKED = texture((20, 20))
-LOW = GREY_MASKED % 4
+PLAIN = texture((20, 20))
+LOW = PLAIN % 4
 
 
 def masked(array, place=(0, 1)):
@@ -344,33 +344,31 @@ def masked(array, place=(0, 1)):
 PLACES = np.zeros((4, 4, 2), np.int32)
 ON = {"device": "reference", "rng": 1}
 REFUSED = {
-    "solid": lambda _: simdtex.synthesize_solid(masked(GREY_MASKED), (4, 4, 4), **ON),
-    "solid start": lambda _: simdtex.synthesize_solid(GREY_MASKED, (4, 4, 4), start=masked(np.ones((4, 4, 4))), **ON),
-    "multires": lambda _: simdtex.synthesize(masked(GREY_MASKED), (9, 9), method="multires", **ON),
-    "pyramid": lambda _: simdtex.synthesize(masked(GREY_MASKED), (9, 9), method="pyramid", **ON),
-    "start": lambda _: simdtex.synthesize(GREY_MASKED, (9, 9), method="pyramid", start=masked(np.ones((9, 9))), **ON),
-    "mix": lambda _: simdtex.mix([GREY_MASKED, masked(GREY_MASKED)], (9, 9), **ON),
-    "extend": lambda _: simdtex.extend(masked(GREY_MASKED), left=3, **ON),
+    "solid": lambda _: simdtex.synthesize_solid(masked(PLAIN), (4, 4, 4), **ON),
+    "solid start": lambda _: simdtex.synthesize_solid(PLAIN, (4, 4, 4), start=masked(np.ones((4, 4, 4))), **ON),
+    "multires": lambda _: simdtex.synthesize(masked(PLAIN), (9, 9), method="multires", **ON),
+    "pyramid": lambda _: simdtex.synthesize(masked(PLAIN), (9, 9), method="pyramid", **ON),
+    "start": lambda _: simdtex.synthesize(PLAIN, (9, 9), method="pyramid", start=masked(np.ones((9, 9))), **ON),
+    "mix": lambda _: simdtex.mix([PLAIN, masked(PLAIN)], (9, 9), **ON),
+    "extend": lambda _: simdtex.extend(masked(PLAIN), left=3, **ON),
     "lcpdf image": lambda _: simdtex.lcpdf(masked(LOW), LOW, [[1, 1]], order=1, greys=4, device="reference"),
     "lcpdf sample": lambda _: simdtex.lcpdf(LOW, masked(LOW), [[1, 1]], order=1, greys=4, device="reference"),
     "lcpdf sites": lambda _: simdtex.lcpdf(LOW, LOW, masked([[1, 1]]), order=1, greys=4, device="reference"),
     "temperature": lambda _: simdtex.lcpdf(
         LOW, LOW, [[1, 1]], order=1, greys=4, temperature=masked(np.ones((20, 20))), device="reference"
     ),
-    "mask": lambda _: simdtex.synthesize(GREY_MASKED, (9, 9), mask=masked(GREY_MASKED > 0), **ON),
-    "guide": lambda _: simdtex.synthesize(GREY_MASKED, (20, 20), guide=(masked(GREY_MASKED), GREY_MASKED), **ON),
-    "output's guide": lambda _: simdtex.synthesize(
-        GREY_MASKED, (20, 20), guide=(GREY_MASKED, masked(GREY_MASKED)), **ON
-    ),
-    "quality": lambda _: simdtex.quality.coverage(masked(GREY_MASKED), GREY_MASKED),
-    "output": lambda _: simdtex.quality.seam(masked(GREY_MASKED)),
-    "image of an ensemble": lambda _: as_image(masked(GREY_MASKED)),
+    "mask": lambda _: simdtex.synthesize(PLAIN, (9, 9), mask=masked(PLAIN > 0), **ON),
+    "guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(masked(PLAIN), PLAIN), **ON),
+    "output's guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(PLAIN, masked(PLAIN)), **ON),
+    "quality": lambda _: simdtex.quality.coverage(masked(PLAIN), PLAIN),
+    "output": lambda _: simdtex.quality.seam(masked(PLAIN)),
+    "image of an ensemble": lambda _: as_image(masked(PLAIN)),
     "ensemble": lambda _: as_ensemble(masked(np.ones((2, 3, 3)))),
-    "map": lambda _: apply_source_map(PLACES, masked(GREY_MASKED)),
+    "map": lambda _: apply_source_map(PLACES, masked(PLAIN)),
     "source map": lambda folder: save_source_map(folder / "a.npz", masked(PLACES)),
-    "picture": lambda folder: image.write(folder / "a.png", masked(GREY_MASKED)),
+    "picture": lambda folder: image.write(folder / "a.png", masked(PLAIN)),
     "volume": lambda folder: volume.write(folder / "a.npz", masked(np.ones((2, 3, 3)))),
-    "alpha": lambda _: image.split_alpha(masked(GREY_MASKED)),
+    "alpha": lambda _: image.split_alpha(masked(PLAIN)),
 }
 
 
@@ -383,22 +381,22 @@ def test_a_mask_that_would_be_lost_is_refused(tmp_path, case):
 
 
 def test_masked_arrays_without_a_masked_value_are_arrays(tmp_path):
-    whole = np.ma.array(GREY_MASKED, mask=np.zeros(GREY_MASKED.shape, bool))
+    whole = np.ma.array(PLAIN, mask=np.zeros(PLAIN.shape, bool))
     image.write(tmp_path / "a.png", whole)
-    assert np.array_equal(image.read(tmp_path / "a.png").pixels, GREY_MASKED)
-    made = [simdtex.synthesize(one, (9, 9), method="multires", **ON) for one in (GREY_MASKED, whole)]
+    assert np.array_equal(image.read(tmp_path / "a.png").pixels, PLAIN)
+    made = [simdtex.synthesize(one, (9, 9), method="multires", **ON) for one in (PLAIN, whole)]
     assert np.array_equal(*made)
 
 
 def test_where_a_mask_means_unknown_it_is_taken():
-    simdtex.synthesize(masked(GREY_MASKED), (9, 9), order=1, **ON)
-    simdtex.fill(masked(GREY_MASKED), order=1, **ON)
+    simdtex.synthesize(masked(PLAIN), (9, 9), order=1, **ON)
+    simdtex.fill(masked(PLAIN), order=1, **ON)
 
 
 # -- What goes into public functions and what comes out: arrays of other libraries, and generators.
 
 RNG = np.random.default_rng(1)
-GREY_FOREIGN = RNG.integers(0, 256, (12, 14), dtype=np.uint8)
+PHOTO = RNG.integers(0, 256, (12, 14), dtype=np.uint8)
 RGB = RNG.integers(0, 256, (12, 14, 3), dtype=np.uint8)
 HOLE = np.zeros((12, 14), bool)
 HOLE[4:6, 4:7] = True
@@ -467,20 +465,16 @@ KINDS = {
 }
 
 JOBS = {
-    "synthesize": lambda of: simdtex.synthesize(of(GREY_FOREIGN), (6, 7), **OPTIONS),
-    "several": lambda of: simdtex.synthesize([of(GREY_FOREIGN), of(GREY_FOREIGN[:9])], (6, 7), **OPTIONS),
-    "mask": lambda of: simdtex.synthesize(GREY_FOREIGN, (6, 7), mask=of(~HOLE), **OPTIONS),
-    "guide": lambda of: simdtex.synthesize(
-        GREY_FOREIGN, (12, 14), guide=(of(GREY_FOREIGN), of(GREY_FOREIGN)), labels=False, **OPTIONS
-    ),
-    "fill": lambda of: simdtex.fill(of(GREY_FOREIGN), of(HOLE), **OPTIONS),
-    "extend": lambda of: simdtex.extend(of(GREY_FOREIGN), right=2, **OPTIONS),
-    "solid": lambda of: simdtex.synthesize_solid(of(GREY_FOREIGN), (8, 8, 8), iterations=1, device="reference", rng=1),
-    "mix": lambda of: simdtex.mix(
-        [of(GREY_FOREIGN), of(GREY_FOREIGN)], (8, 8), iterations=1, device="reference", rng=1
-    ),
-    "simulate": lambda of: simdtex.simulate(of(GREY_FOREIGN), 1, **OPTIONS).values,
-    "apply_source_map": lambda of: apply_source_map(np.zeros((3, 4, 2), int), of(GREY_FOREIGN), GREY_FOREIGN.shape),
+    "synthesize": lambda of: simdtex.synthesize(of(PHOTO), (6, 7), **OPTIONS),
+    "several": lambda of: simdtex.synthesize([of(PHOTO), of(PHOTO[:9])], (6, 7), **OPTIONS),
+    "mask": lambda of: simdtex.synthesize(PHOTO, (6, 7), mask=of(~HOLE), **OPTIONS),
+    "guide": lambda of: simdtex.synthesize(PHOTO, (12, 14), guide=(of(PHOTO), of(PHOTO)), labels=False, **OPTIONS),
+    "fill": lambda of: simdtex.fill(of(PHOTO), of(HOLE), **OPTIONS),
+    "extend": lambda of: simdtex.extend(of(PHOTO), right=2, **OPTIONS),
+    "solid": lambda of: simdtex.synthesize_solid(of(PHOTO), (8, 8, 8), iterations=1, device="reference", rng=1),
+    "mix": lambda of: simdtex.mix([of(PHOTO), of(PHOTO)], (8, 8), iterations=1, device="reference", rng=1),
+    "simulate": lambda of: simdtex.simulate(of(PHOTO), 1, **OPTIONS).values,
+    "apply_source_map": lambda of: apply_source_map(np.zeros((3, 4, 2), int), of(PHOTO), PHOTO.shape),
 }
 
 
@@ -502,22 +496,22 @@ def test_colours_are_taken(kind):
 
 def test_known_values_with_nan_are_taken():
     known = np.where(np.pad(HOLE[:6, :7], 0), 9.0, np.nan)
-    made = simdtex.synthesize(GREY_FOREIGN.astype(float), (6, 7), known=known, **OPTIONS)
+    made = simdtex.synthesize(PHOTO.astype(float), (6, 7), known=known, **OPTIONS)
     for of in (Tensor, xarray.DataArray, KINDS["dask"], pandas.DataFrame):
-        assert_same_bits(simdtex.synthesize(GREY_FOREIGN.astype(float), (6, 7), known=of(known), **OPTIONS), made)
+        assert_same_bits(simdtex.synthesize(PHOTO.astype(float), (6, 7), known=of(known), **OPTIONS), made)
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
         (
-            OnGpu(GREY_FOREIGN),
+            OnGpu(PHOTO),
             r"the sample is no array that NumPy can take: can.t convert cuda:0 .*Use Tensor\.cpu\(\)",
         ),
-        (Tracked(GREY_FOREIGN), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
+        (Tracked(PHOTO), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
         (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
-        (pandas.DataFrame(GREY_FOREIGN).astype("Int64"), "holds object values; convert it"),
-        (xarray.DataArray(GREY_FOREIGN).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
+        (pandas.DataFrame(PHOTO).astype("Int64"), "holds object values; convert it"),
+        (xarray.DataArray(PHOTO).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
     ],
     ids=["GPU", "gradient", "palette", "nullable", "dataset"],
 )
@@ -530,18 +524,18 @@ def test_what_is_no_array_is_refused_in_one_sentence(given, words):
 READERS = {
     "synthesize": lambda one: simdtex.synthesize(one, (6, 7), **OPTIONS),
     "several": lambda one: simdtex.synthesize([one, one], (6, 7), **OPTIONS),
-    "mask": lambda one: simdtex.synthesize(GREY_FOREIGN, (6, 7), mask=one, **OPTIONS),
-    "guide": lambda one: simdtex.synthesize(GREY_FOREIGN, (6, 7), guide=(GREY_FOREIGN, one), **OPTIONS),
+    "mask": lambda one: simdtex.synthesize(PHOTO, (6, 7), mask=one, **OPTIONS),
+    "guide": lambda one: simdtex.synthesize(PHOTO, (6, 7), guide=(PHOTO, one), **OPTIONS),
     "tiles": lambda one: simdtex.distributed.synthesize(one, (6, 7), "no.zarr", **OPTIONS),
     "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
     "fill": lambda one: simdtex.fill(one, HOLE, **OPTIONS),
-    "hole": lambda one: simdtex.fill(GREY_FOREIGN, one, **OPTIONS),
+    "hole": lambda one: simdtex.fill(PHOTO, one, **OPTIONS),
     "extend": lambda one: simdtex.extend(one, right=3, **OPTIONS),
     "simulate": lambda one: simdtex.simulate(one, 1, **OPTIONS),
-    "estimate": lambda one: simdtex.estimate(one, known=np.ma.masked_array(GREY_FOREIGN, HOLE), device="reference"),
-    "classify": lambda one: simdtex.classify(one, {"a": GREY_FOREIGN, "b": GREY_FOREIGN}, **OPTIONS),
-    "class": lambda one: simdtex.classify(GREY_FOREIGN, {"a": one, "b": GREY_FOREIGN}, **OPTIONS),
-    "mix": lambda one: simdtex.mix([one, GREY_FOREIGN], (32, 32), device="reference"),
+    "estimate": lambda one: simdtex.estimate(one, known=np.ma.masked_array(PHOTO, HOLE), device="reference"),
+    "classify": lambda one: simdtex.classify(one, {"a": PHOTO, "b": PHOTO}, **OPTIONS),
+    "class": lambda one: simdtex.classify(PHOTO, {"a": one, "b": PHOTO}, **OPTIONS),
+    "mix": lambda one: simdtex.mix([one, PHOTO], (32, 32), device="reference"),
     "live": simdtex.Live,
     "source map": lambda one: apply_source_map(np.zeros((2, 2, 2), int), one),
 }
@@ -561,9 +555,9 @@ def test_a_generator_gives_the_seed():
     seeds = []
     for _ in range(2):
         rng = np.random.default_rng(7)
-        runs = [simdtex.synthesize(GREY_FOREIGN, (6, 7), **(given | {"rng": rng})) for _ in range(2)]
+        runs = [simdtex.synthesize(PHOTO, (6, 7), **(given | {"rng": rng})) for _ in range(2)]
         seeds.append([output.statistics["seed"] for _, output in runs])
-        again = simdtex.synthesize(GREY_FOREIGN, (6, 7), **(OPTIONS | {"rng": seeds[-1][0]}))
+        again = simdtex.synthesize(PHOTO, (6, 7), **(OPTIONS | {"rng": seeds[-1][0]}))
         assert_same_bits(again, runs[0][0])
     assert seeds[0] == seeds[1] and seeds[0][0] != seeds[0][1], "each call draws one"
 
@@ -571,16 +565,16 @@ def test_a_generator_gives_the_seed():
 @pytest.mark.parametrize("rng", [np.random.RandomState(1), np.random.SeedSequence(1), "1", True, 1.0], ids=str)
 def test_what_is_no_seed_is_refused(rng):
     with pytest.raises(TypeError, match=r"rng must be None, an integer or a numpy\.random\.Generator, not "):
-        simdtex.synthesize(GREY_FOREIGN, (6, 7), order=1, device="reference", rng=rng)
+        simdtex.synthesize(PHOTO, (6, 7), order=1, device="reference", rng=rng)
 
 
 def test_what_is_given_is_not_changed():
     for job in JOBS.values():
-        before = GREY_FOREIGN.copy(), HOLE.copy()
-        GREY_FOREIGN.flags.writeable = HOLE.flags.writeable = False
+        before = PHOTO.copy(), HOLE.copy()
+        PHOTO.flags.writeable = HOLE.flags.writeable = False
         try:
             made = job(np.asarray)
         finally:
-            GREY_FOREIGN.flags.writeable = HOLE.flags.writeable = True
-        assert made.flags.writeable and not np.shares_memory(made, GREY_FOREIGN)
-        assert_same_bits((GREY_FOREIGN, HOLE), before)
+            PHOTO.flags.writeable = HOLE.flags.writeable = True
+        assert made.flags.writeable and not np.shares_memory(made, PHOTO)
+        assert_same_bits((PHOTO, HOLE), before)

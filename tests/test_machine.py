@@ -401,7 +401,10 @@ print(simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=sys
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize("environment", [{"HOME": "FILE", "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}])
+@pytest.mark.parametrize(
+    "environment",
+    [pytest.param({"HOME": "FILE", "XDG_CACHE_HOME": ""}, marks=pytest.mark.slow), {"XDG_CACHE_HOME": "/proc/nowhere"}],
+)
 def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environment):
     (tmp_path / "FILE").touch()
     environment = {key: value.replace("FILE", str(tmp_path / "FILE")) for key, value in environment.items()}
@@ -419,7 +422,9 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize("damaged", ["*.so", "*.bc", "binary", "info", "*.sqlite"])
+@pytest.mark.parametrize(
+    "damaged", ["info", *(pytest.param(one, marks=pytest.mark.slow) for one in ("*.so", "*.bc", "binary", "*.sqlite"))]
+)
 def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
     """The first process may crash; the next one warns of the folder, and has the device."""
 
@@ -512,7 +517,7 @@ print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), 
 """
 
 
-@pytest.mark.parametrize("profile", [False, True])
+@pytest.mark.parametrize("profile", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, profile):
     assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
 

@@ -414,13 +414,6 @@ def test_a_start_and_a_callback_are_those_of_the_method():
     assert output.statistics["seed"] == 4
 
 
-@pytest.mark.parametrize("options", [{"palette": 0, "pattern": 1}, {}, {"low": 0, "high": 1, "levels": 2}], ids=str)
-def test_a_device_has_the_references_bits(machine, options):
-    samples = [texture((16, 18), 3, seed=1), texture((19, 16), 3, seed=2)]
-    options |= {"channel_axis": -1, "iterations": 2}
-    assert_same_bits(mix(samples, (17, 15), device=machine, **options), mix(samples, (17, 15), **options))
-
-
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
@@ -444,7 +437,7 @@ def test_a_device_has_the_references_bits(machine, options):
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",
 )
-def test_a_wrong_option_is_one_sentence_of_mixtures(options, error, words):
+def test_a_wrong_option_of_a_mixture_is_one_sentence(options, error, words):
     with pytest.raises(error, match=words):
         mix([texture((16, 18)), texture((19, 16))], (17, 16), **options)
 

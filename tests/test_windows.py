@@ -15,7 +15,7 @@ from simdtex.ops.neighbourhood import Field
 from simdtex.ops.start import start
 from simdtex.schedules import SCHEDULES, get
 
-# -- Sites are known by their place in the whole: a window with a halo relaxes to the bits of the same window of the whole.
+# -- Sites are known by their place in the whole: a window with a halo relaxes to the bits of that of the whole.
 
 WINDOWS = [name for name in SCHEDULES if get(name).windows]
 SEARCHES = {
@@ -36,9 +36,10 @@ def cut(saved, grid, window):
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
-@pytest.mark.parametrize("how", SEARCHES)
-@pytest.mark.parametrize(("name", "number"), [*((name, 0) for name in WINDOWS), ("coloring", 1)])
-def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
+@pytest.mark.parametrize(
+    ("name", "number", "how"), [*zip(WINDOWS, (0, 0, 0, 0), SEARCHES, strict=True), ("coloring", 1, "exact draws")]
+)
+def test_a_window_relaxes_as_the_whole(any_device, name, number, how, boundary):
     """Sweep by sweep: the halo is as deep as a sweep reaches, steps times the radius of the neighbourhood."""
     machine = opencl(any_device)
     given = SEARCHES[how] | {"order": 2, "schedule": name, "boundary": boundary, "levels": 3}
@@ -123,19 +124,10 @@ def test_places_beyond_32_bits_draw_numbers_of_their_own(machine):
 BRICK = data.brick()[:24, :24]
 SHAPE = (18, 21)
 RULES = {"order": 4, "levels": 2, "free_sweeps": 1, "rng": 3}
-SCHEDULES_REPLAY = [
-    "coloring",
-    "luby",
-    "checkerboard",
-    "synchronous",
-    "random-subset",
-    "raster",
-    "random-scan",
-    "block:6x7",
-]
+SCHEDULES_REPLAY = ["coloring", "luby", "synchronous", "random-scan", "block:6x7"]
 
 
-def run(schedule, device):
+def run(schedule, shape, device):
     """The fields at the end of every sweep of a run, in order."""
     seen = []
 
@@ -143,14 +135,15 @@ def run(schedule, device):
         if progress.end_of_sweep:
             seen.append((progress.level, progress.sweep, progress.image(), progress.source(), progress.temperature()))
 
-    simdtex.synthesize(BRICK, SHAPE, schedule=schedule, **RULES, device=device, callback=watch)
+    simdtex.synthesize(BRICK, shape, schedule=schedule, **RULES, device=device, callback=watch)
     return seen
 
 
 @pytest.mark.parametrize("schedule", SCHEDULES_REPLAY)
 def test_fields_are_those_of_the_run(machine, schedule):
-    seen = run(schedule, machine)
-    replay = simdtex.replay(BRICK, SHAPE, schedule=schedule, **RULES, device=machine)
+    shape = (9, 11) if schedule == "random-scan" else SHAPE
+    seen = run(schedule, shape, machine)
+    replay = simdtex.replay(BRICK, shape, schedule=schedule, **RULES, device=machine)
     assert [(one.level, one.sweep) for one in replay.sweeps] == [one[:2] for one in seen]
     for n in {0, len(seen) // 2, len(seen) - 1}:
         found = replay.at(n)
