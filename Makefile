@@ -6,11 +6,12 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow browser lint docs prose links mutants fuzz cpu clean
+.PHONY: help demo test quick slow browser lint docs prose links mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
 	@echo "make test    the tests"
+	@echo "make quick   the tests of the NumPy reference that mutation testing runs; no device is needed"
 	@echo "make slow    the tests that take long or need the package index"
 	@echo "make browser what tests in a browser need of npm; Chromium and its driver are the system's"
 	@echo "make lint    ruff and mypy"
@@ -59,6 +60,12 @@ test:
 	$(call install,test,[test])
 	$(device)
 	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal -k '$(ONLY)'
+
+# The list is that of `make mutants`: what these tests do not notice, mutation testing does not either.
+QUICK := import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["tool"]["mutmut"]["pytest_add_cli_args_test_selection"])
+quick:
+	$(call install,test,[test])
+	@SIMDTEX_REQUIRE_OPENCL= OCL_ICD_VENDORS=/nonexistent $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 $$($(PY) -c '$(QUICK)')
 
 slow:
 	$(call install,slow,[slow])

@@ -1,4 +1,4 @@
-"""The analysis of a sample: its levels, its features and their energy, and what does not change them."""
+"""The analysis of a sample: the Laplacian pyramid, the bank of filters, features and their energy."""
 
 import logging
 from fractions import Fraction
@@ -9,16 +9,318 @@ import pytest
 from cases import REFERENCE, analyse, assert_same_bits, host, texture
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import correlate
+from tolerances import HALF, TAP
 
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.model.stretched import TOP, Stretched
-from simdtex.ops.pyramids import bank
+from simdtex.ops.pyramids import bank, filters, half, laplacian_band, laplacian_collapse, laplacian_reduce, within
+
+# -- The Laplacian pyramid in integers, equations (5) and (6): its steps, its inverse, and tiles.
+
+RANGES = {"sample": (0, TOP), "bits": (0, 1), "signed": (-TOP, TOP), "small": (-3, 3)}
+sides = st.integers(1, 9)
+
+
+def picture(shape, planes=1, values="sample", seed=0):
+    low, high = RANGES[values]
+    return np.random.default_rng(seed).integers(low, high, (planes, *shape), np.int32, endpoint=True)
+
+
+@st.composite
+def pictures(draw):
+    shape, planes = (draw(sides), draw(sides)), draw(st.integers(1, 3))
+    return picture(shape, planes, draw(st.sampled_from(sorted(RANGES))), draw(st.integers(0, 2**16)))
+
+
+@st.composite
+def levels_of_an_output(draw):
+    """A band of the sample, pixels of it that make up a level of whole and broken tiles, and the level above."""
+    tile, planes = (draw(sides), draw(sides)), draw(st.integers(1, 3))
+    shape = draw(st.integers(1, 2 * tile[0] + 1)), draw(st.integers(1, 2 * tile[1] + 1))
+    seed = draw(st.integers(0, 2**16))
+    rng = np.random.default_rng(seed)
+    source = rng.integers(0, tile[0] * tile[1], shape).astype(np.int32)
+    above = [n // m * k + -(-(n % m) // 2) for n, m, k in zip(shape, tile, half(tile), strict=True)]
+    limit = draw(st.sampled_from([TOP, 2**24]))
+    coarse = rng.choice([-limit, limit, 0, 1, *rng.integers(-limit, limit, 5)], (planes, *above)).astype(np.int32)
+    return picture(tile, planes, "signed", seed), source, coarse
+
+
+def identity(shape):
+    """The source map of a picture that is copied from itself."""
+    return np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
+
+
+def steps(machine, g, torus):
+    """One reduction and the band it leaves."""
+    fine = machine.put(g)
+    coarse = laplacian_reduce(machine, fine, torus)
+    return host(machine, [coarse, laplacian_band(machine, fine, coarse, torus)])
+
+
+def collapse(machine, band, source, coarse, torus, blend=False):
+    arrays = [machine.put(np.ascontiguousarray(a)) for a in (band, source, coarse)]
+    return np.asarray(machine.get(laplacian_collapse(machine, *arrays, torus, blend)))
+
+
+def both(machine, g, levels, torus):
+    """The Gaussian and the Laplacian pyramid, in NumPy arrays."""
+    return [host(machine, a) for a in pyramid(machine, machine.put(g), levels, torus)]
+
+
+def depth(shape):
+    """Levels down to a single pixel."""
+    return 1 + (max(shape) - 1).bit_length()
+
+
+@given(st.integers(-40, 40), st.integers(1, 9), st.booleans())
+def test_indices_are_brought_within_the_border(i, n, torus):
+    assert within(np.array([i]), n, torus) == [plain.within(i, n, torus)]
+
+
+@given(pictures(), st.booleans())
+def test_the_reference_is_the_rule(g, torus):
+    coarse, band = steps(REFERENCE, g, torus)
+    assert (coarse.dtype, band.dtype) == (np.int32, np.int32)
+    for plane, own in enumerate(g):
+        (_, above), (expected, _) = plain.pyramid(own, 2, torus)
+        assert (coarse[plane] == above).all()
+        assert (band[plane] == expected).all()
+
+
+@given(levels_of_an_output(), st.booleans())
+def test_the_reference_collapses_by_the_rule(case, torus):
+    band, source, coarse = case
+    fine = collapse(REFERENCE, *case, torus)
+    assert fine.dtype == np.int32
+    for plane, own in enumerate(coarse):
+        expected = band[plane].ravel()[source] + plain.expanded(own, source.shape, band.shape[1:], torus)
+        assert (fine[plane] == expected).all()
+
+
+@given(levels_of_an_output(), st.booleans())
+def test_the_reference_blends_by_the_rule(case, torus):
+    band, source, coarse = case
+    fine = collapse(REFERENCE, *case, torus, blend=True)
+    assert fine.dtype == np.int32
+    for plane, own in enumerate(coarse):
+        up = plain.expanded(own, source.shape, band.shape[1:], torus)
+        assert (fine[plane] == plain.faded(band[plane], source, torus) + up).all()
+
+
+def test_a_blend_fades_over_one_pixel_on_either_side_of_a_join():
+    band = np.zeros((1, 4, 16), np.int32)
+    band[..., 8:] = 16  # two flat pieces, laid side by side with 4 columns of each
+    source = identity((4, 16))[:, [2, 3, 4, 5, 10, 11, 12, 13]]
+    made = collapse(REFERENCE, band, source, np.zeros((1, 2, 4), np.int32), False, blend=True)
+    assert (made[0] == [0, 0, 0, 4, 12, 16, 16, 16]).all()
+
+
+@given(g=pictures(), torus=st.booleans())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, g, torus):
+    assert_same_bits(steps(machine, g, torus), steps(REFERENCE, g, torus))
+
+
+@given(case=levels_of_an_output(), torus=st.booleans())
+@settings(max_examples=25)
+def test_a_device_collapses_to_the_references_bits(machine, case, torus):
+    for blend in (False, True):
+        assert_same_bits(collapse(machine, *case, torus, blend), collapse(REFERENCE, *case, torus, blend))
+
+
+def test_nothing_overflows_at_the_limits(machine):
+    """Sums of the sample, of what 30 levels can add up to, and of integers up to the 2**24 that is promised."""
+    rng = np.random.default_rng(3)
+    for g in (np.full((1, 8, 8), TOP), np.full((1, 8, 8), -TOP), rng.choice([-TOP, TOP], (1, 8, 8))):
+        for torus in (True, False):
+            coarse, band = steps(machine, g.astype(np.int32), torus)
+            assert_same_bits(steps(REFERENCE, g.astype(np.int32), torus), [coarse, band])
+            assert abs(coarse).max() <= TOP
+            assert abs(band).max() <= 2 * TOP
+    for most in (2**24, 30 * TOP):
+        for sign in (1, -1):
+            coarse = np.full((1, 4, 4), sign * most, np.int32)
+            band = np.full((1, 8, 8), sign * TOP, np.int32)
+            for blend in (False, True):
+                fine = collapse(machine, band, identity((8, 8)), coarse, True, blend)
+                assert (fine == sign * (most + TOP)).all()
+
+
+@given(pictures(), st.booleans())
+@example(picture((1, 1), 2), True)
+@example(picture((1, 9)), False)
+@example(picture((33, 2)), False)
+@example(picture((21, 37)), True)
+def test_a_collapsed_pyramid_is_the_picture_to_the_bit(g, torus):
+    most = depth(g.shape[1:])
+    gaussian, bands = both(REFERENCE, g, most, torus)
+    assert gaussian[-1].shape[1:] == (1, 1)
+    assert_same_bits(bands[-1], gaussian[-1])
+    for levels in range(1, most + 1):
+        shorter = both(REFERENCE, g, levels, torus)
+        assert_same_bits(shorter[0], gaussian[:levels])
+        assert_same_bits(shorter[1], [*bands[: levels - 1], gaussian[levels - 1]])
+        value = gaussian[levels - 1]
+        for level in reversed(range(levels - 1)):
+            value = collapse(REFERENCE, bands[level], identity(bands[level].shape[1:]), value, torus)
+        assert_same_bits(value, g)
+
+
+@pytest.mark.parametrize("torus", [True, False])
+@pytest.mark.parametrize("shape", [(13, 10), (1, 9)])
+def test_a_device_collapses_a_pyramid_to_the_picture(machine, shape, torus):
+    g = picture(shape, 3)
+    gaussian, bands = both(machine, g, depth(shape), torus)
+    assert_same_bits(both(REFERENCE, g, depth(shape), torus), [gaussian, bands])
+    value = bands[-1]
+    for band in reversed(bands[:-1]):
+        value = collapse(machine, band, identity(band.shape[1:]), value, torus)
+    assert_same_bits(value, g)
+
+
+# -- Local texture measures, equation (7): the bank of filters and the responses to it.
+
+UNIT = 2**14
+BANKS = (1, 3, 4, 6)
+
+
+def run(machine, picture, band, taps, torus):
+    arrays = [machine.put(np.ascontiguousarray(a, np.int32)) for a in (picture, band, taps)]
+    return np.asarray(machine.get(filters(machine, *arrays, torus)))
+
+
+def responses(picture, taps, torus=True):
+    """Of one plane: (filters, rows, cols), without F^0."""
+    features = run(REFERENCE, picture[None], np.zeros_like(picture[None]), taps, torus)
+    return np.moveaxis(features.reshape(*picture.shape, -1)[..., 1:], -1, 0)
+
+
+def noise(shape, seed=0):
+    return np.random.default_rng(seed).integers(0, TOP, shape, endpoint=True)
+
+
+@st.composite
+def levels(draw):
+    """A level, its band, and filters of any taps at all, so that nothing may be turned or swapped unseen."""
+    rows, cols, planes = draw(st.integers(1, 9)), draw(st.integers(1, 9)), draw(st.integers(1, 3))
+    count, side = draw(st.integers(0, 3)), draw(st.sampled_from([3, 5]))
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    picture = rng.integers(-TOP, TOP, (planes, rows, cols), endpoint=True)
+    band = rng.integers(-TOP, TOP, (planes, rows, cols), endpoint=True)
+    taps = rng.integers(-UNIT // 4, UNIT // 4, (count, side, side), endpoint=True)
+    return picture, band, taps, draw(st.booleans())
+
+
+@given(levels())
+def test_the_reference_is_the_rule_of_filters(case):
+    picture, band, taps, torus = case
+    planes, rows, cols = picture.shape
+    features = run(REFERENCE, *case)
+    assert features.dtype == np.int32
+    assert features.shape == (rows * cols, planes * (1 + len(taps)))
+    expected = []
+    for g, own in zip(picture, band, strict=True):
+        expected += [own, *(plain.response(g, f, torus) for f in taps)]
+    assert (features == np.stack(expected, -1).reshape(rows * cols, -1)).all()
+
+
+@given(case=levels())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits_of_filters(machine, case):
+    assert_same_bits(run(machine, *case), run(REFERENCE, *case))
+
+
+def test_sums_beyond_32_bits_are_exact(machine):
+    picture = np.full((1, 6, 5), TOP)
+    taps = np.full((2, 5, 5), UNIT)
+    taps[1] *= -1
+    for m in (REFERENCE, machine):
+        features = run(m, picture, picture, taps, True)
+        assert (features == [TOP, 25 * TOP, -25 * TOP]).all()
+
+
+def exact(orientations, sigma=0.7, side=3):
+    """The bank in float64: positive parts that add up to 2**14, and what each was multiplied by."""
+    both = [plain.derivative(degree, a, sigma, side) for degree in (1, 2) for a in plain.angles(orientations)]
+    scale = np.array([UNIT / total for _, total in both])
+    return np.array([f for f, _ in both]) * scale[:, None, None], scale
+
+
+def around_centre(taps):
+    """Taps, row by row, without the centre, which only makes the sum 0."""
+    return np.delete(taps.reshape(len(taps), -1), taps[0].size // 2, 1)
+
+
+@pytest.mark.parametrize("orientations", BANKS)
+def test_the_bank_is_the_derivatives_of_a_gaussian(orientations):
+    taps, (formula, _) = bank(orientations), exact(orientations)
+    assert taps.dtype == np.int32
+    assert taps.shape == formula.shape == (2 * orientations, 3, 3)
+    assert abs(around_centre(taps) - around_centre(formula)).max() <= TAP
+
+
+@pytest.mark.parametrize("orientations", BANKS)
+def test_every_filter_adds_up_to_0_and_its_positive_taps_to_about_1(orientations):
+    taps = bank(orientations)
+    assert not taps.sum((1, 2)).any()
+    # Every tap and the centre's making up for it.
+    assert abs(np.where(taps > 0, taps, 0).sum((1, 2)) - UNIT).max() <= 2 * TAP * taps[0].size
+
+
+def test_no_default_tap_is_near_a_tie():
+    """So the last bits of another machine's exp and cos change none: taps are made on the host."""
+    for orientations in range(1, 9):
+        formula = around_centre(exact(orientations)[0])
+        assert abs(formula % 1 - 0.5).min() > 1e-4
+
+
+def test_a_bank_of_no_orientations_leaves_the_bands_alone(machine):
+    taps = bank(0)
+    assert (taps.dtype, taps.shape) == (np.int32, (0, 3, 3))
+    picture = noise((2, 4, 5))
+    for m in (REFERENCE, machine):
+        features = run(m, picture, picture - TOP // 2, taps, True)
+        assert_same_bits(features, (picture - TOP // 2).reshape(2, 20).T.astype(np.int32))
+
+
+def test_angle_0_sees_change_along_columns_only_and_a_right_angle_along_rows_only():
+    row, col = np.indices((9, 9))
+    for change, blind, sees in ((col, 1, 0), (row, 0, 1)):
+        picture = 1000 * change**2
+        found = responses(picture, bank(2), torus=False)
+        edges, lines = found[:2], found[2:]
+        assert not edges[blind].any()
+        assert (edges[sees, 1:-1, 1:-1] > 0).all(), "brighter towards larger indices is positive"
+        assert (abs(lines[blind]) <= rounding(picture, 3, "mirror")).all()
+        assert (lines[sees, 1:-1, 1:-1] > 100).all()
+
+
+def rounding(picture, side, mode):
+    """How far a response may be from that of the float filter.
+
+    Taps add up to 0, so a response is the sum of every tap but the centre times how much its pixel differs from the
+    centre's. Each of these taps is off by TAP at most, and the sum is rounded.
+    """
+    difference = np.zeros(picture.shape)
+    for at in np.ndindex(side, side):
+        one = np.zeros((side, side))
+        one[at] = 1
+        difference += abs(correlate(picture.astype(np.float64), one, mode=mode) - picture)
+    return TAP * difference / UNIT + HALF
+
+
+# The positive part of each filter is scaled to 1, so filters steer with the scale they had before.
+
+
+# -- The analysis of a sample: its levels, its features and their energy, and what does not change them.
 
 WARNING = "is as large as the filters"
-sides = st.integers(1, 12)
+sides_analysis = st.integers(1, 12)
 
 
-def run(machine, pixels, **options):
+def run_analysis(machine, pixels, **options):
     """Everything that an analysis holds, in NumPy arrays."""
     found = analyse(machine, pixels, **options)
     return [*host(machine, found.bands), np.asarray(machine.get(found.features)), found.energy]
@@ -34,7 +336,7 @@ def by_level(found):
 @st.composite
 def analyses(draw):
     """Pixels and options, all of them."""
-    shape, channels = (draw(sides), draw(sides)), draw(st.sampled_from([1, 2, 3]))
+    shape, channels = (draw(sides_analysis), draw(sides_analysis)), draw(st.sampled_from([1, 2, 3]))
     dtype = draw(st.sampled_from([np.uint8, np.uint16, np.float32]))
     most = 1 + (max(shape) - 1).bit_length()
     return texture(shape, channels, dtype, draw(st.integers(0, 99))), {
@@ -44,7 +346,7 @@ def analyses(draw):
     }
 
 
-@given(sides, sides)
+@given(sides_analysis, sides_analysis)
 @example(1, 1)
 @example(1, 40)
 @example(33, 16)
@@ -88,7 +390,7 @@ def test_a_single_level_has_no_nodes():
 
 @given(analyses())
 @settings(max_examples=40)
-def test_the_reference_is_the_rule(case):
+def test_the_reference_is_the_rule_of_analysis(case):
     """Bands, features and energy from the pixels on."""
     pixels, options = case
     found = analyse(REFERENCE, pixels, **options)
@@ -151,8 +453,8 @@ def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(boundary):
 def test_no_orientations_leave_the_bands_alone(machine):
     pixels = texture((9, 8), 2)
     for m in (REFERENCE, machine):
-        bare = run(m, pixels, orientations=0)
-        whole = run(REFERENCE, pixels, orientations=2)
+        bare = run_analysis(m, pixels, orientations=0)
+        whole = run_analysis(REFERENCE, pixels, orientations=2)
         assert_same_bits(bare[:-2], whole[:-2])
         assert_same_bits(bare[-2:], [np.ascontiguousarray(a[:, ::5]) for a in whole[-2:]])
 
@@ -161,13 +463,13 @@ def test_no_orientations_leave_the_bands_alone(machine):
 def test_contrast_and_a_constant_change_nothing(boundary):
     byte = texture((13, 10), 3)
     options = {"boundary": boundary}
-    expected = run(REFERENCE, byte, **options)
+    expected = run_analysis(REFERENCE, byte, **options)
     for a, b, dtype in ((1, 1000, np.uint16), (257, 0, np.uint16), (100, -20000, np.int16), (0.25, -3, np.float32)):
-        assert_same_bits(run(REFERENCE, (byte.astype(np.float64) * a + b).astype(dtype), **options), expected)
+        assert_same_bits(run_analysis(REFERENCE, (byte.astype(np.float64) * a + b).astype(dtype), **options), expected)
     for a, b in ((1 / 255, 0.0), (1e300, -1e302), (2.0**-1000, 0.0)):
-        assert_same_bits(run(REFERENCE, byte * a + b, **options), expected)
+        assert_same_bits(run_analysis(REFERENCE, byte * a + b, **options), expected)
     dull = byte // 2 + np.uint8(7)
-    assert_same_bits(run(REFERENCE, dull * np.uint16(3), **options), run(REFERENCE, dull, **options))
+    assert_same_bits(run_analysis(REFERENCE, dull * np.uint16(3), **options), run_analysis(REFERENCE, dull, **options))
 
 
 def test_on_a_torus_a_shift_of_the_sample_shifts_its_features():
@@ -203,6 +505,6 @@ def test_it_warns_where_no_level_is_as_large_as_the_filters(caplog, shape, optio
 
 @given(case=analyses())
 @settings(max_examples=15)
-def test_a_device_has_the_references_bits(machine, case):
+def test_a_device_has_the_references_bits_of_analysis(machine, case):
     pixels, options = case
-    assert_same_bits(run(machine, pixels, **options), run(REFERENCE, pixels, **options))
+    assert_same_bits(run_analysis(machine, pixels, **options), run_analysis(REFERENCE, pixels, **options))

@@ -1,8 +1,11 @@
-"""The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown."""
+"""The classifier: features, exemplars, windows, the Potts field, what is learned, and the test for the unknown."""
 
 import numpy as np
 import pytest
-from cases import REFERENCE, texture
+import tolerances
+from cases import REFERENCE, assert_same_bits, opencl, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.stats import f
 
@@ -12,7 +15,245 @@ from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS, MEANS, Region, experts_of, learn, windowed
 from simdtex.model.pictures import Pictures
 from simdtex.model.scale import Scale
-from simdtex.ops.classes import gaussian
+from simdtex.ops.classes import EXEMPLAR_MULTIPLE, TAPS, exemplars, features, gaussian, potts, stacked, window
+
+# -- The whole neighbourhoods that a classifier compares: values, and what is left of them with contrast compressed.
+
+TOP = 4080
+
+
+def run(machine, levels, sites, offsets, contrast):
+    arrays = [np.asarray(levels, np.uint16), np.asarray(sites, np.int32), np.asarray(offsets, np.int32)]
+    return machine.get(features(machine, *map(machine.put, arrays), contrast))
+
+
+def mirrored(i, n):
+    while not 0 <= i < n:
+        i = -i if i < 0 else 2 * n - 2 - i
+        if n == 1:
+            i = 0
+    return i
+
+
+def plain(levels, sites, offsets, contrast):
+    """One neighbourhood after another, in float64."""
+    bands, rows, cols = levels.shape
+    found = []
+    for site in sites:
+        i, j = divmod(int(site), cols)
+        values = np.array(
+            [[levels[b, mirrored(i + y, rows), mirrored(j + x, cols)] / 16 for y, x in offsets] for b in range(bands)]
+        )
+        if contrast:
+            z = values - values.mean(1, keepdims=True)
+            size = np.sqrt((z * z).sum())
+            # below 1 the size is taken for its square
+            shown, inverse = (size, 1 / size) if size > 1 else (size * size, 1)
+            values = z * 40 * np.log1p(shown / 5) * inverse
+        found.append(values.ravel())
+    return np.array(found).T
+
+
+@st.composite
+def cases(draw):
+    bands, rows, cols = draw(st.integers(1, 3)), draw(st.integers(1, 7)), draw(st.integers(1, 7))
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    spread = draw(st.sampled_from([1, 8, 300, TOP]))
+    levels = rng.integers(0, spread, (bands, rows, cols), endpoint=True) + rng.integers(0, TOP - spread, endpoint=True)
+    sites = rng.integers(0, rows * cols, draw(st.integers(1, 40)))
+    offsets = np.concatenate([[[0, 0]], rng.integers(-4, 4, (draw(st.integers(1, 12)), 2), endpoint=True)])
+    return levels, sites, offsets
+
+
+@given(cases(), st.booleans())
+@settings(max_examples=60)
+def test_the_reference_is_the_formula(case, contrast):
+    found, exact = run(REFERENCE, *case, contrast), plain(*case, contrast)
+    assert found.dtype == np.float32
+    assert (found == np.rint(found)).all()
+    assert abs(found - exact).max() <= tolerances.HALF + tolerances.GAIN
+
+
+@given(case=cases(), contrast=st.booleans())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, case, contrast):
+    assert_same_bits(run(machine, *case, contrast), run(REFERENCE, *case, contrast))
+
+
+def test_brightness_is_taken_away_and_contrast_compressed():
+    rng = np.random.default_rng(0)
+    picture, offsets = rng.integers(0, 500, (1, 6, 6)), [[0, 0], [0, 1], [1, 0], [1, 1]]
+    sites = np.arange(36)
+    own = run(REFERENCE, picture, sites, offsets, True)
+    assert_same_bits(run(REFERENCE, picture + 2000, sites, offsets, True), own)
+    twice = run(REFERENCE, 2 * picture, sites, offsets, True)
+    size, larger = (np.sqrt((one * one).sum(0)) for one in (own, twice))
+    assert (larger > size).all() and (larger < 1.9 * size).all()
+    assert (run(REFERENCE, np.full((1, 6, 6), 700), sites, offsets, True) == 0).all()
+
+
+@pytest.mark.parametrize("value", [0, 7, 8, 2040, TOP])
+def test_raw_values_are_rounded_to_255_steps(machine, value):
+    for m in (REFERENCE, machine):
+        found = run(m, np.full((1, 3, 3), value), [4], [[0, 0], [-1, 1]], False)
+        assert found.ravel().tolist() == [(value + 8) // 16] * 2
+
+
+# -- The least squared distance of a neighbourhood to the exemplars of each class.
+
+
+def run_exemplars(machine, features, classes):
+    known = stacked([np.asarray(one, np.float32) for one in classes]).on(machine)
+    return machine.get(exemplars(machine, machine.put(np.asarray(features, np.float32)), known))
+
+
+@st.composite
+def cases_exemplars(draw):
+    count, sites = draw(st.integers(1, 40)), draw(st.integers(1, 70))
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    low, high = draw(st.sampled_from([(0, 255), (-180, 180), (0, 3)]))
+    sizes = draw(st.lists(st.integers(1, 11), min_size=1, max_size=4))
+    features = rng.integers(low, high, (count, sites), endpoint=True)
+    return features, [rng.integers(low, high, (size, count), endpoint=True) for size in sizes]
+
+
+@given(cases_exemplars())
+@settings(max_examples=60)
+def test_the_reference_is_the_least_of_all_distances(case):
+    features, classes = case
+    found = run_exemplars(REFERENCE, *case)
+    assert (found.dtype, found.shape) == (np.uint16, (len(classes), features.shape[1]))
+    for logs, known in zip(found, classes, strict=True):
+        squared = ((features.T[:, None] - known[None]) ** 2).sum(-1).min(1)
+        assert abs(logs - 256 * np.log1p(squared)).max() <= 0.501
+
+
+@given(case=cases_exemplars())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits_of_exemplars(machine, case):
+    assert_same_bits(run_exemplars(machine, *case), run_exemplars(REFERENCE, *case))
+
+
+@pytest.mark.parametrize("vector", [1, 4, 16])
+def test_the_width_of_a_vector_changes_nothing(machine, vector):
+    rng = np.random.default_rng(3)
+    features, known = rng.integers(0, 255, (9, 37)), [rng.integers(0, 255, (n, 9)) for n in (5, 8)]
+    assert_same_bits(
+        run_exemplars(opencl(machine.info, vector=vector), features, known), run_exemplars(REFERENCE, features, known)
+    )
+
+
+def test_the_widest_neighbourhoods_are_exact(machine):
+    """14 bands of 9 raw values, at the ends of their range: no sum reaches 2**24."""
+    features = np.stack([np.zeros(126), np.full(126, 255), np.arange(126) % 2 * 255], 1)
+    known = [np.full((1, 126), 255), np.zeros((3, 126))]
+    expected = 256 * np.log1p([[126 * 255**2, 0, 63 * 255**2], [0, 126 * 255**2, 63 * 255**2]])
+    for m in (REFERENCE, machine):
+        assert abs(run_exemplars(m, features, known) - expected).max() <= 0.501
+
+
+def test_classes_are_filled_up_by_their_own_last_exemplar():
+    known = stacked([np.ones((3, 2), np.float32), np.full((EXEMPLAR_MULTIPLE + 1, 2), 2, np.float32)])
+    assert known.starts.tolist() == [0, EXEMPLAR_MULTIPLE, 3 * EXEMPLAR_MULTIPLE]
+    assert (known.doubled[:EXEMPLAR_MULTIPLE] == -2).all() and (known.doubled[EXEMPLAR_MULTIPLE:] == -4).all()
+    assert known.squares.tolist() == [2.0] * EXEMPLAR_MULTIPLE + [8.0] * 2 * EXEMPLAR_MULTIPLE
+
+
+# -- Sums over a Gaussian window around each site, of the sites with one label alone.
+
+
+def run_window(machine, labels, owner, taps, values=None):
+    arrays = [np.asarray(labels, np.uint8), np.asarray(owner, np.int32), np.asarray(taps, np.uint32)]
+    more = [] if values is None else [machine.put(np.asarray(values, np.uint16))]
+    return machine.get(window(machine, *map(machine.put, arrays), *more))
+
+
+@st.composite
+def cases_window(draw):
+    rows, cols, planes = draw(st.integers(1, 9)), draw(st.integers(1, 20)), draw(st.integers(1, 4))
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    reach = draw(st.integers(1, 5))
+    taps = np.diff(np.sort(np.concatenate([[0], rng.integers(0, TAPS, 2 * reach, endpoint=True), [TAPS]])))
+    values = rng.integers(0, 2**13, (planes, rows, cols)) if draw(st.booleans()) else None
+    return rng.integers(0, 3, (rows, cols)), rng.integers(0, 3, planes), taps, values
+
+
+@given(cases_window())
+@settings(max_examples=60)
+def test_the_reference_is_a_correlation(case):
+    labels, owner, taps, values = case
+    found = run_window(REFERENCE, *case)
+    assert found.dtype == np.uint32
+    for p, own in enumerate(owner):
+        here = (labels == own) * (1 if values is None else values[p])
+        for axis in (0, 1):
+            here = ndimage.correlate1d(here.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
+        assert (found[p] == here).all()
+
+
+@given(case=cases_window())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits_of_window(machine, case):
+    assert_same_bits(run_window(machine, *case), run_window(REFERENCE, *case))
+
+
+def test_the_largest_sums_fit_32_bits(machine):
+    labels, taps = np.zeros((40, 40)), gaussian(6.0)
+    values = np.full((1, 40, 40), 2**13 - 1)
+    for m in (REFERENCE, machine):
+        assert (run_window(m, labels, [0], taps, values) == (2**13 - 1) * TAPS**2).all()
+        assert (run_window(m, labels, [0], taps) == TAPS**2).all()
+
+
+@pytest.mark.parametrize("sd", [0.5, 0.8, 1.8, 8.0, 10.0, 33.3, 100.0])
+def test_taps_are_a_gaussian_in_whole_numbers(sd):
+    taps = gaussian(sd).astype(np.int64)
+    reach = len(taps) // 2
+    assert taps.sum() == TAPS and (taps == taps[::-1]).all() and reach >= min(3 * sd, 1)
+    density = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sd) ** 2)
+    assert abs(taps - TAPS * density / density.sum()).max() <= 2
+    spread = np.sqrt((taps * np.arange(-reach, reach + 1) ** 2).sum() / TAPS)
+    assert spread == pytest.approx(sd, rel=0.06, abs=0.15)
+
+
+# -- Iterated conditional modes of a Potts field.
+
+
+def run_potts(machine, sites, evidence, votes, weight, labels):
+    put = machine.put
+    arrays = put(np.asarray(sites, np.int32)), put(np.asarray(evidence, np.int32)), put(np.asarray(votes, np.uint32))
+    return machine.get(potts(machine, *arrays, weight, put(np.asarray(labels, np.uint8))))
+
+
+@st.composite
+def cases_potts(draw):
+    classes, rows, cols = draw(st.integers(1, 5)), draw(st.integers(1, 6)), draw(st.integers(1, 6))
+    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
+    scale = draw(st.sampled_from([2, 2**18, 2**24]))  # of the smallest, many are equal
+    evidence = rng.integers(-scale, scale, (classes, rows, cols))
+    votes = rng.integers(0, min(scale, 2**18), (classes, rows, cols), endpoint=True)
+    sites = rng.permutation(rows * cols)[: draw(st.integers(1, rows * cols))]
+    return sites, evidence, votes, draw(st.sampled_from([0, 1, 112, 1600])), rng.integers(0, classes, (rows, cols))
+
+
+@given(cases_potts())
+@settings(max_examples=60)
+def test_the_reference_takes_the_first_of_the_greatest_energies(case):
+    sites, evidence, votes, weight, labels = case
+    found = run_potts(REFERENCE, *case)
+    for site in range(labels.size):
+        at = np.unravel_index(site, labels.shape)
+        energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
+        assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
+
+
+@given(case=cases_potts())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits_of_potts(machine, case):
+    assert_same_bits(run_potts(machine, *case), run_potts(REFERENCE, *case))
+
+
+# -- The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown.
 
 
 def stripes(shape, turned=False, seed=0):
@@ -33,7 +274,7 @@ def planned(picture, classes=CLASSES, **options):
     return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
 
 
-def run(picture, classes=CLASSES, machine=REFERENCE, seed=1, **options):
+def run_classifier(picture, classes=CLASSES, machine=REFERENCE, seed=1, **options):
     labels, output = drive(planned(picture, classes, **options), machine, seed)
     return labels[..., 0], output
 
@@ -108,7 +349,7 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes):
 
 def test_two_textures_are_told_apart_up_to_their_border():
     picture, truth = halves()
-    labels, output = run(picture, unknown=0.0)
+    labels, output = run_classifier(picture, unknown=0.0)
     assert (labels == truth).mean() > 0.97
     assert output.probability.shape == output.fit.shape == (*picture.shape, 2)
     assert abs(output.probability.sum(-1) - 1).max() < 1e-6
@@ -120,20 +361,20 @@ def test_two_textures_are_told_apart_up_to_their_border():
 def test_a_texture_that_was_not_shown_is_unknown():
     picture, truth = halves(60)
     picture[20:, :30] = np.random.default_rng(9).integers(0, 255, (40, 30))
-    labels, output = run(picture, coupling=4.0, window=5.0)
+    labels, output = run_classifier(picture, coupling=4.0, window=5.0)
     inside = np.zeros(picture.shape, bool)
     inside[26:, :24] = True
     assert (labels[inside] == 0).all()
     assert (labels == truth)[~ndimage.binary_dilation(truth * 0 + inside, iterations=14)].mean() > 0.9
     assert (output.fit[inside].max(-1) < 0.05).all()
-    assert (run(picture, coupling=4.0, window=5.0, unknown=0.0)[0] > 0).all()
+    assert (run_classifier(picture, coupling=4.0, window=5.0, unknown=0.0)[0] > 0).all()
 
 
 def test_known_texture_is_rarely_unknown():
     """Noise does not drift, so the test may call few windows unknown, and the fit is not piled up at 0."""
     rng = np.random.default_rng(2)
     noise = [np.clip(rng.normal(120, 30, (64, 64)), 0, 255).astype(np.uint8) for _ in range(3)]
-    labels, output = run(np.hstack(noise[1:]), [whole(noise[0])], unknown=0.1)
+    labels, output = run_classifier(np.hstack(noise[1:]), [whole(noise[0])], unknown=0.1)
     assert (labels == 0).mean() <= 0.1
     assert np.median(output.fit) > 0.1
 
@@ -141,7 +382,7 @@ def test_known_texture_is_rarely_unknown():
 @pytest.mark.parametrize("schedule", ["checkerboard", "coloring", "random-subset:0.5"])
 def test_any_schedule_of_few_steps_relaxes_the_labels(schedule):
     picture, truth = halves()
-    labels, output = run(picture, schedule=schedule, unknown=0.0)
+    labels, output = run_classifier(picture, schedule=schedule, unknown=0.0)
     assert (labels == truth).mean() > 0.97
     assert schedule.startswith(output.statistics["options"]["schedule"])
 
@@ -149,25 +390,25 @@ def test_any_schedule_of_few_steps_relaxes_the_labels(schedule):
 @pytest.mark.parametrize("schedule", ["raster", "random-scan"])
 def test_a_schedule_of_many_steps_is_refused(schedule):
     with pytest.raises(ValueError, match=r"takes more than 64 steps to a sweep.*choose synchronous"):
-        run(halves()[0], schedule=schedule)
+        run_classifier(halves()[0], schedule=schedule)
 
 
 def test_the_field_ends_when_no_label_changes():
-    changed = run(halves()[0], sweeps=500)[1].statistics["changed"]
+    changed = run_classifier(halves()[0], sweeps=500)[1].statistics["changed"]
     assert len(changed) < 500 and changed[-1] == 0 and all(changed[:-1])
-    assert run(halves()[0], sweeps=0)[1].statistics["changed"] == []
+    assert run_classifier(halves()[0], sweeps=0)[1].statistics["changed"] == []
 
 
 def test_a_small_sample_has_fewer_levels_and_a_tiny_one_is_refused():
     picture, small = halves()[0], whole(stripes((12, 12)))
-    assert run(picture, [small])[1].statistics["options"]["levels"] == 1
-    assert run(picture)[1].statistics["options"]["levels"] == 1
+    assert run_classifier(picture, [small])[1].statistics["options"]["levels"] == 1
+    assert run_classifier(picture)[1].statistics["options"]["levels"] == 1
     large = whole(stripes((70, 70)))
-    assert run(picture, [large])[1].statistics["options"]["levels"] == 2
+    assert run_classifier(picture, [large])[1].statistics["options"]["levels"] == 2
     with pytest.raises(
         ValueError, match=f"'class 0' has 4 whole neighbourhoods of 5x5 pixels, and {FEWEST_NEIGHBOURHOODS} are needed"
     ):
-        run(picture, [whole(stripes((6, 6)))])
+        run_classifier(picture, [whole(stripes((6, 6)))])
 
 
 def test_whole_neighbourhoods_lie_within_a_mask_and_centres_of_strokes_alone_do():
@@ -233,9 +474,9 @@ def test_exemplars_of_a_judged_part_and_of_validation_are_not_drawn():
 def test_a_validation_picture_widens_what_is_known():
     picture = stripes((40, 40), seed=4)
     brighter = np.clip(picture.astype(int) + 25, 0, 255).astype(np.uint8)
-    plain = run(brighter, [whole(stripes((40, 40)))])[1].fit
+    plain = run_classifier(brighter, [whole(stripes((40, 40)))])[1].fit
     more = [*whole(stripes((40, 40))), *whole(np.clip(stripes((40, 40), seed=7) + 25, 0, 255), judged=True)]
-    assert plain.max() < 0.05 < run(brighter, [more])[1].fit.min()
+    assert plain.max() < 0.05 < run_classifier(brighter, [more])[1].fit.min()
 
 
 def test_means_over_a_window_are_of_the_sites_alone():
@@ -309,13 +550,12 @@ def test_the_fit_is_hotellings():
     gap = means[:, 1] / 4096 - null.mean
     assert distance == pytest.approx([0, gap @ null.inverse @ gap / len(gap)], abs=1e-6)
     picture = halves()[0]
-    fit = run(picture)[1].fit
+    fit = run_classifier(picture)[1].fit
     assert fit.min() >= 0 and fit.max() <= 1
     assert f.sf(0, 2, 6) == 1  # a texture at the mean fits fully
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
-@pytest.mark.parametrize("channels", [1, 3, 14])
+@pytest.mark.parametrize(("dtype", "channels"), [(np.uint8, 14), (np.uint16, 3), (np.float32, 1)])
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]

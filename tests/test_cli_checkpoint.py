@@ -1,6 +1,7 @@
 """``--checkpoint`` and ``simdtex resume``: the files of a run that was never stopped."""
 
 import os
+import shlex
 import signal
 import time
 from pathlib import Path
@@ -8,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import texture
-from click.testing import CliRunner
+from commands import refused, run
 
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint, read
-from simdtex.cli import COMMANDS, load, main
+from simdtex.cli import COMMANDS, load
 from simdtex.cli.resume import COMMANDS as KEEPING
 from simdtex.io import image
 
@@ -22,20 +23,7 @@ RUNS = {
     "synth-mrf": (*MRF, "--stages", "stages", "--also", "height.png=more.png"),
     "synth-multires": (*SYNTH, "--method", "multires", "--stages", "stages"),
     "synth-pyramid": (*SYNTH, "--method", "pyramid", "--stages", "stages"),
-    "fill": (
-        "fill",
-        "holed.png",
-        "--mask",
-        "mask.png",
-        "-o",
-        "out.png",
-        "--order",
-        "1",
-        "--levels",
-        "1",
-        "--seed",
-        "5",
-    ),
+    "fill": tuple(shlex.split("fill holed.png --mask mask.png -o out.png --order 1 --levels 1 --seed 5")),
     "extend": ("extend", "sample.png", "-o", "out.png", "--right", "3", "--order", "2", "--seed", "5"),
     "mix": ("mix", "sample.png", "holed.png", "-o", "out.png", "--size", "16x16", "--seed", "5"),
     "solid": ("solid", "sample.png", "-o", "out.npz", "--size", "8", "--iterations", "2", "--seed", "5"),
@@ -66,10 +54,6 @@ def place(tmp_path, monkeypatch):
     image.write(folder / "mask.png", mask)
     monkeypatch.chdir(folder)
     return folder
-
-
-def run(*words):
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def given(*words, device="reference"):
@@ -146,15 +130,6 @@ def stopped(place, monkeypatch, *more, after=3):
         assert given(*MRF, "--checkpoint", "kept", *more).exit_code == 128 + signal.SIGTERM
 
 
-def refused(place, words, *command):
-    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
-    result = run(*command)
-    assert result.exit_code == 2, result.output
-    assert words in result.output
-    assert result.output.startswith("simdtex: ") and len(result.output.splitlines()) == 1
-    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
-
-
 def test_the_command_line_is_kept(place, monkeypatch):
     stopped(place, monkeypatch, "-q")
     kept = read(place / "kept")[0]["command"]
@@ -182,12 +157,12 @@ def test_a_file_whose_name_looks_like_an_option(place, monkeypatch):
 
 
 def test_what_is_no_checkpoint(place):
-    refused(place, "nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
+    refused("nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
     (place / "other").mkdir()
-    refused(place, "other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
-    refused(place, "sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")
-    refused(place, "sample.png is an input and would be overwritten", *SYNTH, "--checkpoint", "sample.png")
-    refused(place, "out.png would be written twice", *SYNTH, "--checkpoint", "out.png")
+    refused("other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
+    refused("sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")
+    refused("sample.png is an input and would be overwritten", *SYNTH, "--checkpoint", "sample.png")
+    refused("out.png would be written twice", *SYNTH, "--checkpoint", "out.png")
 
 
 def test_what_was_begun_elsewhere(place, monkeypatch):
@@ -200,13 +175,11 @@ def test_what_was_begun_elsewhere(place, monkeypatch):
         kept._write(tree)
 
     edited(about["command"] | {"folder": "/nowhere"})
-    refused(
-        place, "/nowhere, the folder in which the run in kept was started, does not exist; restore it", "resume", "kept"
-    )
+    refused("/nowhere, the folder in which the run in kept was started, does not exist; restore it", "resume", "kept")
     edited(about["command"] | {"name": "bench"})
-    refused(place, "is of a command that cannot be resumed; remove", "resume", "kept")
+    refused("is of a command that cannot be resumed; remove", "resume", "kept")
     edited(None)
-    refused(place, "was started in Python; make the same call with checkpoint='kept'", "resume", "kept")
+    refused("was started in Python; make the same call with checkpoint='kept'", "resume", "kept")
 
 
 def test_an_output_that_cannot_be_written_leaves_the_checkpoint(place, monkeypatch):

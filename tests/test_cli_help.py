@@ -111,7 +111,7 @@ def test_examples_are_understood(words):
 def test_the_first_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     image.write("gravel.png", np.random.default_rng(1).integers(0, 256, (10, 11), dtype=np.uint8))
-    done = run(*shlex.split(load("synth").examples[0][0]), "--device", "reference")
+    done = run(*shlex.split(load("synth").examples[0][0]), "--order", 2, "--device", "reference")
     assert done.exit_code == 0, done.output
     assert image.read("more.png").pixels.shape == (20, 22)
 

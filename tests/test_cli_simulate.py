@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from commands import contents, pixels, run
 
 import simdtex
-from simdtex.cli import main
 from simdtex.io import image
 from simdtex.io.grids import read_grid, write_grid
 from simdtex.io.hard_data import read_hard_data
@@ -19,12 +18,13 @@ pytest.importorskip("zarr")
 pytest.importorskip("h5netcdf")
 
 OPTIONS = {"order": 2, "rng": 5, "device": "reference"}
-ENDS = (".png", ".tif", ".npy", ".npz", ".nc", ".zarr", ".csv", ".xyz", ".gslib", ".sgems", ".dat", ".eas")
+QUICK = ["--order", 2, "--seed", 5, "--device", "reference"]
 
 
 @pytest.fixture
-def folder(tmp_path):
+def folder(tmp_path, monkeypatch):
     """Training images of three kinds, and tables of hard data."""
+    monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(2)
     row, col = np.indices((16, 20))
     grey = np.rint(120 + 80 * np.sin(row * 0.9 + col * 0.5) + rng.uniform(-20, 20, (16, 20))).astype(np.uint8)
@@ -38,8 +38,8 @@ def folder(tmp_path):
         "colour.png": rng.integers(0, 256, (16, 20, 3), dtype=np.uint8),
         "holed.tif": holed,
     }
-    for name, pixels in pictures.items():
-        image.write(tmp_path / name, pixels)
+    for name, one in pictures.items():
+        image.write(name, one)
     tables = {
         "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
         "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
@@ -62,38 +62,21 @@ def folder(tmp_path):
     return tmp_path
 
 
-def simulate(folder, *args):
-    """Run the command; what ends like a file, or is a report, is one of the folder."""
-
-    def placed(text):
-        if not text.endswith((*ENDS, "report")) or text.startswith("-"):
-            return text
-        return "=".join(f"{folder}/{part}" for part in text.split("="))
-
-    words = [placed(str(arg)) for arg in args]
-    return CliRunner().invoke(main, ["simulate", *words, "--order", "2", "--seed", "5", "--device", "reference"])
+def simulate(*words):
+    return run("simulate", *words, *QUICK)
 
 
-def made(folder, *args, out="out.npz"):
-    result = simulate(folder, *args, "-o", out)
+def made(*words, out="out.npz"):
+    result = simulate(*words, "-o", out)
     assert result.exit_code == 0, result.output
     if not out.endswith(".npz"):
-        with xarray.open_dataarray(folder / out) as found:
+        with xarray.open_dataarray(out) as found:
             return found.load()
-    with np.load(folder / out) as arrays:
+    with np.load(out) as arrays:
         dims = ("realisation", "y", "x", "variable")[: arrays["values"].ndim]
         coordinates = {name: arrays[name] for name in ("realisation", "y", "x")}
         coordinates["seed"] = ("realisation", arrays["seed"])
         return xarray.DataArray(arrays["values"], coordinates, dims, attrs=json.loads(str(arrays["attributes"])))
-
-
-def pixels(folder, name):
-    return image.read(folder / name).pixels
-
-
-def contents(folder):
-    """Every file and folder by name, a file with its bytes."""
-    return {str(path.relative_to(folder)): path.is_file() and path.read_bytes() for path in folder.rglob("*")}
 
 
 def assert_same(ours, theirs):
@@ -107,42 +90,42 @@ def assert_same(ours, theirs):
 
 @pytest.mark.parametrize("suffix", ["npz", "nc", "zarr"])
 def test_the_bytes_of_the_function_in_every_format(folder, suffix):
-    found = made(folder, "grey.png", "-n", 3, "--first", 2, "--size", "14x12", out=f"out.{suffix}")
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 3, first=2, shape=(12, 14), **OPTIONS))
+    found = made("grey.png", "-n", 3, "--first", 2, "--size", "14x12", out=f"out.{suffix}")
+    assert_same(found, simdtex.simulate(pixels("grey.png"), 3, first=2, shape=(12, 14), **OPTIONS))
 
 
 def test_what_is_told(folder):
     args = ("grey.png", "-n", 2, "--size", "14x12", "-o", "out.npz", "--jobs", 2)
-    result = simulate(folder, *args)
+    result = simulate(*args)
     assert result.exit_code == 0
     assert "2 realisations of 14x12 in" in result.output and "on reference" in result.output
     assert "seed 5" in result.output
-    assert simulate(folder, *args, "-q").output == ""
-    assert "1 realisation of 20x16" in simulate(folder, "grey.png", "-o", "out.npz").output
+    assert simulate(*args, "-q").output == ""
+    assert "1 realisation of 20x16" in simulate("grey.png", "-o", "out.npz").output
 
 
 def test_options_are_handed_on(folder):
     args = ("--size", "14x12", "--novelty", 1, "--boundary", "torus", "--free-sweeps", 1)
-    found = made(folder, "grey.png", *args)
+    found = made("grey.png", *args)
     options = {"novelty": 1.0, "boundary": "torus", "free_sweeps": 1} | OPTIONS
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 1, shape=(12, 14), **options))
+    assert_same(found, simdtex.simulate(pixels("grey.png"), 1, shape=(12, 14), **options))
 
 
 def test_colour_has_variables(folder):
-    found = made(folder, "colour.png", "--size", "14x12")
+    found = made("colour.png", "--size", "14x12")
     assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (1, 12, 14, 3)
-    assert_same(found, simdtex.simulate(pixels(folder, "colour.png"), 1, shape=(12, 14), channel_axis=-1, **OPTIONS))
+    assert_same(found, simdtex.simulate(pixels("colour.png"), 1, shape=(12, 14), channel_axis=-1, **OPTIONS))
 
 
 def test_a_table_of_hard_data(folder):
-    found = made(folder, "grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
+    found = made("grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
     assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
     table = read_hard_data(folder / "wells.csv")
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
+    assert_same(found, simdtex.simulate(pixels("grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
 
 
 def test_categories(folder):
-    found = made(folder, "facies.png", "-n", 2, "--known", "facies.csv", "--size", "14x12", "--categorical")
+    found = made("facies.png", "-n", 2, "--known", "facies.csv", "--size", "14x12", "--categorical")
     assert set(np.unique(found)) == {0, 3}
     assert (found.values[:, 4, 3] == 3).all() and (found.values[:, 7, 10] == 0).all()
 
@@ -151,86 +134,86 @@ def test_categories(folder):
 @pytest.mark.parametrize("out", ["out.gslib", "out.sgems"])
 def test_from_a_grid_to_a_grid(folder, name, out):
     args = ["--known", "wells.eas", "--categorical", "--several", "most", "--size", "14x12", "-n", 2]
-    result = simulate(folder, name, *args, "-o", out)
+    result = simulate(name, *args, "-o", out)
     assert result.exit_code == 0, result.output
     grid = read_grid(folder / out)
     assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
     assert list(grid.values) == ["simulation__real0", "simulation__real1"]
     options = {"known": folder / "wells.eas", "several": "most", "origin": grid.origin, "cell": grid.cell} | OPTIONS
-    own = simdtex.simulate(pixels(folder, "facies.png"), 2, shape=(12, 14), categorical=True, **options)
+    own = simdtex.simulate(pixels("facies.png"), 2, shape=(12, 14), categorical=True, **options)
     assert np.array_equal(np.concatenate(list(grid.values.values())), own.values)
     assert (own.values[:, 4, 3] == 3).all() and (own.values[:, 7, 10] == 0).all()
 
 
 def test_a_grid_is_a_picture_with_coordinates(folder):
     for name in ("ti.gslib", "ti.dat"):
-        found = made(folder, name, "--size", "14x12", "--categorical")
-        own = simdtex.simulate(pixels(folder, "facies.png"), 1, shape=(12, 14), categorical=True, **OPTIONS)
+        found = made(name, "--size", "14x12", "--categorical")
+        own = simdtex.simulate(pixels("facies.png"), 1, shape=(12, 14), categorical=True, **OPTIONS)
         assert found.values.tobytes() == own.values.tobytes() and found.dtype == own.dtype
         ground = name == "ti.gslib"
         assert found.x[1] == (1015 if ground else 1) and found.y[1] == (2007.5 if ground else 1)
-    found = made(folder, "two.gslib", "--size", "14x12")
-    both = np.stack([pixels(folder, "grey.png") / 8, pixels(folder, "facies.png")], -1)
+    found = made("two.gslib", "--size", "14x12")
+    both = np.stack([pixels("grey.png") / 8, pixels("facies.png")], -1)
     own = simdtex.simulate(both, 1, shape=(12, 14), channel_axis=-1, **OPTIONS)
     assert found.values.tobytes() == own.values.tobytes() and found.dtype == own.dtype
-    assert not np.isnan(made(folder, "holed.gslib", "--size", "14x12")).any()
+    assert not np.isnan(made("holed.gslib", "--size", "14x12")).any()
 
 
-def axes(folder, *args):
-    found = made(folder, *args, "--size", "4x4", out="out.nc")
+def axes(*words):
+    found = made(*words, "--size", "4x4", out="out.nc")
     return [(float(found[axis].min()), found.attrs[f"cell_{axis}"]) for axis in "xyz" if axis in found.coords]
 
 
 @pytest.mark.parametrize("case", ["a grid that holds no such number", "a grid too far away"])
 def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatch):
     monkeypatch.setattr("simdtex.simulate", lambda *_, **__: pytest.fail("this takes hours"))
-    refused(folder, *BAD[case])
+    refused(*BAD[case])
 
 
 def test_a_report_of_data_on_the_ground(folder):
     args = ("--known", "wells.eas", "--several", "most", "--size", "14x12", "--categorical", "--report", "report")
-    assert (made(folder, "ti.gslib", *args).values[0, 4, 3] == 3).all()
+    assert (made("ti.gslib", *args).values[0, 4, 3] == 3).all()
     assert "wells.eas" in (folder / "report" / "index.html").read_text(encoding="utf-8")
 
 
 def test_where_cells_lie(folder):
     """What is given on the command line counts more than the file of the training image."""
-    assert axes(folder, "ti.sgems") == [(1005, 10), (2002.5, 5), (3, 2)]
-    assert axes(folder, "ti.gslib", "--origin", "-7,0,0.5") == [(-7, 10), (0, 5), (0.5, 2)]
-    assert axes(folder, "ti.gslib", "--origin", "-7,0") == [(-7, 10), (0, 5)]
-    assert axes(folder, "ti.gslib", "--cell", "2,3") == [(1005, 2), (2002.5, 3)]
-    assert axes(folder, "grey.png", "--cell", "2,3") == [(0, 2), (0, 3)]
-    assert axes(folder, "grey.png", "--origin", "5,6", "--cell", "2,3") == [(5, 2), (6, 3)]
+    assert axes("ti.sgems") == [(1005, 10), (2002.5, 5), (3, 2)]
+    assert axes("ti.gslib", "--origin", "-7,0,0.5") == [(-7, 10), (0, 5), (0.5, 2)]
+    assert axes("ti.gslib", "--origin", "-7,0") == [(-7, 10), (0, 5)]
+    assert axes("ti.gslib", "--cell", "2,3") == [(1005, 2), (2002.5, 3)]
+    assert axes("grey.png", "--cell", "2,3") == [(0, 2), (0, 3)]
+    assert axes("grey.png", "--origin", "5,6", "--cell", "2,3") == [(5, 2), (6, 3)]
 
 
 def test_a_grid_of_known_values(folder):
     known = np.full((16, 20), np.nan)
     known[3, 4] = 200
     write_grid(folder / "known.gslib", {"v": known, "w": known})
-    refused(folder, ["grey.png", "-o", "out.npz", "--known", "known.gslib"], "known is")
+    refused(["grey.png", "-o", "out.npz", "--known", "known.gslib"], "known is")
     write_grid(folder / "known.gslib", {"v": known})
-    found = made(folder, "grey.png", "--known", "known.gslib")
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 1, known=known, **OPTIONS))
+    found = made("grey.png", "--known", "known.gslib")
+    assert_same(found, simdtex.simulate(pixels("grey.png"), 1, known=known, **OPTIONS))
 
 
 def test_grids_as_guides(folder):
-    write_grid(folder / "wanted.gslib", {"v": pixels(folder, "facies.png")[:12, :14]})
-    found = made(folder, "grey.png", "--guide", "ti.gslib=wanted.gslib", "--size", "14x12")
-    guide = pixels(folder, "facies.png"), pixels(folder, "facies.png")[:12, :14]
-    own = simdtex.simulate(pixels(folder, "grey.png"), 1, guide=guide, labels=True, shape=(12, 14), **OPTIONS)
+    write_grid(folder / "wanted.gslib", {"v": pixels("facies.png")[:12, :14]})
+    found = made("grey.png", "--guide", "ti.gslib=wanted.gslib", "--size", "14x12")
+    guide = pixels("facies.png"), pixels("facies.png")[:12, :14]
+    own = simdtex.simulate(pixels("grey.png"), 1, guide=guide, labels=True, shape=(12, 14), **OPTIONS)
     assert found.values.tobytes() == own.values.tobytes()
     args = ["grey.png", "-o", "two.npz", "--guide", "ti.gslib=two.gslib"]
-    refused(folder, args, "has 1 channels and that of the output 2")
+    refused(args, "has 1 channels and that of the output 2")
 
 
 def test_an_existing_file_is_replaced(folder):
-    made(folder, "grey.png", "-n", 2, "--size", "14x12")
-    assert made(folder, "grey.png", "--size", "9x8").shape == (1, 8, 9)
+    made("grey.png", "-n", 2, "--size", "14x12")
+    assert made("grey.png", "--size", "9x8").shape == (1, 8, 9)
 
 
 def test_a_report_is_a_page_and_numbers(folder):
     args = ("--known", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
-    made(folder, "facies.png", "-n", 2, *args)
+    made("facies.png", "-n", 2, *args)
     page = (folder / "report" / "index.html").read_text(encoding="utf-8")
     assert "simdtex simulate" in page and "facies.csv" in page
     results = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
@@ -278,18 +261,18 @@ BAD = {
 }
 
 
-def refused(folder, args, words):
-    before = contents(folder)
-    result = simulate(folder, *args)
+def refused(args, words):
+    before = contents()
+    result = simulate(*args)
     assert result.exit_code == 2, result.output
     assert words in result.output
     assert len([line for line in result.output.strip().splitlines() if "taken as unknown" not in line]) == 1
-    assert contents(folder) == before
+    assert contents() == before
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
-    refused(folder, *BAD[case])
+    refused(*BAD[case])
 
 
 @pytest.fixture
@@ -311,32 +294,32 @@ def maps(folder):
 
 
 def test_maps_are_those_of_the_function(folder, maps):
-    facies = pixels(folder, "facies.png")
+    facies = pixels("facies.png")
     expected = simdtex.simulate(facies, 1, **maps, categorical=True, **OPTIONS)
     for region in ("region.png", "region.gslib"):
         for p in ("p.npy", "p.gslib", "p.csv"):
-            found = made(folder, "facies.png", "--region", region, "--probabilities", p, "--categorical")
+            found = made("facies.png", "--region", region, "--probabilities", p, "--categorical")
             assert np.array_equal(found, expected), (region, p)
-    rotation, scale = pixels(folder, "angles.tif"), np.load(folder / "sizes.npy")
+    rotation, scale = pixels("angles.tif"), np.load(folder / "sizes.npy")
     expected = simdtex.simulate(facies, 1, rotation=rotation, scale=scale, **OPTIONS)
-    assert np.array_equal(made(folder, "facies.png", "--rotation", "angles.tif", "--scale", "sizes.npy"), expected)
-    both, number = [pixels(folder, name) for name in ("grey.png", "second.png")], np.load(folder / "numbers.npy")
+    assert np.array_equal(made("facies.png", "--rotation", "angles.tif", "--scale", "sizes.npy"), expected)
+    both, number = [pixels(name) for name in ("grey.png", "second.png")], np.load(folder / "numbers.npy")
     expected = simdtex.simulate(both, 1, image_map=number, **OPTIONS)
     write_labels(folder / "numbers.png", number)  # as indices of a palette
     for name in ("numbers.npy", "numbers.png"):
-        assert np.array_equal(made(folder, "grey.png", "second.png", "--image-map", name), expected)
+        assert np.array_equal(made("grey.png", "second.png", "--image-map", name), expected)
 
 
 def test_the_size_is_that_of_a_map(folder, maps):
     np.save(folder / "small.npy", np.full((7, 9, 2), 0.5))
-    assert made(folder, "facies.png", "--probabilities", "small.npy", "--categorical").shape == (1, 7, 9)
+    assert made("facies.png", "--probabilities", "small.npy", "--categorical").shape == (1, 7, 9)
 
 
 def test_a_source_map_is_in_the_file(folder):
-    result = simulate(folder, "grey.png", "--source", "--finish", 0, "-o", "out.nc")
+    result = simulate("grey.png", "--source", "--finish", 0, "-o", "out.nc")
     assert result.exit_code == 0, result.output
     with xarray.open_dataset(folder / "out.nc") as found:
-        grey = pixels(folder, "grey.png")
+        grey = pixels("grey.png")
         assert np.array_equal(grey[found.source_row, found.source_column], found.simulation)
 
 
@@ -346,13 +329,13 @@ def test_a_region_is_the_white_parts_of_a_picture(folder, maps):
     image.write(folder / "grey-region.png", grey)
     image.write(folder / "colour-region.png", np.stack([grey] * 3, -1))
     for name in ("grey-region.png", "colour-region.png"):
-        made(folder, "facies.png", "--region", name, "--categorical")
+        made("facies.png", "--region", name, "--categorical")
         with np.load(folder / "out.npz") as arrays:
             assert np.array_equal(arrays["region"], maps["region"])
 
 
 def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
-    result = simulate(folder, "facies.png", "--region", "region.png", "--categorical", "-o", "out.gslib")
+    result = simulate("facies.png", "--region", "region.png", "--categorical", "-o", "out.gslib")
     assert result.exit_code == 0, result.output
     with pytest.warns(DataWarning, match="128 of 320 values are -9966699"):
         values = read_grid(folder / "out.gslib").values["simulation__real0"][0]
@@ -373,20 +356,19 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
 )
 def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps, words, sentence):
     before = sorted(folder.iterdir())
-    result = simulate(folder, "facies.png", *words, *([] if "-o" in words else ["-o", "out.npz"]))
+    result = simulate("facies.png", *words, *([] if "-o" in words else ["-o", "out.npz"]))
     assert result.exit_code != 0 and sentence in " ".join(result.output.split())
     assert sorted(folder.iterdir()) == before
 
 
-def estimate(folder, *args):
-    words = [f"{folder}/{word}" if word.endswith(ENDS) else word for word in map(str, args)]
-    return CliRunner().invoke(main, ["estimate", *words, "--device", "reference"])
+def estimate(*words):
+    return run("estimate", *words, "--device", "reference")
 
 
 @pytest.mark.parametrize("out", ["out.nc", "out.gslib"])
 def test_an_estimate_is_that_of_the_function(folder, out):
     how = ["--several", "most", "--nearest", 3, "--size", "20x16"]
-    result = estimate(folder, "ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", out)
+    result = estimate("ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", out)
     assert result.exit_code == 0 and "maps of 20x16" in result.output, result.output
     expected = simdtex.estimate(
         read_grid(folder / "ti.gslib").values["facies"][0], known=folder / "wells.eas", shape=(16, 20),
@@ -410,7 +392,7 @@ def test_an_estimate_is_that_of_the_function(folder, out):
         (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
     ],
 )
-def test_an_estimate_of_nothing_is_refused(folder, words, sentence):
-    result = estimate(folder, *words, "-o", "out.npz")
+def test_an_estimate_of_nothing_is_refused(words, sentence):
+    result = estimate(*words, "-o", "out.npz")
     assert result.exit_code != 0 and sentence in " ".join(result.output.split())
     assert not (folder / "out.npz").exists()

@@ -1,4 +1,4 @@
-"""A comparison of schedules: what is recorded of a run, who keeps equation (14), and that seeds decide everything."""
+"""Schedules compared: what is recorded of a run, who keeps equation (14), and ``simdtex schedules``."""
 
 import json
 from types import SimpleNamespace
@@ -6,11 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from cases import texture
+from commands import names, run
+from pages import assert_needs_nothing_else, embedded, read_page
 
 from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
+from simdtex.io import image
 from simdtex.report.page import Figure
 from simdtex.report.schedules import comparison_tables as tables
 from simdtex.report.schedules import sections
+
+# -- A comparison of schedules: what is recorded of a run, who keeps equation (14), and that seeds decide everything.
 
 
 def feed(recorder, pictures, level=0, phase="free", **more):
@@ -106,16 +111,16 @@ def test_a_device_gives_what_the_reference_gives(found, any_device):
 
 def test_runs_are_what_the_statistics_say(found):
     for entry in found.entries:
-        assert [run.seed for run in entry.runs] == [3, 5]
-        for run in entry.runs:
-            finest = run.levels[-1]
-            assert len(run.finest) == finest["sweeps"] and run.finest[-1].steps == finest["steps"]
-            cooling = [sweep for sweep in run.finest if sweep.phase == "relax"]
-            assert run.figures["steps"] == cooling[-1].steps == finest["equilibrium"]["steps"]
-            assert run.figures["sweeps"] == len(cooling)
+        assert [one.seed for one in entry.runs] == [3, 5]
+        for one in entry.runs:
+            finest = one.levels[-1]
+            assert len(one.finest) == finest["sweeps"] and one.finest[-1].steps == finest["steps"]
+            cooling = [sweep for sweep in one.finest if sweep.phase == "relax"]
+            assert one.figures["steps"] == cooling[-1].steps == finest["equilibrium"]["steps"]
+            assert one.figures["sweeps"] == len(cooling)
             assert cooling[0].before == 0.75 and cooling[-1].left == 0
-            assert run.image.shape == (12, 14) and run.figures["seconds"] > 0
-            assert 0 < run.figures["utilisation"] <= 1
+            assert one.image.shape == (12, 14) and one.figures["seconds"] > 0
+            assert 0 < one.figures["utilisation"] <= 1
     synchronous = found.entries[1].runs[0]
     assert synchronous.figures["steps"] == synchronous.figures["sweeps"]
 
@@ -209,3 +214,124 @@ def test_bad_input(change, words):
 def test_the_schedule_is_no_option():
     with pytest.raises(TypeError, match="schedules"):
         compare(SAMPLE, (12, 12), schedule="luby", **JOB)
+
+
+# -- ``simdtex schedules``, end to end, as its user meets it.
+
+FILES = [
+    *("index.html", "oscillation.png", "pictures.png", "results.json", "seeds.png", "temperature.png"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    image.write(tmp_path / "sample.png", texture((16, 16)))
+    return tmp_path
+
+
+def small(folder, *args):
+    job = ["--order", 2, "--size", "12x10", "--device", "reference", "--schedule", "coloring,synchronous"]
+    return run("schedules", folder / "sample.png", "-o", folder / "report", *job, "--seeds", 2, *args)
+
+
+def test_a_report(folder):
+    result = small(folder)
+    assert result.exit_code == 0, result.output
+    assert names(folder / "report") == FILES
+    reader = read_page(folder / "report" / "index.html")
+    assert_needs_nothing_else(reader)
+    beside = {path.read_bytes() for path in (folder / "report").glob("*.png")}
+    assert set(embedded(reader)) == beside and len(embedded(reader)) == len(beside) == 4
+    assert "breaks (14)" in reader.text
+    job = "-o REPORT --order 2 --size 12x10 --device reference --schedule coloring,synchronous --seeds 2"
+    assert f"$ simdtex schedules SAMPLE {job}" in reader.text.replace(str(folder / "report"), "REPORT").replace(
+        str(folder / "sample.png"), "SAMPLE"
+    )
+    found = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
+    assert [entry["name"] for entry in found["schedules"]] == ["coloring", "synchronous"]
+    assert [entry["keeps_equation_14"] for entry in found["schedules"]] == [True, False]
+    assert found["seeds"] == [1, 2] and found["shape"] == [10, 12]
+    lines = result.output.splitlines()
+    assert sum(line.split()[:3] == ["synchronous", "breaks", "(14)"] for line in lines) == 4
+    assert sum(line.split()[:3] == ["coloring", "keeps", "(14)"] for line in lines) == 4
+    assert sum("of 4: " in line for line in lines) == 4
+    assert "index.html" in lines[-1]
+
+
+def test_the_same_command_gives_the_same_pictures(folder):
+    small(folder, "-q")
+    first = {path.name: path.read_bytes() for path in (folder / "report").glob("*.png")}
+    assert small(folder, "-q").output == ""
+    again = {path.name: path.read_bytes() for path in (folder / "report").glob("*.png")}
+    assert first == again
+
+
+def test_options_reach_the_runs(folder):
+    given = ["--free-sweeps", 3, "--relaxation", "gibbs", "--boundary", "open", "--coherence", 0, "--levels", 1]
+    result = small(folder, *given, "--array", "8x8:hierarchical", "--seed", 7)
+    assert result.exit_code == 0, result.output
+    found = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
+    options = found["options"]
+    assert (options["free_sweeps"], options["relaxation"], options["boundary"]) == (3, "gibbs", "open")
+    assert (options["coherence"], options["levels"]) == (0, 1)
+    assert found["seeds"] == [7, 8]
+    accounting = found["schedules"][0]["runs"][0]["accounting"]
+    assert (accounting["array"], accounting["mapping"]) == ("8x8", "hierarchical")
+
+
+def test_without_a_sample_it_is_brick(any_device, tmp_path):
+    args = ["--order", 2, "--size", "9x9", "--seeds", 1, "--schedule", "coloring", "--device", any_device.index, "-q"]
+    result = run("schedules", "-o", tmp_path / "report", *args)
+    assert result.exit_code == 0, result.output
+    found = json.loads((tmp_path / "report" / "results.json").read_text(encoding="utf-8"))
+    assert found["sample_shape"] == [128, 128]
+    assert "seeds.png" not in names(tmp_path / "report")
+
+
+BAD = {
+    "unknown schedule": (["--schedule", "coloring,lubi"], "choose one of: coloring"),
+    "a schedule twice": (["--schedule", "luby,luby"], "given twice"),
+    "no seeds": (["--seeds", 0], "give 1 or more"),
+    "size in words": (["--size", "large"], "size"),
+    "size too small to measure": (["--size", "8x20"], "give 9 or more"),
+    "device": (["--device", "no such device"], "no such device"),
+}
+
+
+def assert_refused(result, words):
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    said = [line for line in result.output.strip().splitlines() if not line.startswith("run ")]
+    assert len(said) == 1
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD[case]
+    before = names(folder)
+    assert_refused(small(folder, *args), words)
+    assert names(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("report", "words"),
+    [("file", "is a file"), ("nowhere/report", "does not exist"), ("full", "holds other files")],
+)
+def test_bad_folders_are_refused_before_the_work(folder, report, words):
+    (folder / "file").touch()
+    (folder / "full").mkdir()
+    (folder / "full" / "notes.txt").touch()
+    before = names(folder)
+    result = run("schedules", folder / "sample.png", "-o", folder / report, "--order", 2)
+    assert_refused(result, words)
+    assert names(folder) == before
+
+
+def test_ctrl_c_leaves_no_report(folder, monkeypatch):
+    def stop(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("simdtex.experiments.comparison.synthesize", stop)
+    result = small(folder)
+    assert result.exit_code == 130 and "stopped" in result.output
+    assert names(folder) == ["sample.png"]

@@ -36,7 +36,7 @@ def copy(tmp_path_factory):
         assert not (ROOT / name).exists(), f"{name} is in the repository, so the page needs another example"
         (root / name).write_text(LISTINGS[name], encoding="utf-8")
     table = (root / TABLE).read_text(encoding="utf-8")
-    last = "     - ``tests/test_mixtures.py``, ``tests/test_histograms.py``\n"
+    last = "     - ``tests/test_pyramid_method.py``, ``tests/test_matching.py``\n"
     assert table.count(last) == 1
     row = "".join(f"   {line}\n" for line in LISTINGS[TABLE].splitlines())
     (root / TABLE).write_text(table.replace(last, last + row), encoding="utf-8")
@@ -65,6 +65,7 @@ def test_every_listing_has_its_place():
     assert set(LISTINGS) == {*FILES, TABLE, "what look.py prints"}
 
 
+@pytest.mark.slow
 def test_the_operation_passes_its_test_and_those_of_the_house(copy, any_device):
     done = pytest_in(copy, "tests/test_median.py", device=any_device)
     assert done.returncode == 0, done.stdout
@@ -74,6 +75,7 @@ def test_the_operation_passes_its_test_and_those_of_the_house(copy, any_device):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
 def test_it_does_what_the_page_shows(copy, any_device):
     done = python(copy, "look.py", device=any_device)
     assert done.stdout == LISTINGS["what look.py prints"], done.stderr
@@ -96,6 +98,7 @@ def test_its_test_can_fail(copy, any_device):
     assert set(failed) == {"test_a_device_has_the_references_bits", "test_the_shape_of_a_launch_changes_no_bit"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".py")])
 def test_its_python_is_formatted_and_clean(copy, name):
     ruff = shutil.which("ruff", path=str(Path(sys.executable).parent))

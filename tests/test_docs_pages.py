@@ -1,10 +1,15 @@
-# SPDX-License-Identifier: BSD-3-Clause
-"""The check of the built documentation finds what it is for; in a browser, too, where there is one."""
+"""The checks of the built documentation, of its prose, and of the session that it plays."""
 
+import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import simdtex
+
+# -- The check of the built documentation finds what it is for; in a browser, too, where there is one.
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILT = ROOT / "docs" / "_build" / "html"
@@ -93,3 +98,70 @@ def test_built_pages_are_sound_in_a_browser(browser):
     if not (BUILT / "index.html").is_file():
         pytest.skip("the documentation is not built (make docs)")
     assert faults(BUILT) + check.opened(BUILT) + check.sideways(BUILT) == []
+
+
+# -- docs/prose.py: words that the pages avoid are found in prose with their lines, and not in code or literals.
+
+import prose  # noqa: E402
+
+PAGES = {
+    "page.rst": ".. autofunction:: begun\n\nTitle\n=====\n\nIt is ``begun`` here\nand :doc:`begun`.\n\n"
+    "::\n\n   begun the the\n\n"
+    ".. figure:: begun.png\n   :alt: what has\n      begun\n\n   64 x 64 x 64, and the\n   the end.\n",
+    "page.md": "# Title\n\n![what has\nbegun](begun.png) the\n\n```console\nbegun the the\n```\n\n\nand the\nthe end\n",
+    "page.py": '"""\nTitle\n=====\n\n``begun``\n"""\n\nbegun = "begun"\n\n\n'
+    'def f():\n    """\n    It has begun, and\n\n    the\n    the end."""\n',
+}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_faults_are_found_in_prose_alone(name, tmp_path):
+    page = tmp_path / name
+    page.write_text(PAGES[name], encoding="utf-8")
+    lines = PAGES[name].splitlines()
+    found = [fault.removeprefix(f"{page}:").split(": ", 1) for fault in prose.faults(page, prose.checks())]
+    assert sorted(message.rpartition("[")[2] for _, message in found) == ["lexical_illusions]", "project]"]
+    for line, message in found:
+        assert ("begun" if "project" in message else "the") in lines[int(line) - 1]
+    (line,) = (int(line) for line, message in found if "project" in message)
+    assert lines[line - 1].strip().removesuffix("](begun.png) the") in ("begun", "It has begun, and")
+
+
+def test_a_clean_page_has_no_fault(tmp_path):
+    (tmp_path / "page.rst").write_text("Title\n=====\n\nThe schedule chooses sites.\n", encoding="utf-8")
+    assert list(prose.faults(tmp_path / "page.rst", prose.checks())) == []
+
+
+# -- The session that the documentation plays is one of this version.
+
+import recorded  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return recorded.unpack(recorded.FILE.read_text(encoding="ascii"))
+
+
+def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
+    found, data = recording
+    shape = (recorded.SIDE, recorded.SIDE)
+    rules = recorded.OPTIONS | {"rng": recorded.SEED, "device": "reference"}
+    replay = simdtex.replay(recorded.sample(), shape, **rules)
+    assert [list(one) for one in replay.sweeps] == found["inside"][0]["panes"][0]["sweeps"]
+    for key, moment in found["moments"][1::20]:
+        (n, sets), level = json.loads(key), moment[0]
+        _, ((begin, size),) = found["frames"][f"picture {key}"]
+        seen = np.frombuffer(data[begin : begin + size], np.uint8).reshape(*shape, 4)
+        image = replay.at(n, sets).image[..., 0].repeat(2**level, 0).repeat(2**level, 1)
+        np.testing.assert_array_equal(seen[..., 0], image[: shape[0], : shape[1]])
+        row, col = recorded.PIXELS[0]
+        reason = found["explained"][f"{row},{col} {key}"]["reason"]
+        try:
+            assert reason == replay.explain_pixel(row, col, n, sets).reason
+        except ValueError as error:
+            assert reason == str(error)
+
+
+def test_the_recording_is_small_and_packs(recording):
+    assert recorded.FILE.stat().st_size < 700_000
+    assert recorded.unpack(recorded.pack(*recording)) == recording

@@ -136,11 +136,11 @@ def test_a_finished_picture_is_close_to_the_mean_in_any_type(dtype):
 
 
 def run(sample, **options):
-    return simdtex.synthesize(sample, (40, 36), rng=2, device=REFERENCE, full_output=True, order=5, **options)
+    return simdtex.synthesize(sample, (18, 17), rng=2, device=REFERENCE, full_output=True, order=5, **options)
 
 
 def test_the_source_map_stays():
-    sample = texture((32, 30), seed=3)
+    sample = texture((18, 16), seed=3)
     (plain, without), (image, output) = run(sample, finish=0.0), run(sample)
     assert_same_bits(output.source, without.source)
     assert_same_bits(apply_source_map(output.source, sample), plain)
@@ -162,10 +162,10 @@ def test_categories_are_never_averaged(sample):
 
 
 def test_a_finish_that_is_asked_for_averages_categories_too():
-    cells = np.random.default_rng(1).integers(0, 2, (30, 30)).astype(np.uint8) * 200
+    cells = np.random.default_rng(1).integers(0, 2, (18, 18)).astype(np.uint8) * 200
     assert len(np.unique(run(cells, finish=2.0)[0])) > 2
 
 
 def test_a_density_is_left_alone():
-    _, output = run(texture((32, 30), seed=3), pixel="density", relaxation="gibbs", free_sweeps=0, xi=-8.0)
+    _, output = run(texture((18, 16), seed=3), pixel="density", relaxation="gibbs", free_sweeps=0, xi=-8.0)
     assert output.statistics["options"]["finish"] == 0

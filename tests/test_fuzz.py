@@ -80,6 +80,7 @@ def test_a_replay_says_what_is_wrong(tmp_path):
     assert done.returncode == 0 and "exit code 0" in done.stdout, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_a_short_run_finds_nothing(tmp_path):
     done = fuzz("--tries", 25, "--seed", 3, "--workers", 1, "--out", tmp_path / "found")
     assert done.returncode == 0, done.stdout + done.stderr

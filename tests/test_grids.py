@@ -1,17 +1,36 @@
-"""Grids of GSLIB and SGeMS: values come to their cells whatever the header, and a file that is wrong is refused."""
+"""Grids of GSLIB and SGeMS, rasters of GDAL, NetCDF, and realisations in every format."""
 
 import doctest
+import json
+import os
+import signal
 import struct
+import subprocess
+import sys
+import time
 import warnings
 
+import click
+import h5netcdf
 import numpy as np
 import pytest
+import rasterio
+import xarray
+import zarr
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from rasterio.transform import from_origin
 
-from simdtex.io import grids
-from simdtex.io.grids import MISSING, check_grid, kind_of, read_grid, write_grid
+from simdtex import distributed
+from simdtex.cli import main
+from simdtex.cli.ending import catch_signals
+from simdtex.io import grids, image
+from simdtex.io.grids import MISSING, check_grid, is_grid, kind_of, read_grid, write_grid
+from simdtex.io.volume import check_realisations_path, write_realisations
 from simdtex.options import DataWarning
+
+# -- Grids of GSLIB and SGeMS: values come to their cells whatever the header, and a file that is wrong is refused.
 
 NAN = float("nan")
 
@@ -390,3 +409,469 @@ def test_the_check_before_a_run_is_that_of_the_writer(tmp_path):
 
 def test_the_examples_run():
     assert not doctest.testmod(grids).failed
+
+
+# -- Rasters of GDAL keep their no-data and georeference; NetCDF files are read by the names of their axes.
+
+CRS = "EPSG:32633"
+WHERE = from_origin(5000, 9000, 10, 20)
+"""The north-western corner, and the sizes of a pixel."""
+
+
+ROWS, COLS = 12, 16
+
+
+def terrain(dtype="float32"):
+    """A smooth surface of 200 to 250, unknown in a corner."""
+    y, x = np.mgrid[:ROWS, :COLS]
+    heights = (225 + 25 * np.sin(x / 3) * np.cos(y / 4)).astype(dtype)
+    heights[:2, :3] = -9999
+    return heights
+
+
+def saved_rasters(path, bands, nodata=-9999, **more):
+    bands = bands if bands.ndim == 3 else bands[None]
+    about = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype}
+    about |= {"crs": CRS, "transform": WHERE, "nodata": nodata} | more
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        with rasterio.open(path, "w", driver="GTiff", **about) as raster:
+            raster.write(bands)
+    return path
+
+
+def run(*words):
+    return CliRunner().invoke(
+        main, [*map(str, words), "--seed", "1", "--device", "reference", "--order", "2", "--levels", "1"]
+    )
+
+
+@pytest.mark.parametrize("dtype", ["float32", "int16", "float64"])
+def test_the_no_data_of_a_raster_is_unknown(tmp_path, dtype):
+    """The second row of each pair is that of the south, and an unknown value is none of the sample."""
+    path, heights = saved_rasters(tmp_path / "dem.tif", terrain(dtype)), terrain(dtype)
+    found = image.read(path)
+    unknown = np.isnan(found.pixels) if dtype[0] == "f" else np.ma.getmaskarray(found.pixels)
+    assert np.array_equal(unknown, heights == -9999) and found.pixels.dtype == dtype
+    assert np.array_equal(found.pixels[~unknown], heights[~unknown])
+    assert found.metadata.geo.transform == tuple(WHERE)[:6] and found.metadata.geo.nodata == -9999
+    grid = read_grid(path)
+    assert np.array_equal(grid.values["band 1"][0], np.where(heights == -9999, NAN, heights)[::-1], equal_nan=True)
+    assert (grid.origin, grid.cell) == ((5005, 9000 - 20 * ROWS + 10, 0), (10, 20, 1)) and "UTM zone 33N" in grid.crs
+    made = run("synth", path, "-o", tmp_path / "more.tif", "--size", "8x8")
+    assert made.exit_code == 0, made.output
+    again = image.read(tmp_path / "more.tif")
+    assert again.pixels.min() >= 200 and again.metadata.geo is None
+
+
+@pytest.mark.parametrize("dtype", ["float32", "int16"])
+def test_filling_and_extending_keep_the_georeference(tmp_path, dtype):
+    path, heights = saved_rasters(tmp_path / "dem.tif", terrain(dtype)), terrain(dtype)
+    for words, moved in (
+        (("fill", path, "-o", tmp_path / "out.tif"), (0, 0)),
+        (("extend", tmp_path / "out.tif", "-o", tmp_path / "wide.tif", "--left", 3, "--top", 2, "--right", 1), (3, 2)),
+    ):
+        made = run(*words)
+        assert made.exit_code == 0, made.output
+        with rasterio.open(words[3]) as raster:
+            found = raster.read(1)[moved[1] :, moved[0] :]
+            assert raster.crs == CRS and raster.nodata == -9999 and raster.dtypes == (dtype,)
+            assert raster.transform == from_origin(5000 - 10 * moved[0], 9000 + 20 * moved[1], 10, 20)
+        found = found[:ROWS, :COLS]
+        assert np.array_equal(found[heights != -9999], heights[heights != -9999]) and found.min() >= 200
+    if dtype == "int16":
+        made = run("fill", path, "-o", tmp_path / "out.npy")
+        assert "out.npy holds no georeference; end its name in .tif to keep it" in made.output
+
+
+def test_a_mask_inside_a_tiff_is_heeded(tmp_path):
+    heights = np.abs(terrain()).clip(0, 255).astype(np.uint8)
+    with rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True), warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        about = {"count": 1, "height": ROWS, "width": COLS, "dtype": "uint8"}
+        with rasterio.open(tmp_path / "a.tif", "w", driver="GTiff", **about) as raster:
+            raster.write(heights[None])
+            raster.write_mask(heights > 230)
+    found = image.read(tmp_path / "a.tif").pixels
+    assert np.array_equal(np.ma.getmaskarray(found), heights <= 230) and found.shape == heights.shape
+
+
+def test_other_rasters_of_gdal(tmp_path):
+    heights = terrain()
+    text = "ncols 16\nnrows 12\nxllcorner 5000\nyllcorner 8760\ndx 10\ndy 20\nNODATA_value -9999\n"
+    path = tmp_path / "dem.asc"
+    path.write_text(text + "\n".join(" ".join(f"{h:.9g}" for h in row) for row in heights) + "\n")
+    grid = read_grid(path)
+    assert np.array_equal(grid.values["band 1"][0], np.where(heights < 0, NAN, heights)[::-1], equal_nan=True)
+    assert grid.origin == (5005, 8770, 0) and is_grid(path) and not is_grid(path, rasters=False)
+    assert np.array_equal(image.read(path).pixels, np.where(heights < 0, NAN, heights), equal_nan=True)
+    with pytest.raises(ValueError, match=r"dem\.asc.* has 2.* bytes and no more than 792"):
+        read_grid(path, max_pixels=99)
+    turned = saved_rasters(tmp_path / "turned.tif", heights, transform=WHERE @ rasterio.Affine.rotation(30))
+    with pytest.raises(ValueError, match=r"turned\.tif has rows that are not parallel to the x axis: warp it"):
+        read_grid(turned)
+    (tmp_path / "a.asc").write_text("<VRTDataset rasterXSize='4' rasterYSize='4'/>")
+    with pytest.raises(ValueError, match=r"a\.asc cannot be read as a grid"):
+        read_grid(tmp_path / "a.asc")
+
+
+@pytest.mark.parametrize(("output", "source"), [("many.nc", False), ("many.tif", False), ("many.zarr", True)])
+def test_wells_and_realisations_lie_in_the_coordinates_of_a_raster(tmp_path, output, source):
+    """The data are at rows counted from the south, where the file counts from the north."""
+    path, heights = saved_rasters(tmp_path / "dem.tif", terrain()), terrain()
+    rows, cols = np.array([5, 10, 3]), np.array([14, 1, 7])
+    (tmp_path / "wells.csv").write_text(
+        "well,Northing,Easting,height\n"
+        + "".join(
+            f"A{r},{9000 - 20 * (r + 0.5)},{5000 + 10 * (c + 0.5)},{float(heights[r, c])!r}\n"
+            for r, c in zip(rows, cols, strict=True)
+        )
+        + "B,1,1,250\n"
+    )
+    words = ["simulate", path, "-o", tmp_path / output, "--known", tmp_path / "wells.csv", "--outside", "skip"]
+    made = run(*words, *(["--source"] * source))
+    assert made.exit_code == 0, made.output
+    assert "1 of 4 data are outside of the grid and are left out" in made.output
+    assert "left out, because they hold text: the columns well" in made.output
+    if output == "many.tif":
+        with rasterio.open(tmp_path / output) as raster:
+            found = raster.read(1)[rows, cols]
+            assert raster.crs == CRS and raster.transform == WHERE and raster.descriptions == ("simulation__real0",)
+    else:
+        with xarray.open_dataset(tmp_path / output, decode_coords="all") as many:
+            found = many.simulation[0].values[::-1][rows, cols]
+            assert "UTM zone 33N" in many.spatial_ref.crs_wkt
+            assert many.y.values[[0, -1]].tolist() == [8770, 8990]
+    assert np.array_equal(found, heights[rows, cols])
+    refused = run(*words[:6])
+    assert refused.exit_code == 2 and "outside of a picture" in refused.output and "--outside skip" in refused.output
+
+
+def test_pictures_of_a_raster_that_is_counted_from_the_south_are_refused(tmp_path):
+    path = saved_rasters(tmp_path / "dem.tif", terrain())
+    image.write(tmp_path / "mask.png", np.full((ROWS, COLS), 255, np.uint8))
+    for words in (("--sample-mask", tmp_path / "mask.png"), ("--guide", f"{path}={path}")):
+        made = run("simulate", path, "-o", tmp_path / "a.npz", *words)
+        assert made.exit_code == 2 and "is a raster, whose rows are counted from the south" in made.output
+    assert sorted(os.listdir(tmp_path)) == ["dem.tif", "mask.png"]
+
+
+def test_a_grid_is_written_as_a_geotiff(tmp_path):
+    values = np.ma.MaskedArray(np.arange(6, dtype=np.uint8).reshape(2, 3), [[0, 0, 0], [0, 1, 0]])
+    write_grid(tmp_path / "a.tif", {"facies": values, "b": values}, origin=(10, 20), cell=(2, 4), crs=CRS)
+    with rasterio.open(tmp_path / "a.tif") as raster:
+        assert raster.read(1).tolist() == [[3, -9999, 5], [0, 1, 2]] and raster.nodata == -9999
+        assert raster.transform == from_origin(9, 26, 2, 4) and raster.descriptions == ("facies", "b")
+    grid = read_grid(tmp_path / "a.tif", variables=["b"])
+    assert np.array_equal(grid.values["b"][0], values.astype(float).filled(NAN), equal_nan=True)
+    assert (grid.origin, grid.cell) == ((10, 20, 0), (2, 4, 1))
+    with pytest.raises(ValueError, match="is a GeoTIFF, which has no layers"):
+        write_grid(tmp_path / "b.tif", {"v": np.zeros((2, 3, 4))})
+    assert os.listdir(tmp_path) == ["a.tif"]
+
+
+def weather():
+    """Temperatures from the north to the south, at two times, with an unknown one, and a field without time."""
+    rng = np.random.default_rng(1)
+    tas = rng.integers(250, 300, (2, 12, 10)).astype(np.float32)
+    tas[0, 0, 1] = NAN
+    coords = {"lat": ("lat", np.linspace(50, 39, 12), {"units": "degrees_north"}), "time": [0, 1]}
+    coords["lon"] = ("lon", np.linspace(3, 12, 10), {"units": "degrees_east"})
+    fields = {"tas": (("time", "lat", "lon"), tas), "oro": (("lon", "lat"), tas[1].T * 2), "n": ("time", [1, 2])}
+    return xarray.Dataset(fields, coords), tas
+
+
+@pytest.mark.parametrize("form", ["NETCDF4", "NETCDF3_64BIT"])
+def test_netcdf_is_read_by_the_names_of_its_axes(tmp_path, form):
+    data, tas = weather()
+    data.to_netcdf(tmp_path / "a.nc", engine="scipy" if "3" in form else "h5netcdf", format=form)
+    grid = read_grid(tmp_path / "a.nc")
+    assert sorted(grid.values) == ["oro", "tas[0]", "tas[1]"] and is_grid(tmp_path / "a.nc", rasters=False)
+    for name, wanted in (("tas[0]", tas[0]), ("tas[1]", tas[1]), ("oro", 2 * tas[1])):
+        assert np.array_equal(grid.values[name][0], wanted[::-1], equal_nan=True), "in ascending order of latitude"
+    assert (grid.origin, grid.cell) == ((3, 39, 0), (1, 1, 1))
+    made = run("simulate", tmp_path / "a.nc", "-o", tmp_path / "b.npz")
+    assert made.exit_code == 2 and "steps of time or another axis: choose one, as --variables 'tas[0]'" in made.output
+    made = run("simulate", tmp_path / "a.nc", "-o", tmp_path / "b.npz", "--variables", "tas[1]", "--finish", "0")
+    assert made.exit_code == 0, made.output
+    with np.load(tmp_path / "b.npz") as many:
+        assert many["y"].tolist() == np.arange(39.0, 51).tolist() and set(many["values"].flat) <= set(tas[1].flat)
+
+
+def test_hdf5_without_names_of_axes_is_read_by_position(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["rock"] = np.arange(24).reshape(2, 3, 4)
+    grid = read_grid(tmp_path / "a.h5")
+    assert grid.values["rock"].tolist() == np.arange(24).reshape(2, 3, 4).tolist()
+
+
+# -- Realisations go to files by xarray's own writers, and are read by xarray and NumPy alone; nothing is half written.
+
+SUFFIXES = [".zarr", ".nc", ".npz"]
+GRIDS = [".gslib", ".sgems"]
+ATTRIBUTES = {"text": "Höhe ≥ 3", "seed": 2**64 - 1, "share": 0.25, "options": '{"order": 8, "levels": null}'}
+
+
+def some(dtype="uint8", variables=None, name="rock"):
+    rng = np.random.default_rng(3)
+    shape = (3, 5, 4) if variables is None else (3, 5, 4, variables)
+    values = (rng.random(shape) * 255).astype(dtype)
+    if np.dtype(dtype).kind == "f":
+        values[0, 1, 2] = np.nan
+    coords = {
+        "realisation": [7, 9, 11],
+        "y": ("y", np.arange(5) * 0.5 + 0.25, {"units": "m"}),
+        "x": np.arange(4, dtype=np.int32),
+        "seed": ("realisation", np.array([1, 2**64 - 1, 0], np.uint64)),
+    }
+    dims = ("realisation", "y", "x", "variable")[: values.ndim]
+    return xarray.DataArray(values, coords, dims, name=name, attrs=ATTRIBUTES)
+
+
+@pytest.mark.parametrize("suffix", [".zarr", ".nc", ".NC"])
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint64", "float16", "float32", "float64", "bool"])
+@pytest.mark.parametrize("variables", [None, 3])
+def test_xarray_reads_what_was_written(tmp_path, suffix, dtype, variables):
+    path, array = tmp_path / f"many{suffix}", some(dtype, variables)
+    write_realisations(path, array)
+    with xarray.open_dataarray(path) as found:
+        xarray.testing.assert_identical(found, array)
+        assert found.dtype == array.dtype and found.seed.dtype == np.uint64
+    assert os.listdir(tmp_path) == [path.name]
+
+
+def test_files_are_compressed(tmp_path):
+    array = xarray.DataArray(np.zeros((4, 200, 200)), dims=("realisation", "y", "x"))
+    for suffix in SUFFIXES:
+        write_realisations(tmp_path / f"a{suffix}", array)
+    assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) < array.nbytes / 10
+
+
+@pytest.mark.parametrize("variables", [None, 3])
+def test_numpy_alone_reads_npz(tmp_path, variables):
+    array = some("int16", variables)
+    write_realisations(tmp_path / "many.npz", array)
+    with np.load(tmp_path / "many.npz") as arrays:
+        assert np.array_equal(arrays["values"], array) and arrays["values"].dtype == np.int16
+        assert set(arrays.files) == {"values", "attributes", *array.coords}
+        assert all(np.array_equal(arrays[name], array[name]) for name in array.coords)
+        assert json.loads(str(arrays["attributes"])) == ATTRIBUTES
+
+
+def test_an_npz_is_written_without_xarray(tmp_path):
+    code = """
+import sys
+sys.modules["xarray"] = None
+from types import SimpleNamespace
+import numpy as np
+from simdtex.io.volume import check_realisations_path, write_realisations
+coords = {"x": SimpleNamespace(values=np.arange(3))}
+check_realisations_path(sys.argv[1])
+write_realisations(sys.argv[1], SimpleNamespace(values=np.ones((2, 3, 3)), coords=coords, attrs={"seed": 1}))
+"""
+    subprocess.run([sys.executable, "-c", code, tmp_path / "a.npz"], check=True)
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert arrays["values"].sum() == 18 and arrays["x"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_file_is_replaced(tmp_path, suffix):
+    path = tmp_path / f"many{suffix}"
+    write_realisations(path, some("uint8", 3))
+    write_realisations(path, some("float64"))
+    if suffix != ".npz":
+        with xarray.open_dataarray(path) as found:
+            xarray.testing.assert_identical(found, some("float64"))
+    assert os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize("suffix", GRIDS)
+@pytest.mark.parametrize("variables", [None, 2])
+def test_a_grid_keeps_values_origin_and_cells(tmp_path, suffix, variables):
+    array = some("float32", variables).assign_coords(z=3.5).assign_attrs(cell_x=1.0, cell_z=0.25)
+    write_realisations(tmp_path / f"many{suffix}", array)
+    with pytest.warns(DataWarning):
+        grid = read_grid(tmp_path / f"many{suffix}")
+    assert (grid.origin, grid.cell) == ((0, 0.25, 3.5), (1, 0.5, 0.25))
+    parts = [""] if variables is None else ["_0", "_1"]
+    assert list(grid.values) == [f"rock{part}__real{number}" for number in (7, 9, 11) for part in parts]
+    planes = array.values if variables is None else np.moveaxis(array.values, -1, 1)
+    found = np.stack(list(grid.values.values())).astype(np.float32)[:, 0]
+    assert np.array_equal(found, planes.reshape(-1, 5, 4), equal_nan=True)
+
+
+@pytest.mark.parametrize("suffix", GRIDS)
+def test_layers_and_arrays_without_coordinates(tmp_path, suffix):
+    values = np.arange(48, dtype=np.uint8).reshape(2, 3, 4, 2)
+    array = xarray.DataArray(values, dims=("realisation", "y", "x", "z"))
+    write_realisations(tmp_path / f"a{suffix}", array)
+    grid = read_grid(tmp_path / f"a{suffix}")
+    assert np.array_equal(grid.values["realisations__real1"], values[1].transpose(2, 0, 1))
+    assert (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
+    write_realisations(tmp_path / f"a{suffix}", array.assign_attrs(cell_y=2.5))
+    assert read_grid(tmp_path / f"a{suffix}").cell == (1, 2.5, 1)
+    write_realisations(tmp_path / f"a{suffix}", array[0, 0:1, 0:1].assign_coords(x=[7.0]).assign_attrs(cell_x=3.0))
+    assert read_grid(tmp_path / f"a{suffix}").cell == (3, 1, 1)
+
+
+@pytest.mark.parametrize("x", [[0, 1, 3, 4], [3, 2, 1, 0], [1, 1, 1, 1], [0, 1, np.nan, 3]])
+def test_coordinates_that_no_grid_has(tmp_path, x):
+    with pytest.raises(ValueError, match="the coordinate x is not evenly spaced in ascending order"):
+        write_realisations(tmp_path / "a.gslib", some().assign_coords(x=x))
+    with pytest.raises(ValueError, match="have the dimensions realisation, y, row: give"):
+        write_realisations(tmp_path / "a.gslib", some().rename(x="row"))
+    assert os.listdir(tmp_path) == []
+
+
+def refused_realisations(path, words):
+    for attempt in (check_realisations_path, lambda path: write_realisations(path, some())):
+        with pytest.raises(ValueError, match=words) as said:
+            attempt(path)
+        assert "\n" not in str(said.value)
+
+
+def test_places_that_cannot_be_written(tmp_path, monkeypatch):
+    for name in ("folder.nc", "empty.zarr", "photos.zarr"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "photos.zarr" / "a.png").touch()
+    (tmp_path / "file.zarr").touch()
+    for name, words in (
+        ("many.png", "names no format of realisations: end its name in one of .zarr, .nc, .npz, .gsl"),
+        ("many", "names no format"),
+        (".zarr", "names no format"),
+        ("none/many.nc", "the folder .* does not exist"),
+        ("none/many.zarr", "the folder .* does not exist"),
+        ("folder.nc", "is a folder"),
+        ("empty.zarr", "is a folder and not a store of realisations alone: remove it, or give a new name"),
+        ("photos.zarr", "is a folder and not a store of realisations"),
+        ("file.zarr", "is a file"),
+    ):
+        refused_realisations(tmp_path / name, words)
+    assert os.listdir(tmp_path / "photos.zarr") == ["a.png"]
+    assert sorted(os.listdir(tmp_path)) == ["empty.zarr", "file.zarr", "folder.nc", "photos.zarr"]
+    write_realisations(tmp_path / "old.zarr", some())
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
+    for name in ("a.nc", "a.zarr", "old.zarr", "a.npz"):
+        refused_realisations(tmp_path / name, "not writable")
+
+
+@pytest.mark.parametrize(
+    ("missing", "suffixes"),
+    [("xarray", [".zarr", ".nc"]), ("zarr", [".zarr"]), ("h5netcdf", [".nc"]), ("h5py", [".nc"])],
+)
+def test_libraries_that_are_not_installed(tmp_path, monkeypatch, missing, suffixes):
+    monkeypatch.setitem(sys.modules, missing, None)
+    for suffix in suffixes:
+        refused_realisations(
+            tmp_path / f"many{suffix}", rf"^{missing} is not installed; pip install 'simdtex\[simulate\]'$"
+        )
+    for suffix in set(SUFFIXES) - set(suffixes):
+        assert check_realisations_path(tmp_path / f"many{suffix}") == suffix
+
+
+def test_what_is_no_data_array_is_refused(tmp_path):
+    with pytest.raises(TypeError, match=r"of type ndarray: give an xarray\.DataArray"):
+        write_realisations(tmp_path / "a.npz", np.zeros((2, 3, 4)))
+    for suffix in SUFFIXES:
+        with pytest.raises(TypeError):
+            write_realisations(tmp_path / f"a{suffix}", some().assign_attrs(a=object()))
+    assert os.listdir(tmp_path) == []
+
+
+def test_an_interrupt_waits_until_a_netcdf_file_is_closed(tmp_path, monkeypatch):
+    """A file that is half open prints a traceback when it is collected."""
+    interrupted, flush = [], h5netcdf.core.File.flush
+
+    def interrupting(file):
+        if not interrupted:
+            interrupted.append(os.kill(os.getpid(), signal.SIGINT))
+        flush(file)
+
+    monkeypatch.setattr(h5netcdf.core.File, "flush", interrupting)
+    with pytest.raises(KeyboardInterrupt) as said, catch_signals(click.Context(click.Command("simulate"))):
+        write_realisations(tmp_path / "a.nc", some())
+        time.sleep(10)
+    assert interrupted and not any("h5netcdf" in str(entry.path) for entry in said.traceback)
+    assert os.listdir(tmp_path) in ([], ["a.nc"])
+
+
+@pytest.mark.parametrize("layers", [None, 3])
+def test_a_grid_is_read_from_netcdf(tmp_path, layers):
+    path, dims = tmp_path / "grid.nc", ("z", "y", "x")[layers is None :]
+    shape = (3, 5, 4)[layers is None :]
+    values = np.arange(np.prod(shape), dtype=np.int16).reshape(shape)
+    coords = {"x": np.arange(4) * 10.0 + 105, "y": np.arange(5) * 20.0 + 7} | (
+        {"z": np.arange(3) - 9.5} if layers else {}
+    )
+    grid = xarray.Dataset(
+        {"rock": (dims, values), "other": ("x", np.zeros(4)), "b": (dims[::-1], values.T / 2)}, coords
+    )
+    grid.to_netcdf(path, engine="h5netcdf")
+    found = read_grid(path)
+    assert list(found.values) == ["rock", "b"] and found.values["rock"].dtype == np.int16
+    for name, wanted in (("rock", values), ("b", values / 2)):
+        assert (found.values[name] == wanted).all() and found.values[name].shape == (layers or 1, 5, 4)
+    assert found.origin == (105, 7, -9.5 if layers else 0) and found.cell == (10, 20, 1)
+
+
+def test_a_netcdf_that_is_no_grid_gets_one_sentence(tmp_path):
+    path = tmp_path / "grid.nc"
+    xarray.Dataset({"rock": ("t", np.zeros(4))}).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(ValueError, match="has no variable with the axes y and x, or z, y and x"):
+        read_grid(path)
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(ValueError, match="cannot be read as a grid"):
+        read_grid(path)
+    some().isel(realisation=0, drop=True).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(ValueError, match=r"grid\.nc "):
+        read_grid(path, max_pixels=4)
+
+
+def _group(path):
+    zarr.open_group(path, mode="w").create_array("depths", data=np.arange(4))
+
+
+def _tiles(path):
+    distributed.synthesize(np.eye(9), (9, 9), path, order=1, rng=1, device="reference")
+
+
+def _readme(path):
+    write_realisations(path, some())
+    (path / "README").write_text("kept")
+
+
+def _more(path):
+    write_realisations(path, some())
+    zarr.open_group(path).create_array("depths", data=np.arange(4))
+
+
+def _inside(path):
+    write_realisations(path, some())
+    (path / "rock" / "notes.txt").write_text("kept")
+
+
+def _attribute(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"].attrs["checked_by"] = "me"
+
+
+def _title(path):
+    write_realisations(path, some())
+    zarr.open_group(path).attrs["title"] = "mine"
+
+
+def _edited(path):
+    write_realisations(path, some())
+    zarr.open_group(path)["rock"][0, 0, 0] = 77
+
+
+@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more, _inside, _attribute, _title, _edited])
+def test_only_a_store_of_ones_own_is_replaced(tmp_path, make):
+    path = tmp_path / "lab.zarr"
+    make(path)
+    before = {one: one.is_file() and one.read_bytes() for one in path.rglob("*")}
+    with pytest.raises(ValueError, match=r"lab.zarr is a folder and not a store of realisations alone: remove it, or"):
+        write_realisations(path, some())
+    assert {one: one.is_file() and one.read_bytes() for one in path.rglob("*")} == before

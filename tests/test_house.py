@@ -1,4 +1,4 @@
-"""The rules of the house: a kernel has its operation; imports go one way."""
+"""The rules of the house: a kernel has its operation and a test; imports go one way."""
 
 import ast
 import re
@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "simdtex"
 KERNELS = sorted(path.stem for path in (ROOT / "kernels").glob("*.cl"))
 MODULES = sorted(PACKAGE.rglob("*.py"))
+TESTS = sorted((ROOT / "tests").glob("test_*.py"))
 
 
 def imports(path, everything=False):
@@ -43,16 +44,18 @@ def test_there_are_kernels():
 
 
 @pytest.mark.parametrize("stem", KERNELS)
-def test_every_kernel_function_is_launched_by_one_module_of_operations(stem):
-    names = re.findall(
-        r"__kernel\s+(?:__attribute__\S+\s+)?void\s+(\w+)", (ROOT / "kernels" / f"{stem}.cl").read_text()
-    )
+def test_every_kernel_has_one_module_of_operations_which_tests_import(stem):
+    source = (ROOT / "kernels" / f"{stem}.cl").read_text()
+    names = re.findall(r"__kernel\s+(?:__attribute__\S+\s+)?void\s+(\w+)", source)
     assert names and all(name == stem or name.startswith(f"{stem}_") for name in names)
-    texts = [path.read_text() for path in (PACKAGE / "ops").glob("*.py")]
-    for name in names:  # a launcher may leave the stem to a prefix
-        assert sum(f'"{name}"' in text for text in texts) == 1 or any(
-            stem in text and f'"{name.removeprefix(stem + "_")}"' in text for text in texts
-        )
+    operations = {path.stem: path.read_text() for path in (PACKAGE / "ops").glob("*.py")}
+    for name in names:
+        homes = [home for home, text in operations.items() if f'"{name}"' in text]
+        # a launcher may leave the stem to a prefix
+        homes = homes or [home for home in operations if f'"{name.removeprefix(stem + "_")}"' in operations[home]]
+        assert homes and (len(homes) == 1 or stem in homes)
+        named = rf"\bsimdtex\.ops\.({'|'.join(homes)})\b|from simdtex\.ops import .*\b({'|'.join(homes)})\b"
+        assert any(re.search(named, path.read_text(encoding="utf-8")) for path in (ROOT / "tests").glob("*.py"))
 
 
 def test_every_kernel_function_of_the_array_is_launched_by_an_instruction():
@@ -152,7 +155,7 @@ def test_operations_and_the_reference_need_no_opencl_to_be_imported():
         assert not [name for name in imports(path) if name.startswith("pyopencl")]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "tests").glob("test_*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", TESTS, ids=lambda path: path.stem)
 def test_nothing_in_a_test_is_unseeded(path):
     text = path.read_text(encoding="utf-8")
     assert not re.search(r"default_rng\(\)|np\.random\.(rand|randn|randint|random|normal|uniform|seed)\(", text)

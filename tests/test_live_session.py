@@ -1,9 +1,13 @@
-"""The sessions of the live page: command lines that repeat a result, restarts, pauses, frames, and error messages."""
+"""Sessions of the live page: commands that repeat a result, frames, strokes, a look inside a run, and controls."""
 
 import io
+import json
 import shlex
+import tracemalloc
+from math import inf
 from types import SimpleNamespace
 
+import click
 import numpy as np
 import PIL.Image
 import pytest
@@ -16,15 +20,21 @@ from PIL import ImageCms
 import simdtex
 from simdtex import cli
 from simdtex.io.image import read_bytes
-from simdtex.live import results
+from simdtex.live import frames, results
 from simdtex.live import session as sessions
-from simdtex.live.job import LABELS, Picture
+from simdtex.live.frames import Layer, Window, parse_window, render
+from simdtex.live.inside import BARS, SET_COLOURS
+from simdtex.live.job import LABELS, Picture, paint
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
+from simdtex.live.words import TABLES, controls
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
 from simdtex.model.display import read_labels
 from simdtex.model.source_map import apply_source_map
+from simdtex.options import table
+
+# -- The sessions of the live page: command lines that repeat a result, restarts, pauses, frames, and error messages.
 
 
 @pytest.fixture
@@ -655,3 +665,336 @@ def test_a_file_with_further_frames_is_said(page):
     frames[0].save(file, "GIF", save_all=True, append_images=frames[1:])
     assert page.ask("picture", file.getvalue(), kind="open", name="a.gif")[0]["more"] is True
     assert page.ask("picture", png(texture()), kind="open", name="a.png")[0]["more"] is False
+
+
+# -- Strokes become labels, and windows of layers become frames; labels lie over a picture.
+
+
+def stroke_frames(label, width, *points):
+    return {"label": label, "width": width, "points": [list(point) for point in points]}
+
+
+def test_a_stroke_is_round_and_the_last_one_counts():
+    label = paint([stroke_frames(1, 9, (10, 10))], (21, 21))
+    i, j = np.indices((21, 21))
+    distance = np.hypot(i - 10, j - 10)
+    assert (label[distance <= 3.5] == 1).all() and not label[distance > 5.5].any()
+    label = paint([stroke_frames(1, 8, (2, 10), (18, 10)), stroke_frames(2, 4, (10, 0), (10, 20))], (21, 21))
+    assert (label[10, 4], label[10, 10], label[0, 10], label[0, 0]) == (1, 2, 2, 0)
+    assert paint([stroke_frames(1, 8, (5, 5)), stroke_frames(0, 30, (5, 5))], (12, 12)).sum() == 0
+    assert paint([stroke_frames(1, 4, (-50, 5), (500, 5))], (12, 12))[5].all(), "it goes on beyond the edges"
+
+
+@pytest.mark.parametrize("channels", [(), (1,), (2,), (4,)], ids=str)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_labels_lie_over_a_picture(channels, dtype):
+    pixels = np.random.default_rng(0).integers(0, 256, (4, 6, *channels)).astype(dtype)
+    pixels[:2, 0] = np.array([0, 255]).reshape(2, *[1] * len(channels))  # black and white
+    labels = np.arange(24, dtype=np.uint8).reshape(4, 6) % 3
+    colours = np.array([[0, 0, 0], [200, 100, 0], [255, 255, 255]], np.uint8)
+    own = pixels.reshape(4, 6, -1)
+    own = (own[..., :3] if own.shape[2] > 2 else own[..., :1]).astype(int) * np.ones(3, int)
+    for shares in ([0.5, 0.5, 0.5], [0, 0.25, 1]):
+        found = render(frames.overlay(pixels, labels, colours, shares), Window(width=6, height=4))
+        shown = np.frombuffer(found.pixels, np.uint8).reshape(4, 6, 4)[..., :3]
+        share = np.array(shares)[labels][..., None]
+        np.testing.assert_array_equal(shown, np.floor(own * (1 - share) + colours[labels] * share))
+
+
+@given(
+    *(st.integers(-40, 40), st.integers(-40, 40), st.integers(1, 30), st.integers(1, 30), st.integers(1, 7)),
+    st.booleans(),
+)
+def test_a_window_of_a_layer(left, top, width, height, step, tiled):
+    values = np.random.default_rng(0).integers(0, 256, (20, 24, 3), np.uint8)
+    found = render(Layer((20, 24), values, np.asarray), Window("picture", left, top, width, height, step, tiled))
+    shown = np.frombuffer(found.pixels, np.uint8).reshape(found.height, found.width, 4)
+    padded = np.pad(values.astype(float), ((200, 200), (200, 200), (0, 0)), "wrap" if tiled else "edge")
+    for row in range(found.height):
+        for col in range(found.width):
+            y, x = found.top + row * step + 200, found.left + col * step + 200
+            mean = padded[y : y + step, x : x + step].mean((0, 1))
+            assert np.abs(shown[row, col, :3] - mean).max() <= 0.5 + 1e-3
+    beside = 20 if tiled else 0  # three times the layer, itself in the middle
+    inside = [one for one in range(top, top + step * height, step) if -beside - step < one < 20 + beside]
+    assert found.height == len(inside) and (not inside or found.top == inside[0])
+
+
+def test_a_coarse_level_stands_for_the_whole():
+    values = np.arange(9, dtype=np.uint8).reshape(3, 3)
+    found = render(Layer((6, 6), values, np.asarray), Window(width=6, height=6))
+    shown = np.frombuffer(found.pixels, np.uint8).reshape(6, 6, 4)[..., 0]
+    np.testing.assert_array_equal(shown, values.repeat(2, 0).repeat(2, 1))
+
+
+def test_parts_of_a_large_window_are_the_same(monkeypatch):
+    values = np.random.default_rng(0).integers(0, 256, (40, 40), np.uint8)
+    layer, window = Layer((40, 40), values, np.asarray), Window(width=14, height=14, step=3)
+    whole = render(layer, window)
+    monkeypatch.setattr(frames, "CHUNK", 3 * 3 * 14 * 2)
+    assert render(layer, window) == whole
+
+
+def test_a_coarse_window_of_a_tiled_layer_takes_little_memory():
+    window = parse_window({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
+    layer = Layer((512, 2**14), np.zeros((512, 2**14, 3), np.uint8), np.asarray)
+    tracemalloc.start()
+    found = render(layer, window)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (found.width, found.height) == (96, 2)
+    assert most < 50 * 2**20
+
+
+# -- A look inside a result: moments of its run, and why pixels have their values, as the page is sent them.
+
+SAMPLE = texture(24, 28)
+RULES = {"order": 4, "channel_axis": -1, "device": "reference"}
+
+
+@pytest.fixture
+def page_inside():
+    page = Fake(Picture("t.png", SAMPLE, -1))
+    yield page
+    page.session.close(10)
+
+
+def inside(page, **message):
+    return page.ask("inside", kind="inside", open=True, **message)[0]["panes"]
+
+
+def frame(page, after, pane=0, **values):
+    message, (data,) = page.wait("frame", after=after, pane=pane, **values)
+    return message, np.frombuffer(data, np.uint8).reshape(message["height"], message["width"], 4)
+
+
+def test_moments_are_those_of_the_run(page_inside):
+    page_inside.result(width=20, height=18)
+    (pane,) = inside(page_inside)
+    replay = simdtex.replay(SAMPLE, (18, 20), rng=7, **RULES)
+    assert (pane["result"], pane["moment"]) == (1, None)
+    assert pane["sweeps"] == [list(one) for one in replay.sweeps]
+    for layer in ("picture", "temperature", "sets"):
+        page_inside.say(kind="view", layer=layer, left=0, top=0, width=20, height=18, step=1)
+        for n in (0, len(replay.sweeps) - 1):
+            level, sweep, *_ = replay.sweeps[n]
+            after = len(page_inside.got)
+            assert page_inside.ask("moments", kind="seek", level=level, sweep=sweep, sets=1)[0]["moments"] == [(n, 1)]
+            message, seen = frame(page_inside, after, layer=layer)
+            now = replay.at(n, 1)
+            assert (message["rows"], message["cols"]) == (18, 20)
+            rows, cols = np.arange(18) // 2**level, np.arange(20) // 2**level
+            if layer == "picture":
+                np.testing.assert_array_equal(seen[..., :3], now.image[np.ix_(rows, cols)])
+            if layer == "sets":
+                last = now.relaxed[np.ix_(rows, cols)] == 2
+                np.testing.assert_array_equal((seen[..., :3] == SET_COLOURS[2]).all(-1), last)
+    assert page_inside.ask("moments", kind="seek", level=99, sweep=99, sets=10**6)[0]["moments"][0][0] < len(
+        replay.sweeps
+    )
+    after = len(page_inside.got)
+    assert page_inside.ask("moments", kind="seek")[0]["moments"] == [None]
+    page_inside.say(kind="view", layer="picture", left=0, top=0, width=20, height=18, step=1)
+    np.testing.assert_array_equal(frame(page_inside, after, layer="picture")[1][..., :3], page_inside.latest.image)
+
+
+def test_a_pixel_is_explained_as_in_python(page_inside):
+    page_inside.result(width=20, height=18)
+    inside(page_inside)
+    after = len(page_inside.got)
+    found, _ = page_inside.ask("explained", kind="explain", row=5, col=7)
+    assert json.loads(json.dumps(found, allow_nan=False)) == json.loads(json.dumps(found))
+    why = simdtex.explain(SAMPLE, (18, 20), (5, 7), rng=7, **RULES)
+    assert (found["pixel"], found["reason"]) == ([5, 7], why.reason)
+    taken = next(one for one in found["candidates"] if one["taken"])
+    assert taken["place"] == why.candidates.place[why.taken].tolist()
+    assert taken["costs"]["total"] == why.candidates.total[why.taken]
+    np.testing.assert_array_equal(taken["pixels"], why.candidates.pixels[why.taken])
+    np.testing.assert_array_equal(found["pixels"], why.neighbours.pixels)
+    page_inside.say(kind="seek", level=9, sweep=1, sets=0)
+    assert "has not relaxed yet" in page_inside.ask("explained", kind="explain", row=5, col=7)[0]["reason"]
+    assert "error" not in page_inside.kinds(after)
+    for row, words in [(18, "give 17 or fewer"), (-1, "give 0 or more"), ("x", "the row of the pixel")]:
+        assert words in str(page_inside.ask(("explained", "error"), kind="explain", row=row, col=0)[0])
+
+
+def test_a_density_has_few_bars(page_inside):
+    page_inside.result(
+        width=14, height=12, options={"pixel": "density", "relaxation": "gibbs", "structure": 0, "levels": 1}
+    )
+    inside(page_inside)
+    found, _ = page_inside.ask("explained", kind="explain", row=5, col=7)
+    bars = np.array(found["density"]["bars"])
+    assert bars.shape == (3, BARS)
+    np.testing.assert_allclose(bars.sum(1), 1)
+    assert len(found["density"]["starts"]) == BARS
+
+
+def test_two_results_side_by_side(page_inside):
+    page_inside.result(width=20, height=18)
+    page_inside.result(width=20, height=18, options={"schedule": "synchronous"})
+    first, second = inside(page_inside, beside=1)
+    assert (first["result"], second["result"]) == (2, 1)
+    after = len(page_inside.got)
+    page_inside.say(kind="view", layer="picture", left=0, top=0, width=20, height=18, step=1)
+    level, sweep, sets, *_ = first["sweeps"][-1]
+    moments = page_inside.ask("moments", kind="seek", level=level, sweep=sweep, sets=sets)[0]["moments"]
+    assert [len(one) for one in moments] == [2, 2]
+    assert {frame(page_inside, after, pane)[0]["of"] for pane in (0, 1)} == {1, 2}
+    page_inside.say(kind="explain", row=3, col=4)
+    assert page_inside.wait("explained", pane=1, after=after)[0]["pixel"] == [3, 4]
+
+
+def test_a_seamless_picture_is_looked_into(page_inside):
+    page_inside.result(job="extend", options={"order": 4})
+    (pane,) = inside(page_inside)
+    assert pane["sweeps"]
+    found, _ = page_inside.ask("explained", kind="explain", row=0, col=0)
+    assert found["candidates"]
+    assert "value is given" in page_inside.ask("explained", kind="explain", row=11, col=13)[0]["reason"]
+
+
+@pytest.mark.parametrize("message", [{"method": "pyramid"}, {"method": "multires"}])
+def test_other_methods_are_refused(page_inside, message):
+    page_inside.result(width=20, height=18, **message)
+    assert "method mrf" in page_inside.error(kind="inside", open=True)
+
+
+def test_what_cannot_be_looked_into(page_inside):
+    assert "no result" in page_inside.error(kind="inside", open=True)
+    page_inside.result(width=20, height=18)
+    assert "no longer kept" in page_inside.error(kind="inside", open=True, beside=5)
+    inside(page_inside)
+    page_inside.result(width=20, height=18, seed=2)
+    assert page_inside.session._inside == {}, "another result is not looked into by itself"
+    inside(page_inside)
+    page_inside.ask("frame", kind="inside", open=False)
+    assert page_inside.session._inside == {}
+
+
+def test_the_lattice_and_its_faults_are_sent():
+    i, j = np.indices((50, 50))
+    bricks = np.where(((i % 8 < 2) | ((j + 6 * (i // 8 % 2)) % 12 < 2)), 230, 90).astype(np.uint8)
+    bricks += np.random.default_rng(0).integers(0, 9, bricks.shape, np.uint8)
+    page = Fake(Picture("bricks.png", bricks, None))
+    try:
+        cols, rows = page.ask("picture", kind="hello")[0]["size"]
+        assert (cols % 12, rows % 16) == (0, 0), "a lattice of bricks fits the first size"
+        told = page.result(width=48, height=48)
+        assert len(told["lattice"]["vectors"]) == 2 and "faults" in told["layers"]
+        page.say(kind="view", layer="faults", left=0, top=0, width=48, height=48, step=1)
+        assert page.wait("frame", layer="faults")[0]["rows"] == 48
+    finally:
+        page.session.close(10)
+
+
+HOLE = [{"label": 1, "width": 7, "points": [[12, 10], [16, 12]]}]
+
+
+def test_a_filled_hole_is_looked_into(page_inside):
+    page_inside.result(job="fill", hole=HOLE, options={"order": 4})
+    image, hole = page_inside.latest.image, paint(HOLE, SAMPLE.shape) > 0
+    (pane,) = inside(page_inside)
+    level, sweep, sets, *_ = pane["sweeps"][-1]
+    page_inside.say(kind="view", layer="picture", left=0, top=0, width=28, height=24, step=1)
+    after = len(page_inside.got)
+    page_inside.ask("moments", kind="seek", level=level, sweep=sweep, sets=sets)
+    np.testing.assert_array_equal(
+        frame(page_inside, after, layer="picture")[1][..., :3], image, "the end is the result"
+    )
+    after = len(page_inside.got)
+    page_inside.ask("moments", kind="seek", level=pane["sweeps"][0][0], sweep=1, sets=0)
+    seen = frame(page_inside, after, layer="picture")[1][..., :3]
+    np.testing.assert_array_equal(seen[~hole], SAMPLE[~hole])
+    assert (seen[hole] != image[hole]).any(), "the hole has changed since"
+
+    row, col = np.argwhere(hole)[0].tolist()
+    page_inside.ask("moments", kind="seek")
+    found, _ = page_inside.ask("explained", kind="explain", row=row, col=col)
+    taken = next(one for one in found["candidates"] if one["taken"])
+    assert taken["place"] == page_inside.latest.source[row, col].tolist()
+    np.testing.assert_array_equal(taken["pixels"][0], SAMPLE[tuple(taken["place"])])
+    assert found["corner"] == [row, col]
+    around = [
+        ((row + down, col + across), pixel)
+        for (down, across), pixel in zip(found["offsets"], found["pixels"], strict=True)
+        if not hole[row + down, col + across]
+    ]
+    assert len(around) > 2
+    for place, pixel in around:
+        np.testing.assert_array_equal(pixel, SAMPLE[place])
+    assert "value is given" in page_inside.ask("explained", kind="explain", row=0, col=0)[0]["reason"]
+
+
+def test_the_sample_of_a_look_is_that_of_the_run(page_inside):
+    page_inside.result(width=20, height=18, part=[4, 2, 16, 12])
+    told, (small,) = page_inside.ask("inside", kind="inside", open=True)
+    assert (told["panes"][0]["width"], told["panes"][0]["height"]) == (16, 12)
+    part = np.frombuffer(small, np.uint8).reshape(*told["panes"][0]["preview"][::-1], 4)[..., :3]
+    np.testing.assert_array_equal(part, SAMPLE[2:14, 4:20])
+    after = len(page_inside.got)
+    page_inside.say(kind="view", layer="sample", left=0, top=0, width=28, height=24, step=1)
+    np.testing.assert_array_equal(frame(page_inside, after, layer="sample")[1][..., :3], part)
+
+
+def test_several_holes_are_not_looked_into():
+    page = Fake(Picture("t.png", texture(90, 100), -1))
+    try:
+        hole = [{"label": 1, "width": 5, "points": [[x, 12]]} for x in (10, 90)]
+        page.result(job="fill", hole=hole, options={"order": 2})
+        assert "fill one hole" in page.error(kind="inside", open=True)
+    finally:
+        page.session.close(10)
+
+
+# -- The controls of the live page are the declared options.
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
+    options, command = TABLES[name]
+    flags = {flag for one in cli.load(command).params if isinstance(one, click.Option) for flag in one.opts}
+    own = table(options)
+    found = json.loads(json.dumps(controls(name), allow_nan=False))  # as the page gets them
+    assert {one["name"] for one in found} <= {other for other, one in own.items() if command in one.shown}
+    for control in found:
+        one = own[control["name"]]
+        assert f"--{control['name'].replace('_', '-')}" in flags
+        assert control["hint"].startswith(one.help) and control["group"] == one.group and control["label"]
+        assert control["default"] == one.default_of(command)
+        if control["kind"] == "words":
+            assert [word for word, _ in control["valid"]] == list(one.kind.valid)
+        elif control["kind"] != "switch":
+            least, most, step = control["span"]
+            assert control["least"] == (one.kind.least if one.kind.least > -inf else None)
+            assert one.kind.least <= least < most <= one.kind.most and step > 0
+            if control["default"] is None:
+                assert control["empty"], "it says what an empty field means"
+            else:
+                assert least <= control["default"] <= most
+
+
+def test_the_controls_of_a_texture():
+    assert {one["name"] for one in controls("mrf")} >= {
+        "order",
+        "finish",
+        "boundary",
+        "categorical",
+        "levels",
+        "lattice",
+        "schedule",
+    }
+    assert not {"array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
+    assert controls("mrf")[0]["group"] == "Appearance"
+
+
+def test_jobs_have_their_own_defaults():
+    assert {one["name"]: one["default"] for one in controls("fill")}["balance"] == 0
+    assert "boundary" not in {one["name"] for one in controls("extend")}
+
+
+def test_an_empty_field_says_what_it_stands_for():
+    finish = {one["name"]: one for one in controls("mrf")}["finish"]
+    assert (finish["default"], finish["usual"], finish["empty"]) == (None, 1.5, "automatic: 1.5")
+    levels = {one["name"]: one for one in controls("mrf")}["levels"]
+    assert (levels["usual"], levels["empty"]) == (None, "automatic")

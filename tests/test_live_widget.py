@@ -1,6 +1,7 @@
-"""The live page in a notebook: the widget, the notebook among the examples, and results that show themselves."""
+"""Results in a notebook: the live page as a widget, and what shows itself."""
 
 import json
+import pickle
 import re
 import subprocess
 import sys
@@ -8,16 +9,30 @@ import time
 from base64 import b64decode
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import nbformat
 import numpy as np
 import pytest
+import xarray
+from click.testing import CliRunner
 from live import asked, texture
+from nbclient import NotebookClient
+from skimage import data
 
 import simdtex
-from simdtex.io.image import read_bytes
+from simdtex.cli import main
+from simdtex.io.grids import CartesianGrid
+from simdtex.io.hard_data import HardData
+from simdtex.io.image import Image, Metadata, read, read_bytes, write
 from simdtex.live import widget
 from simdtex.live.server import FILES
-from simdtex.model.display import source_colours
-from simdtex.run import Output
+from simdtex.machine.devices import DeviceInfo
+from simdtex.model.display import category_colours, source_colours
+from simdtex.report.ensemble import write_volumes
+from simdtex.report.sheet import GAP, STRIP
+from simdtex.run import Output, Progress, Stage
+
+# -- The live page in a notebook: the widget, the notebook among the examples, and results that show themselves.
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTE = """
@@ -138,3 +153,139 @@ def test_the_notebook_runs():
     outputs = json.loads(found.stdout.splitlines()[-1])
     assert any("data:image/png" in str(one.get("data", {}).get("text/html", "")) for one in outputs)
     assert any("application/vnd.jupyter.widget-view+json" in one.get("data", {}) for one in outputs)
+
+
+# -- Results show themselves: figures of pictures, realisations and estimates, and texts of one line.
+
+BRICK = data.brick()[:40, :60]
+HALVES = np.repeat(np.array([3, 7], np.uint8), 8)[:, None] * np.ones(20, np.uint8)
+OPTIONS = {"order": 2, "rng": 1, "device": "reference"}
+
+
+def drawn(figure, path):
+    figure.savefig(path)
+    return read(path).pixels[..., :3]
+
+
+def test_a_picture_is_drawn_pixel_by_pixel(tmp_path):
+    colour, solid = data.coffee()[:50, :30], np.stack([BRICK * 0, BRICK / 510, BRICK * 0])
+    solid[1, 3, 4] = np.nan
+    figure = simdtex.show(colour, titles=["coffee"], tiled=True)
+    assert figure.axes[0].get_title() == "coffee"
+    assert (drawn(figure, tmp_path / "a.png")[24:174, 24:114] == np.tile(colour, (3, 3, 1))).all()
+    shown = drawn(simdtex.show(np.moveaxis(colour, -1, 0), channel_axis=0), tmp_path / "a.png")
+    assert (shown[24:274, 24:174] == colour.repeat(5, 0).repeat(5, 1)).all()
+    stretched = np.rint((BRICK - BRICK.min()) / np.ptp(BRICK) * 255)
+    stretched[3, 4] = 255
+    figure = simdtex.show(solid, BRICK.astype(np.uint16) * 257, BRICK > 99)
+    shown = drawn(figure, tmp_path / "a.png")[24:184, :, 0]
+    assert (abs(shown[:, 24:264] - stretched.repeat(4, 0).repeat(4, 1)) <= 1).all()
+    assert (shown[:, 552:792] == np.where(BRICK > 99, 255, 0).repeat(4, 0).repeat(4, 1)).all()
+
+
+@pytest.mark.parametrize(
+    ("pictures", "titles", "words"),
+    [([], [], "0 pictures"), ([BRICK], "ab", "2 titles"), ([BRICK[0]], [], "shape"), ([BRICK * 1j], [], "real")],
+)
+def test_what_cannot_be_shown_is_refused(pictures, titles, words):
+    with pytest.raises((ValueError, TypeError), match=words):
+        simdtex.show(*pictures, titles=titles)
+
+
+def test_a_script_keeps_no_figure_and_is_not_warned():
+    code = (
+        "import simdtex, numpy\nfor _ in range(25): simdtex.show(numpy.eye(9)).canvas.draw()\nimport matplotlib.pyplot"
+    )
+    told = f"{code}\nprint(matplotlib.pyplot.get_backend(), matplotlib.pyplot.get_fignums())"
+    result = subprocess.run([sys.executable, "-W", "error", "-c", told], capture_output=True, text=True)
+    assert (result.stdout.lower(), result.stderr) == ("agg []\n", "")
+
+
+def test_a_notebook_draws_each_figure_once_and_in_order():
+    cells = ["simdtex.show(a)", "simdtex.show(a);\n1", "simdtex.show(a)\nsimdtex.show(a, a)"]
+    book = nbformat.v4.new_notebook()
+    book.cells = [nbformat.v4.new_code_cell(f"import simdtex, numpy\na = numpy.eye(9)\n{text}") for text in cells]
+    NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    found = [[one["data"]["image/png"] for one in cell.outputs if "image/png" in one["data"]] for cell in book.cells]
+    assert [len(one) for one in found] == [1, 1, 2]
+    assert len(found[2][0]) < len(found[2][1]), "the figure of two pictures is the second"
+
+
+def test_realisations_are_arrays_of_xarray_that_draw_themselves(tmp_path):
+    training = xarray.DataArray(HALVES / 10, dims=("y", "x"), name="porosity", attrs={"units": "%"})
+    made = simdtex.simulate(training, 10, shape=(6, 8), **OPTIONS)
+    figure = made.plot()
+    assert [axes.get_title() for axes in figure.axes] == [*(f"realisation {k}" for k in range(8)), ""]
+    assert figure.axes[-1].get_ylabel() == "porosity, %" and len(made.plot(number=2).axes) == 3
+    same = [made.copy(), pickle.loads(pickle.dumps(made)), made + 0, made.sel(realisation=slice(9)), made.load()]
+    assert all(type(one) is type(made) and np.array_equal(one, made) for one in same)
+    assert made[3].plot().axes[0].get_title() == "realisation 3" and isinstance(made, xarray.DataArray)
+    assert len(made.plot.hist()[0]) == 10 and made[0].plot(x="x").axes.get_xlabel() == "x"  # of xarray
+    made.to_netcdf(tmp_path / "made.nc")
+    with xarray.open_dataarray(tmp_path / "made.nc") as back:
+        assert len(simdtex.show(back).axes) == 9
+    volume = simdtex.simulate(np.stack([HALVES] * 8), 1, shape=(4, 5, 6), categorical=True, source=True, **OPTIONS)
+    assert volume.plot().axes[0].get_title() == "realisation 0, z = 2"
+    with pytest.raises(ValueError, match="no realisations and no estimate"):
+        simdtex.show(xarray.Dataset())
+    plt.close("all")  # those of xarray
+
+
+def test_an_estimate_has_a_map_of_each_category_and_of_the_entropy():
+    known = np.where(np.indices(HALVES.shape)[0] == 2, HALVES, np.nan)
+    made = simdtex.estimate(HALVES, known=known, categorical=True, device="reference")
+    share = 100 * made.probability.sel(category=7).values.mean()
+    titles = [axes.get_title() for axes in made.plot().axes]
+    assert titles[1:3] == [f"category 7, share {share:.0f} %", "entropy, bits"]
+    training = xarray.DataArray(HALVES, dims=("y", "x"), attrs={"units": "m"})
+    made = simdtex.estimate(training, known=known, device="reference")
+    assert [axes.get_title() for axes in simdtex.show(made).axes[:2]] == ["mean, m", "variance, (m)²"]
+
+
+@pytest.mark.parametrize("ground", [False, True])
+def test_maps_have_north_up_in_plots_and_reports_and_pictures_their_first_row(tmp_path, monkeypatch, ground):
+    monkeypatch.chdir(tmp_path)
+    write("t.png", HALVES)
+    known = np.where(np.isin(np.indices(HALVES.shape)[0], [0, 15]), HALVES, np.nan)
+    np.save("known.npy", known)
+    words = ["simulate", "t.png", "-o", "o.npz", "--known", "known.npy", "--report", "page", "--categorical"]
+    result = CliRunner().invoke(main, [*words, "--order", "2", *["--origin", "5,5", "--cell", "10,10"] * ground])
+    assert result.exit_code == 0, result.output
+    first, last = category_colours(2)[::-1] if ground else category_colours(2)
+    sheet = read("page/realisations.png").pixels[GAP + STRIP :, GAP : GAP + 20]
+    inside = sheet[: int(np.flatnonzero((sheet == 255).all((1, 2)))[0])]
+    assert (inside[0] == first).all() and (inside[-1] == last).all()
+    column = read("page/maps.png").pixels[:, 150].tolist()  # of viridis: yellow where all realisations have 7
+    assert (column.index([253, 231, 36]) < column.index([68, 1, 84])) == ground
+    cube = np.indices((4, 5, 6))[1]
+    write_volumes("cube", cube, cube[None], False, upward=ground)
+    assert (read("cube/slices.png").pixels[GAP + STRIP, GAP] == (255 if ground else 0)).all()
+    options = {"origin": (5, 5), "cell": (10, 10)} if ground else {}
+    figure = simdtex.simulate(HALVES, 1, known=known, categorical=True, **OPTIONS, **options).plot()
+    assert figure.axes[-1].get_yticklabels()[0].get_text().startswith("3: ")
+    shown = drawn(figure, "a.png")
+    for row, value in ((0, 0), (15, 1)):
+        across, up = figure.axes[0].transData.transform((105, 10 * row + 5) if ground else (10, row))
+        assert (shown[len(shown) - 1 - int(up), int(across)] == category_colours(2)[value]).all()
+        assert (up > len(shown) / 2) == ((row == 15) == ground)
+
+
+TEXTS = {
+    "<NumPy reference>": lambda: simdtex.open_machine("reference"),
+    "<0: cpu-x (PoCL), cpu, no>": lambda: DeviceInfo(0, "PoCL", "cpu-x", "cpu", reason="no"),
+    "Stage(level=0, image=uint8 40x60)": lambda: Stage(0, BRICK),
+    "Progress(level=0, levels=1, fraction=0.5)": lambda: Progress(level=0, levels=1, fraction=0.5, image=print),
+    "CartesianGrid(values={'a': 'uint8": lambda: CartesianGrid({"a": BRICK[None]}, (0, 0, 0), (1, 1, 1)),
+    "HardData(points=float64 99x2": lambda: HardData(np.zeros((99, 2)), np.zeros((99, 1)), ("v",), tuple(range(99))),
+    "Image(pixels=uint8 40x60": lambda: Image(BRICK, None, Metadata(exif=b"0" * 999)),
+    "Neighbours(offsets=": lambda: simdtex.explain(BRICK, (9, 9), (1, 2), **OPTIONS).neighbours,
+    "<Replay of ": lambda: simdtex.replay(BRICK, (9, 9), **OPTIONS),
+    "Checkpoint('": lambda: simdtex.Checkpoint("here"),
+    "TextureClassifier(rng=3, unknown=0.1)": lambda: simdtex.TextureClassifier(rng=3, unknown=0.1),
+}
+
+
+@pytest.mark.parametrize("words", TEXTS)
+def test_a_result_is_a_short_text(words):
+    text = repr(TEXTS[words]())
+    assert text.startswith(words) and len(text) < 200 and "\n" not in text and " at 0x" not in text

@@ -1,7 +1,7 @@
-# SPDX-License-Identifier: BSD-3-Clause
-"""Machines: memory, caches, threads, forked processes and arguments of `open_machine`."""
+"""Machines: memory and its checks, caches, threads, forked processes, the pace of launches, and profiles."""
 
 import dataclasses
+import importlib.util
 import os
 import shutil
 import signal
@@ -9,19 +9,361 @@ import subprocess
 import sys
 import uuid
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import psutil
 import pytest
+from cases import ising, opencl, texture
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.machine import devices, memory, opencl
+import simdtex.run
+from simdtex.cli import main
+from simdtex.io.image import write
+from simdtex.machine import devices, memory
+from simdtex.machine import opencl as opencl_machine
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
+from simdtex.machine.reference import PENDING, Log, Reference
 from simdtex.model.sample import BLOCK
+from simdtex.report.tables import profile_summary, profile_table, seconds_text
+from simdtex.run import Iterating, Progress, Relaxing, Sampling, paced
+
+# -- The memory that is available, the checks before a run, and that a run takes no more than checked.
+
+ROOT = Path(__file__).resolve().parent.parent
+SAMPLE = np.random.default_rng(1).integers(0, 256, (16, 16), dtype=np.uint8)
+MEBIBYTE = 2**20
+
+
+@pytest.fixture
+def limits(monkeypatch, tmp_path):
+    """Set the free memory, the memory of this process and the texts of the limits of its control group, in files."""
+    files = (tmp_path / "memory.max", tmp_path / "memory.limit_in_bytes")
+    monkeypatch.setattr(memory, "LIMITS", files)
+
+    def set_to(free, used, *texts):
+        monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=free))
+        process = SimpleNamespace(memory_info=lambda: SimpleNamespace(rss=used, vms=used))
+        monkeypatch.setattr(psutil, "Process", lambda: process)
+        for path, text in zip(files, texts, strict=False):
+            if text is not None:
+                path.write_text(text)
+
+    return set_to
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        ((), 5000),
+        (("max\n",), 5000),
+        (("4000\n",), 3000),
+        ((None, "4500\n"), 3500),
+        ((None, "9223372036854771712\n"), 5000),
+        (("900\n",), 0),
+    ],
+)
+def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_group(limits, texts, expected):
+    limits(5000, 1000, *texts)
+    assert memory.available() == expected
+
+
+def test_the_available_memory_of_this_computer():
+    assert 2**20 < memory.available() <= psutil.virtual_memory().total
+
+
+class Gpu(Reference):
+    """A machine with its own memory."""
+
+    kind = "gpu"
+
+
+class Cpu(Reference):
+    """A device that shares the host's memory."""
+
+    kind = "cpu"
+
+
+@pytest.mark.parametrize(
+    ("machine", "wanted"), [(Reference(), 30 + memory.TEMPORARY), (Cpu(), 30 + memory.TEMPORARY), (Gpu(), 10)]
+)
+def test_arrays_of_a_cpu_count_for_the_host(machine, wanted, monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: wanted)
+    memory.require(machine, 20, 10)
+    monkeypatch.setattr(memory, "available", lambda: wanted - 1)
+    with pytest.raises(
+        simdtex.DeviceError, match=r"of this computer's memory and \d+ MiB is available; give a smaller"
+    ):
+        memory.require(machine, 20, 10)
+
+
+def test_the_limits_are_exact_and_named(monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 3 * MEBIBYTE)
+    memory.require_host(3 * MEBIBYTE)
+    with pytest.raises(simdtex.DeviceError) as caught:
+        memory.require_host(3 * MEBIBYTE + 1, "do less")
+    assert str(caught.value) == "this needs about 3 MiB of this computer's memory and 3 MiB is available; do less"
+    machine = Gpu()
+    machine.memory = 2 * MEBIBYTE
+    memory.require(machine, 2 * MEBIBYTE)
+    with pytest.raises(simdtex.DeviceError) as caught:
+        memory.require(machine, 2 * MEBIBYTE + 1)
+    sentence = "this needs about 2 MiB and reference (NumPy) has 2; give a smaller size or another --device"
+    assert str(caught.value) == sentence
+
+
+JOBS = {
+    "mrf": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), device="reference", rng=1),
+    "multires": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="multires", device="reference", rng=1),
+    "pyramid": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="pyramid", device="reference", rng=1),
+    "solid": lambda: simdtex.synthesize_solid(SAMPLE, (400, 400, 400), device="reference", rng=1),
+    "mix": lambda: simdtex.mix([SAMPLE, SAMPLE], (9000, 9000), device="reference", rng=1),
+    "extend": lambda: simdtex.extend(SAMPLE, right=9000, bottom=9000, order=1, device="reference", rng=1),
+    "simulate": lambda: simdtex.simulate(SAMPLE, 10**6, shape=(99, 99), device="reference", rng=1),
+    "classify": lambda: simdtex.classify(np.zeros((6000, 6000), np.uint8), {"a": SAMPLE}, device="reference", rng=1),
+    "ising": lambda: ising(Reference(), (64, 64), [2.0], "coloring", sweeps=2**27),
+}
+
+
+ASKED = {
+    "mrf": 9952,
+    "multires": 5485,
+    "pyramid": 15745,
+    "solid": 14712,
+    "mix": 15745,
+    "extend": 7907,
+    "simulate": 18755,
+    "classify": 5023,
+    "ising": 81986,
+}
+"""MiB that are asked for, by the bytes for each pixel that benchmarks/memory.py measures."""
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_a_run_that_does_not_fit_is_refused_before_it_begins(job, monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 2**30)
+    with pytest.raises(simdtex.DeviceError, match=rf"needs about {ASKED[job]} MiB .* and 1024 MiB is available"):
+        JOBS[job]()
+
+
+def test_tiles_are_offered_where_there_are_tiles(monkeypatch):
+    hole = np.zeros(SAMPLE.shape, bool)
+    hole[7, 7] = True
+    monkeypatch.setattr(memory, "available", lambda: memory.TEMPORARY)
+    for job, tiles in (
+        (lambda: simdtex.synthesize(SAMPLE, (9, 9), order=1, device="reference", rng=1), True),
+        (lambda: simdtex.fill(SAMPLE, hole, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.extend(SAMPLE, right=9, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.simulate(SAMPLE, 1, order=1, device="reference", rng=1), False),
+    ):
+        with pytest.raises(simdtex.DeviceError, match="is available; give a smaller size") as said:
+            job()
+        assert ("--tiles" in str(said.value)) == tiles
+
+
+@pytest.mark.parametrize("shape, values", [((20000, 20000), 8), ((40000, 40000), 4)])
+def test_a_limit_of_counting_says_what_is_counted(shape, values):
+    method = "pyramid" if values == 8 else "multires"
+    with pytest.raises(ValueError, match=f"columns is beyond 2..31 values, {values} for each pixel; give"):
+        simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
+
+
+def benchmark():
+    spec = importlib.util.spec_from_file_location("memory_benchmark", ROOT / "benchmarks" / "memory.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels, dtype", [(1, "uint8"), (3, "float64")])
+@pytest.mark.parametrize("name", benchmark().CASES)
+def test_no_run_takes_more_than_was_asked_for(name, channels, dtype, any_device):
+    kind, options = benchmark().CASES[name]
+    small, side = (24, 80) if kind == "solid" else (128, 1024)
+    grown, asked = benchmark().measured(kind, small, side, channels, dtype, str(any_device.index), options)
+    assert 0.3 * (asked - memory.TEMPORARY) < grown <= asked, "and not far less, but for what is asked for at any size"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["multires", "pyramid"])
+def test_no_run_of_the_reference_takes_more_than_was_asked_for(name):
+    kind, options = benchmark().CASES[name]
+    grown, asked = benchmark().measured(kind, 64, 256, 3, "uint8", "reference", options)
+    assert 0 < grown <= asked
+
+
+# -- Progress, and the pace of launches.
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that stands still until it is moved on."""
+    now = [0.0]
+    monkeypatch.setattr(simdtex.run.time, "perf_counter", lambda: now[0])
+    return now
+
+
+@given(count=st.integers(0, 500), least=st.integers(1, 60))
+def test_ranges_make_up_the_whole(count, least):
+    ranges = list(paced(count, least))
+    assert [first for first, _ in ranges] == [0, *(end for _, end in ranges)][: len(ranges)]
+    assert (ranges[-1][1] if ranges else 0) == count
+    assert all(end - first >= least for first, end in ranges[:-1])
+
+
+def test_ranges_grow_to_a_tenth_of_a_second_and_shrink_again(clock):
+    sizes = []
+    for first, end in paced(100_000, 10):
+        sizes.append(end - first)
+        clock[0] += (end - first) * (1e-4 if first < 10_000 else 1e-3)
+    assert sizes[:6] == [10, 40, 160, 640, 1000, 1000], "at most four times the last"
+    assert sizes[-2] == 100
+
+
+def test_a_first_range_that_takes_long_is_not_undercut(clock):
+    sizes = []
+    for first, end in paced(60, 20):
+        sizes.append(end - first)
+        clock[0] += 10
+    assert sizes == [20, 20, 20]
+
+
+def test_what_progress_says_of_itself():
+    where = {"level": 2, "levels": 4, "fraction": 0.25, "image": lambda: np.zeros((3, 3))}
+    plain = Progress(**where)
+    assert (plain.doing, plain.stage, plain.maps()) == ("level 2", None, {})
+
+    left = {"temperature_left": 0.125, "temperature": lambda: np.ones((3, 3)), "source": lambda: np.zeros((3, 3, 2))}
+    left["explain"] = lambda row, col: None
+    relaxing = [Relaxing(sweep=7, step=9, phase="relax", end_of_sweep=end, **left, **where) for end in (False, True)]
+    assert relaxing[0].doing == "level 2, sweep 7, temperature 0.125"
+    assert [one.stage for one in relaxing] == [None, "level2-sweep07"]
+    assert list(relaxing[0].maps()) == ["temperature"]
+
+    sampling = [
+        Sampling(end_of_level=end, candidates=lambda: np.array([[1, 10, 100]]), **where) for end in (False, True)
+    ]
+    assert [one.stage for one in sampling] == [None, "level2"]
+    np.testing.assert_array_equal(sampling[0].maps()["candidates"], [[0, 0.5, 1]])
+    alone = Sampling(end_of_level=True, candidates=lambda: np.ones((2, 2), np.int32), **where)
+    assert not alone.maps()["candidates"].any()
+
+    iterating = [Iterating(iteration=3, iterations=5, end_of_iteration=end, **where) for end in (False, True)]
+    assert iterating[0].doing == "iteration 3 of 5"
+    assert [one.stage for one in iterating] == [None, "iteration03"]
+    assert iterating[1].maps() == {}
+
+
+# -- Profiles: the times of kernels, and their table.
+
+
+class Event:
+    """A kernel that ran from one nanosecond to another."""
+
+    def __init__(self, start, end):
+        self.profile = SimpleNamespace(start=start, end=end)
+        self.waited = False
+
+    def wait(self):
+        self.waited = True
+
+
+def kernel(name):
+    return SimpleNamespace(function_name=name)
+
+
+def test_a_log_reports_kernels_and_shares():
+    log = Log(True)
+    log.add(Event(100, 200), kernel("fast"))
+    log.add(Event(250, 550), kernel("slow"))
+    log.add(Event(550, 650), kernel("fast"))
+    log.settle()
+    slow, fast = log.take()["kernels"]
+    assert slow == {"name": "slow", "calls": 1, "seconds": pytest.approx(300e-9), "share": 0.6}
+    assert fast == {"name": "fast", "calls": 2, "seconds": pytest.approx(200e-9), "share": 0.4}
+    assert log.take() == {"kernels": []}, "begun anew"
+    assert log.seconds == pytest.approx(500e-9)
+
+
+def test_without_profiling_nothing_is_kept():
+    log = Log(False)
+    log.add(Event(0, 1), kernel("a"))
+    assert (log.launches, log.seconds, log.take(), log._pending) == (1, None, None, [])
+
+
+def test_events_do_not_pile_up():
+    log = Log(True)
+    events = [Event(2 * i, 2 * i + 1) for i in range(3 * PENDING)]
+    for event in events:
+        log.add(event, kernel("a"))
+        assert len(log._pending) < PENDING
+    assert any(event.waited for event in events)
+    log.settle()
+    assert log.take()["kernels"][0]["calls"] == len(events)
+
+
+def test_the_kernels_of_a_run_take_its_seconds_on_the_device(any_device):
+    machine = OpenCL(any_device, profile=True)
+    run = simdtex.synthesize(texture((12, 12)), (10, 10), rng=1, order=2, device=machine, full_output=True)[1]
+    total = sum(entry["seconds"] for entry in run.statistics["kernels"])
+    assert total == pytest.approx(run.statistics["device_seconds"])
+
+
+def test_statistics_have_kernels_only_where_they_are_measured(any_device):
+    sample = texture((16, 16))
+    for machine in (opencl(any_device), Reference()):
+        run = simdtex.synthesize(sample, (8, 8), order=1, rng=1, device=machine, full_output=True)[1]
+        assert "kernels" not in run.statistics
+        assert machine.profile() is None
+
+
+def test_the_table_and_the_sentence():
+    entry = {"name": "a", "calls": 1000, "seconds": 0.5, "share": 0.25}
+    table = profile_table({"device": "d", "kernels": [entry]})
+    assert list(table.rows[0].values()) == ["a", "1,000", "500 us", "500 ms", "25.0%"] and all(table.numeric[1:])
+    text = profile_summary({"seconds": 2.0, "device_seconds": 1.0})
+    assert text == "wall time 2 s: kernels 1 s (50.0%)"
+    assert [seconds_text(s) for s in (1.234, 0.01234, 1.234e-6, 123.4)] == ["1.23 s", "12.3 ms", "1.23 us", "123 s"]
+
+
+@pytest.mark.parametrize(
+    ("command", "kernels"),
+    [
+        (("synth", "--order", "1"), "start"),
+        (("synth", "--method", "multires"), "candidates"),
+        (("solid", "--iterations", "1"), "solid_turn"),
+        (("mix", "--iterations", "1"), "sort_scatter"),
+    ],
+)
+def test_profile_prints_a_table(any_device, tmp_path, command, kernels):
+    sample, out = tmp_path / "in.png", tmp_path / ("out.npy" if command[0] == "solid" else "out.png")
+    write(sample, texture((16, 16)))
+    device = ("--device", str(any_device.index), "-q")
+    done = CliRunner().invoke(main, [*command, str(sample), "-o", str(out), "--size", "12", *device, "--profile"])
+    assert done.exit_code == 0, done.output
+    assert kernels in done.output
+    assert "wall time" in done.output
+
+
+def test_the_reference_has_no_profile(tmp_path):
+    sample = tmp_path / "in.png"
+    write(sample, texture((16, 16)))
+    words = ["synth", str(sample), "-o", str(tmp_path / "out.png"), "--device", "reference", "--profile"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 2
+    assert done.output.count("\n") == 1
+    assert "--profile times the kernels of an OpenCL device" in done.output
+    assert not (tmp_path / "out.png").exists()
+
+
+# -- Machines: memory, caches, threads, forked processes and arguments of `open_machine`.
 
 
 @given(st.integers(1, 200_000), st.integers(1, 300), st.integers(1, 4))
@@ -57,7 +399,10 @@ print(simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=sys
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize("environment", [{"HOME": "FILE", "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}])
+@pytest.mark.parametrize(
+    "environment",
+    [pytest.param({"HOME": "FILE", "XDG_CACHE_HOME": ""}, marks=pytest.mark.slow), {"XDG_CACHE_HOME": "/proc/nowhere"}],
+)
 def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environment):
     (tmp_path / "FILE").touch()
     environment = {key: value.replace("FILE", str(tmp_path / "FILE")) for key, value in environment.items()}
@@ -75,7 +420,9 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize("damaged", ["*.so", "*.bc", "binary", "info", "*.sqlite"])
+@pytest.mark.parametrize(
+    "damaged", ["info", *(pytest.param(one, marks=pytest.mark.slow) for one in ("*.so", "*.bc", "binary", "*.sqlite"))]
+)
 def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
     """The first process may crash; the next one warns of the folder, and has the device."""
 
@@ -109,8 +456,8 @@ def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
 
 def test_kernels_are_compiled_from_a_folder_of_any_name(cl_device, monkeypatch, tmp_path):
     folder = tmp_path / "a space" / "\u00fc"
-    shutil.copytree(opencl.kernel_folder(), folder)
-    monkeypatch.setattr(opencl, "kernel_folder", lambda: folder)
+    shutil.copytree(opencl_machine.kernel_folder(), folder)
+    monkeypatch.setattr(opencl_machine, "kernel_folder", lambda: folder)
     assert OpenCL(cl_device).kernel("start").function_name == "start"
 
 
@@ -134,8 +481,6 @@ except ValueError as error:
 
 
 # Threads and forks, in processes of their own: a race may crash, and a forked process may hang
-
-
 def python(code, *words, **environment):
     """Return the words that a process prints within 100 seconds."""
     result = subprocess.run(
@@ -170,7 +515,7 @@ print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), 
 """
 
 
-@pytest.mark.parametrize("profile", [False, True])
+@pytest.mark.parametrize("profile", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, profile):
     assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
 

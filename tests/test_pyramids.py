@@ -1,20 +1,337 @@
-"""Pyramids of pictures in their own unit, and the transform that methods use."""
+"""Pyramids in integers: noise, folding, the steerable pyramid, and the transform that methods use."""
+
+import re
 
 import numpy as np
 import plain_pyramid as plain
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
-from hypothesis import given, settings
+from cases import REFERENCE, assert_same_bits, opencl, texture
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyrtools.pyramids import SteerablePyramidSpace
-from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION
+from pyrtools.pyramids.filters import parse_filter
+from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION, UNIT32
 
 from benchmarks.subbands import decompose
+from simdtex import random
+from simdtex.machine.opencl import kernel_folder
 from simdtex.methods.pyramid.pyramids import Transform, most_levels
+from simdtex.ops.pyramids import fold, noise, unfold
+from simdtex.ops.steerable import ORIENTATIONS, UNIT, filters, steerable_join, steerable_split
+
+# -- White noise: uniform 32-bit words, a function of seed, level, plane and site alone.
+
+seeds = st.integers(0, 2**64 - 1)
+levels = st.integers(0, 30)
+
+
+def run(machine, *args):
+    return np.asarray(machine.get(noise(machine, *args)))
+
+
+@given(st.integers(1, 9), st.sampled_from([1, 2, 13]), seeds, levels)
+def test_the_reference_is_a_word_of_each_sites_draw(planes, n, seed, level):
+    values = run(REFERENCE, planes, n, seed, level)
+    assert (values.dtype, values.shape) == (np.int32, (planes, n))
+    for p, s in np.ndindex(planes, n):
+        word = int(random.draw4(seed, level, p // 4, s, 5, 0)[p % 4])
+        assert values[p, s] == (word if word < 2**31 else word - 2**32)
+
+
+@given(planes=st.integers(1, 9), n=st.sampled_from([1, 13, 100]), seed=seeds, level=levels)
+@settings(max_examples=40)
+def test_a_device_has_the_references_bits(machine, planes, n, seed, level):
+    args = planes, n, seed, level
+    assert_same_bits(run(machine, *args), run(REFERENCE, *args))
+
+
+def test_a_plane_is_the_same_whatever_is_beside_it():
+    whole = run(REFERENCE, 9, 50, 3, 1)
+    for planes, n in ((1, 50), (4, 50), (5, 7), (9, 1)):
+        assert_same_bits(run(REFERENCE, planes, n, 3, 1), whole[:planes, :n].copy())
+
+
+def test_noise_has_a_purpose_of_its_own_that_the_kernels_know():
+    header = (kernel_folder() / "common" / "philox.h").read_text()
+    purposes = re.findall(r"#define PURPOSE_(\w+) (\d+)u\n", header)
+    assert ("NOISE", str(random.NOISE)) in purposes
+    assert len({number for _, number in purposes}) == len(purposes)
+
+
+# -- Every second pixel of a torus of any size, and back.
+
+SHAPES = [(1, 1), (1, 2), (2, 1), (3, 3), (4, 6), (5, 4), (4, 5), (7, 9), (8, 1)]
+
+
+def picture(shape, planes=2):
+    return np.random.default_rng(3).integers(-(2**20), 2**20, (planes, *shape)).astype(np.int32)
+
+
+def folded(machine, x):
+    return np.asarray(machine.get(fold(machine, machine.put(x))))
+
+
+def unfolded(machine, x, shape):
+    return np.asarray(machine.get(unfold(machine, machine.put(x), shape)))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_second_pixel_around_the_torus(shape):
+    x = picture(shape)
+    rows, cols = (n if n % 2 else n // 2 for n in shape)
+    expected = [[[x[p, 2 * i % shape[0], 2 * j % shape[1]] for j in range(cols)] for i in range(rows)] for p in (0, 1)]
+    assert_same_bits(folded(REFERENCE, x), np.array(expected, np.int32))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_back_is_the_transpose(shape):
+    """<fold x, y> = <x, unfold y>, and folding what was unfolded gives it back."""
+    x = picture(shape)
+    y = folded(REFERENCE, x)
+    back = unfolded(REFERENCE, y, shape)
+    assert_same_bits(folded(REFERENCE, back), y)
+    other = picture(y.shape[1:])
+    left = (y.astype(np.int64) * other).sum()
+    assert left == (x.astype(np.int64) * unfolded(REFERENCE, other, shape)).sum()
+
+
+@pytest.mark.parametrize("shape", [(n, m) for n, m in SHAPES if n % 2 and m % 2])
+def test_an_odd_torus_loses_no_pixel(shape):
+    x = picture(shape)
+    assert_same_bits(unfolded(REFERENCE, folded(REFERENCE, x), shape), x)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_device_has_the_references_bits_of_fold(machine, shape):
+    x = picture(shape)
+    y = folded(REFERENCE, x)
+    assert_same_bits(folded(machine, x), y)
+    assert_same_bits(unfolded(machine, y, shape), unfolded(REFERENCE, y, shape))
+
+
+# -- The steerable pyramid in integers: its filters, its two operations, and pyramids made with them.
+
+TOP = 2**20
+BANKS = pytest.mark.parametrize("orientations", ORIENTATIONS)
+BORDERS = pytest.mark.parametrize("torus", [True, False], ids=["torus", "mirror"])
+
+
+def noise_steerable(shape, seed=0, top=TOP):
+    return np.random.default_rng(seed).integers(-top, top, shape, np.int32, endpoint=True)
+
+
+def any_taps(count, side, seed):
+    """Filters of any taps at all, so that nothing may be turned or swapped unseen."""
+    taps = np.random.default_rng(seed).normal(0, 1 / side, (count, side, side))
+    return (np.rint(taps * UNIT) / UNIT).astype(np.float32)
+
+
+def split(machine, picture, taps, torus, step=1):
+    arrays = machine.put(np.ascontiguousarray(picture)), machine.put(taps)
+    return np.asarray(machine.get(steerable_split(machine, *arrays, torus, step)))
+
+
+def join(machine, terms, shape, torus):
+    terms = [(machine.put(np.ascontiguousarray(bands)), machine.put(taps), step) for bands, taps, step in terms]
+    return np.asarray(machine.get(steerable_join(machine, terms, shape, torus)))
+
+
+def half(shape):
+    return tuple(-(-n // 2) for n in shape)
+
+
+def build(machine, picture, orientations, levels, torus):
+    """High-pass residue, bands of every level, finest first, and low-pass residue: (bands, planes, rows, cols) each."""
+    bank = filters(orientations)
+    subbands = [split(machine, picture, bank.high[None], torus)]
+    low = split(machine, picture, bank.low[None], torus)
+    for _ in range(levels):
+        subbands.append(split(machine, low[0], bank.bands, torus))
+        low = split(machine, low[0], bank.down[None], torus, 2)
+    return [*subbands, low]
+
+
+def collapse(machine, subbands, orientations, torus):
+    bank = filters(orientations)
+    high, *levels, low = subbands
+    for bands in reversed(levels):
+        terms = [(bands, bank.bands, 1), (low, 4 * bank.down[None], 2)]
+        low = join(machine, terms, bands.shape[2:], torus)[None]
+    return join(machine, [(high, bank.high[None], 1), (low, bank.low[None], 1)], high.shape[2:], torus)
+
+
+def float32_error(terms):
+    """How far a sum of products in float32 may be from the exact one, given each product's largest taps and values."""
+    count = sum(taps.size for _, taps, _ in terms)
+    total = sum(abs(taps).sum(dtype=float) * max(1, abs(values).max()) for values, taps, _ in terms)
+    return HALF + (count + 1) * UNIT32 * total
+
+
+@BANKS
+def test_the_filters_are_those_of_pyrtools(orientations):
+    theirs = parse_filter(f"sp{orientations - 1}_filters", normalize=False)
+    ours = filters(orientations)
+    side = ours.bands.shape[1]
+    bands = theirs["bfilts"].T.reshape(orientations, side, side).swapaxes(1, 2)
+    for found, known in [
+        *((ours.high, theirs["hi0filt"]), (ours.low, theirs["lo0filt"])),
+        *((ours.down, theirs["lofilt"] / 2), (ours.bands, bands)),
+    ]:
+        assert found.dtype == np.float32
+        assert (found == np.rint(known * UNIT) / UNIT).all()
+        assert found.shape == known.shape
+        assert not found.flags.writeable
+
+
+@pytest.mark.parametrize("orientations", [0, 3, 5, 8, -1])
+def test_other_orientations_are_refused(orientations):
+    with pytest.raises(ValueError, match=rf"orientations is {orientations}; give one of 1, 2, 4, 6"):
+        filters(orientations)
+
+
+@pytest.mark.parametrize("orientations", [2, 4, 6])
+def test_an_orientation_answers_to_waves_along_its_angle(orientations):
+    bands = filters(orientations).bands
+    row, col = np.indices(bands.shape[1:]) - bands.shape[1] // 2
+    degrees = np.arange(180)
+    angle = np.deg2rad(degrees)[:, None, None]
+    wave = np.exp(1.4j * (np.cos(angle) * col - np.sin(angle) * row))  # counter-clockwise: towards lower rows
+    answer = abs(np.einsum("aij,fij->fa", wave, bands))
+    assert (answer.argmax(1) == degrees[:: 180 // orientations]).all()
+
+
+@st.composite
+def splits(draw, counts=(1, 2, 4, 6)):
+    shape = draw(st.integers(1, 3)), draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    seed = draw(st.integers(0, 2**16))
+    taps = any_taps(draw(st.sampled_from(counts)), draw(st.sampled_from([3, 5, 9])), seed)
+    return noise_steerable(shape, seed), taps, draw(st.booleans()), draw(st.sampled_from([1, 2]))
+
+
+@st.composite
+def joins(draw):
+    planes, shape = draw(st.integers(1, 3)), (draw(st.integers(1, 9)), draw(st.integers(1, 9)))
+    seed, terms = draw(st.integers(0, 2**16)), []
+    for n in range(draw(st.integers(1, 3))):
+        count, side, step = (draw(st.sampled_from(some)) for some in ([1, 2, 4], [3, 5, 9], [1, 2]))
+        size = half(shape) if step == 2 else shape
+        terms.append((noise_steerable((count, planes, *size), seed + n), any_taps(count, side, seed + n), step))
+    return terms, shape, draw(st.booleans())
+
+
+@given(splits())
+@settings(max_examples=60)
+def test_the_reference_correlates_by_the_rule(case):
+    picture, taps, torus, step = case
+    found = split(REFERENCE, *case)
+    assert found.dtype == np.int32
+    assert found.shape == (len(taps), *picture[:, ::step, ::step].shape)
+    for f, bands in zip(taps, found, strict=True):
+        bound = float32_error([(picture, f, step)])
+        for g, band in zip(picture, bands, strict=True):
+            assert abs(band - plain.split(g, f, torus, step)).max() <= bound
+
+
+@given(joins())
+@settings(max_examples=60)
+def test_the_reference_joins_by_the_rule(case):
+    terms, shape, torus = case
+    found = join(REFERENCE, *case)
+    assert found.dtype == np.int32
+    assert found.shape == (terms[0][0].shape[1], *shape)
+    bound = float32_error(terms)
+    for plane, picture in enumerate(found):
+        single = [(b[plane], f, step) for bands, taps, step in terms for b, f in zip(bands, taps, strict=True)]
+        assert abs(picture - plain.join(single, shape, torus)).max() <= bound
+
+
+@given(st.integers(1, 8), st.integers(1, 8), st.sampled_from([1, 2]), st.integers(0, 2**16))
+def test_on_a_torus_a_join_is_the_transpose_of_a_split(rows, cols, step, seed):
+    """<split(x), y> is <x, join(y)>: sums of products of rounded numbers, in float64."""
+    taps, x = any_taps(2, 5, seed), noise_steerable((1, rows, cols), seed)
+    bands = split(REFERENCE, x, taps, True, step)
+    y = noise_steerable(bands.shape, seed + 1)
+    joined = join(REFERENCE, [(y, taps, step)], (rows, cols), True)
+    there, back = np.vdot(bands.astype(float), y), np.vdot(x.astype(float), joined)
+    bound = abs(y).sum(dtype=float) * float32_error([(x, taps, 1)]) + abs(x).sum(dtype=float) * float32_error(
+        [(y, taps, 1)]
+    )
+    assert abs(there - back) <= bound
+
+
+@given(case=splits(counts=(4,)))  # the other banks follow below; each is compiled anew
+@example(case=(noise_steerable((1, 1, 1)), any_taps(4, 9, 0), False, 2))
+@example(case=(noise_steerable((2, 2, 3)), any_taps(1, 9, 0), True, 2))
+@settings(max_examples=25)
+def test_a_device_correlates_to_the_references_bits(machine, case):
+    assert_same_bits(split(machine, *case), split(REFERENCE, *case))
+
+
+@given(case=joins())
+@example(case=([(noise_steerable((1, 1, 1, 1)), any_taps(1, 9, 0), 2)], (1, 1), False))
+@example(case=([(noise_steerable((2, 1, 1, 2)), any_taps(2, 9, 0), 2)], (1, 3), True))
+@settings(max_examples=25)
+def test_a_device_joins_to_the_references_bits(machine, case):
+    assert_same_bits(join(machine, *case), join(REFERENCE, *case))
+
+
+@BORDERS
+@BANKS
+def test_a_device_builds_and_collapses_to_the_references_bits(machine, orientations, torus):
+    for shape in ((3, 37, 41), (2, 18, 64)):
+        picture = noise_steerable(shape)
+        subbands = build(REFERENCE, picture, orientations, 2, torus)
+        assert_same_bits(build(machine, picture, orientations, 2, torus), subbands)
+        whole = collapse(REFERENCE, subbands, orientations, torus)
+        assert_same_bits(collapse(machine, subbands, orientations, torus), whole)
+
+
+@pytest.mark.parametrize(("scratch", "bound"), [(2**12, 2**12), (2**17, 2**17), (1, 10 * 48 * 4)])
+def test_scratch_memory_is_bounded(any_device, scratch, bound):
+    """What is laid out at a time fits in it, or is the rows of one work-item; all launches use the same."""
+    machine, sizes = opencl(any_device, scratch=scratch), []
+    arrays, empty = [machine.put(array) for array in (noise_steerable((4, 37, 31)), filters(4).bands)], machine.empty
+    machine.empty = lambda shape, dtype: (sizes.append((shape, dtype)), empty(shape, dtype))[1]
+    try:
+        steerable_split(machine, *arrays, True, 1)
+    finally:
+        machine.empty = empty
+    padded = [4 * int(np.prod(shape)) for shape, dtype in sizes if dtype == np.float32]
+    assert len(padded) == 1
+    assert padded[0] <= bound
+
+
+@BORDERS
+@pytest.mark.parametrize("shape", [(72, 90), (71, 93)], ids=["even", "odd"])
+@BANKS
+def test_a_pyramid_is_that_of_pyrtools(orientations, shape, torus):
+    picture, levels = noise_steerable((1, *shape)), 3
+    subbands = build(REFERENCE, picture, orientations, levels, torus)
+    theirs = SteerablePyramidSpace(
+        picture[0].astype(float),
+        height=levels,
+        order=orientations - 1,
+        edge_type="circular" if torus else "reflect1",
+    )
+
+    def close(found, known):
+        assert found.shape == known.shape
+        assert abs(found - known).max() <= PYRTOOLS * abs(known).max()
+
+    high, *bands, low = subbands
+    close(high[0, 0], theirs.pyr_coeffs["residual_highpass"])
+    close(2.0**levels * low[0, 0], theirs.pyr_coeffs["residual_lowpass"])
+    for level, own in enumerate(bands):
+        for i in range(orientations):
+            close(2.0**level * own[i, 0], theirs.pyr_coeffs[level, i])
+    close(collapse(REFERENCE, subbands, orientations, torus)[0], theirs.recon_pyr())
+
+
+# -- Pyramids of pictures in their own unit, and the transform that methods use.
 
 KINDS = pytest.mark.parametrize("kind", ["steerable", "laplacian"])
-BORDERS = pytest.mark.parametrize("boundary", ["open", "torus"])
-BANKS = pytest.mark.parametrize("orientations", [1, 2, 4, 6])
+BORDERS_PYRAMIDS = pytest.mark.parametrize("boundary", ["open", "torus"])
+BANKS_PYRAMIDS = pytest.mark.parametrize("orientations", [1, 2, 4, 6])
 
 
 def white(shape, seed=0):
@@ -48,7 +365,7 @@ def test_a_laplacian_pyramid_is_exact_to_half_a_unit(shape, boundary, dtype, lev
 
 
 @pytest.mark.parametrize("shape", [(64, 64), (65, 97), (70, 50), (33, 64)])
-@BANKS
+@BANKS_PYRAMIDS
 def test_a_steerable_pyramid_loses_little_on_a_torus_of_any_size(orientations, shape):
     """Whatever the mean: half as many rows of an odd number would leave a seam, which a mean makes worse."""
     for levels in (1, 3):
@@ -57,7 +374,7 @@ def test_a_steerable_pyramid_loses_little_on_a_torus_of_any_size(orientations, s
         assert lost(picture, pyramid) <= RECONSTRUCTION[orientations]
 
 
-@BANKS
+@BANKS_PYRAMIDS
 def test_with_mirrored_borders_it_loses_more_near_them(orientations):
     picture = white((96, 96))
     pyramid = made(picture, orientations=orientations, levels=3)
@@ -68,7 +385,7 @@ def test_with_mirrored_borders_it_loses_more_near_them(orientations):
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (5, 3), (2, 2)])
 @KINDS
-@BORDERS
+@BORDERS_PYRAMIDS
 def test_tiny_pictures_have_a_pyramid_of_every_height(shape, kind, boundary):
     picture = texture(shape, None, np.float64)
     for levels in range(most_levels(*shape) + 1):
@@ -80,7 +397,7 @@ def test_tiny_pictures_have_a_pyramid_of_every_height(shape, kind, boundary):
 
 
 @pytest.mark.parametrize("boundary", ["open", "torus"])
-@BANKS
+@BANKS_PYRAMIDS
 def test_a_steerable_pyramid_is_that_of_pyrtools_in_the_pictures_unit(orientations, boundary):
     picture = white((72, 96))
     pyramid = made(picture, orientations=orientations, levels=3, boundary=boundary)
@@ -110,7 +427,7 @@ def test_a_laplacian_pyramid_is_that_of_the_plain_sums(shape):
         assert abs(found[0, 0] - band).max() <= 4 * pyramid.unit, "rounded once a level"
 
 
-@BANKS
+@BANKS_PYRAMIDS
 def test_a_steerable_pyramid_keeps_the_sum_of_squares(orientations):
     picture = white((64, 96))
     picture -= picture.mean()
@@ -130,8 +447,8 @@ def test_a_constant_is_all_offset(kind):
 
 
 @KINDS
-@BORDERS
-def test_a_device_has_the_references_bits(machine, kind, boundary):
+@BORDERS_PYRAMIDS
+def test_a_device_has_the_references_bits_of_pyramids(machine, kind, boundary):
     for shape in ((37, 41), (18, 64)):
         picture = white(shape)
         ours = decompose(picture, kind=kind, levels=2, boundary=boundary, device=machine)

@@ -1,0 +1,253 @@
+"""benchmarks/: the figures of classify.py and fill.py on cases whose fault is known, and the picture of front.py."""
+
+import csv
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cases import texture
+from scipy.ndimage import gaussian_filter
+
+import simdtex
+from simdtex.io.image import example, write
+
+# -- The figures of benchmarks/classify.py, on labels whose fault is known, and its tables at a tiny size.
+
+NAMES = ("brick", "grass", "gravel")
+BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
+
+
+@pytest.fixture
+def classify(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import classify
+
+    return classify
+
+
+@pytest.fixture
+def mosaics(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import mosaics
+
+    return mosaics
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Two coloured pictures of 64x64 and a grey one."""
+    for name, seed in (("red", 3), ("blue", 4)):
+        write(tmp_path / f"{name}.png", texture((64, 64), 3, seed=seed))
+    write(tmp_path / "grey.png", texture((64, 64), seed=5))
+    return tmp_path
+
+
+def test_the_distance_to_a_border_is_that_to_the_nearest_pixel_of_another_label(mosaics):
+    truth = np.ones((40, 44), int)
+    truth[:, 20:] = 2
+    col = np.arange(44)
+    expected = np.where(col < 20, 20 - col, col - 19)
+    assert (mosaics.border_distance(truth) == expected).all()
+    assert np.isinf(mosaics.border_distance(np.ones((4, 5), int))).all()
+
+
+def test_accuracy_of_a_perfect_labelling_and_of_swapped_and_shifted_labels(mosaics):
+    truth = mosaics.regions(128, np.random.default_rng(1), curved=False)
+    assert sorted(np.unique(truth)) == [1, 2, 3, 4, 5] and (truth == 5).mean() == 1 / 4
+    assert mosaics.accuracy(truth, truth) == (1, 1)
+    swapped = np.choose(truth, [0, 2, 1, 3, 4, 5])
+    assert mosaics.accuracy(swapped, truth)[1] == 1 - ((truth == 1) | (truth == 2)).mean()
+    away, everywhere = mosaics.accuracy(np.roll(truth, 3, 1), truth)  # 3 pixels are within 16 of a border
+    assert everywhere < 1 and away > everywhere
+
+
+def test_parts_of_a_picture_lie_apart(mosaics):
+    for side in (128, 512):
+        rows, cols = np.indices((side, side))
+        place = np.stack([rows // 2, cols // 2, rows % 2 + 2 * (cols % 2)], -1).astype(np.uint8)
+        parts = [{tuple(pixel) for pixel in one.reshape(-1, 3).tolist()} for one in mosaics.parted(place)]
+        training, test, further, rest = parts
+        assert not training & test and not training & further and not further & rest and rest <= test
+
+
+def test_a_mosaic_shows_the_test_part_of_its_label(mosaics):
+    known = {str(n): mosaics.parted(np.full((64, 64), n, np.uint8)) for n in range(7)}
+    for mosaic in mosaics.drawn(known, 1, 96):
+        names = np.array([int(name) for name in mosaic.textures])
+        assert len(set(names)) == 5
+        assert (mosaics.grey(mosaic.picture) == names[mosaic.truth - 1]).all()
+
+
+def test_auroc_of_scores_that_part_and_of_equal_ones(mosaics):
+    assert mosaics.auroc([0.1, 0.2], [0.3, 0.4, 0.5]) == 1
+    assert mosaics.auroc([0.5, 0.5], [0.5, 0.5]) == 0.5
+    assert mosaics.auroc([0.1, 0.4], [0.3, 0.2]) == 0.5
+
+
+def test_the_field_removes_a_spot(classify):
+    evidence = np.zeros((2, 30, 40), np.float32)
+    evidence[0] = 1
+    evidence[:, 14:17, 20:23] = [[[0]], [[1]]]
+    from simdtex.machine import open_machine
+
+    machine = open_machine("reference")
+    assert (classify.field(machine, evidence, 4, 7) == 1).all()
+    assert (classify.field(machine, evidence, 4, 0) == 2).sum() == 9
+
+
+@pytest.mark.slow
+def test_the_tables(classify, mosaics, folder, monkeypatch, capsys):
+    small = SimpleNamespace(**{name: lambda n=n: texture((128, 128), seed=n) for n, name in enumerate(NAMES)})
+    monkeypatch.setattr(mosaics, "data", small)
+    monkeypatch.setattr(classify, "data", small)
+    monkeypatch.setattr(mosaics, "SHOWN", 100)
+    parts = [part for part in classify.PARTS if part != "accuracy" or find_spec("sklearn")]
+    for name, values in (("ORDERS", (2,)), ("FIELDS", [(8, 2)]), ("DEFAULTS", {"typical": (0.0,)})):
+        monkeypatch.setattr(classify, name, values)
+    words = ["classify.py", folder, "--only", "*.png", "--draws", "1", "--side", "64", "--out", folder]
+    monkeypatch.setattr(sys, "argv", [*map(str, words), "--parts", ",".join(parts)])
+    classify.main()
+    assert "textures: 6" in capsys.readouterr().out
+    for part in parts:
+        with open(folder / f"{part}.csv", encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file)
+        assert rows and all(len(row) == len(header) for row in rows), part
+
+
+def test_missing_baselines_are_told(mosaics, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
+    with pytest.raises(SystemExit, match="pip install"):
+        mosaics.probabilities([], [], mosaics.patterns, 4)
+
+
+# -- The figures of benchmarks/fill.py, on fillings whose fault is known.
+
+
+@pytest.fixture
+def fill(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import fill
+
+    return fill
+
+
+@pytest.fixture
+def cut():
+    """A noise picture and a hole in it."""
+    picture = np.random.default_rng(1).integers(0, 256, (112, 112), np.uint8)
+    hole = np.zeros(picture.shape, bool)
+    hole[40:68, 40:76] = True
+    return picture, hole
+
+
+def test_a_periodic_filling_is_found_in_the_known_part(fill):
+    picture = np.tile(np.random.default_rng(1).integers(0, 256, (8, 8), np.uint8), (6, 6))
+    known = picture.copy()
+    known[40:] = np.random.default_rng(2).integers(0, 256, (8, 48), np.uint8)  # or known patches are all found too
+    hole = np.zeros(picture.shape, bool)
+    hole[12:24, 12:24] = True
+    found = fill.score(known, known, hole)
+    assert found["rim"] == found["inside"] == 0
+
+
+def test_a_bright_filling_has_a_seam_and_a_blurred_one_small_steps(fill, cut):
+    picture, hole = cut
+    blurred = gaussian_filter(picture.astype(float), 1.5)
+    smooth = np.where(hole, blurred, picture)
+    assert fill.score(picture, smooth, hole)["step"] < 0.5
+    soft = blurred.astype(np.uint8)
+    raised = np.where(hole, soft + np.uint8(60), soft)
+    assert fill.score(soft, soft, hole)["seam"] < 1.2
+    assert fill.score(soft, raised, hole)["seam"] > 3
+
+
+@pytest.mark.slow
+def test_one_command_gives_the_table_and_the_sheets(fill, tmp_path, monkeypatch, capsys):
+    (tmp_path / "in").mkdir()
+    write(tmp_path / "in" / "red.png", texture((20, 20), 3))
+    words = ["fill.py", "--samples", tmp_path / "in", "--holes", "rectangle", "--options", "order=2", "--device"]
+    monkeypatch.setattr(
+        sys, "argv", [*map(str, words), "reference", *map(str, ["--out", tmp_path, "--csv", tmp_path / "t.csv"])]
+    )
+    fill.main()
+    with open(tmp_path / "t.csv", encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    labels = ["fill", "order=2", "biharmonic", *["telea"] * (find_spec("cv2") is not None), "original"]
+    assert [line["filling"] for line in lines] == 2 * labels
+    assert (tmp_path / "fill-red.png").is_file()
+    assert "original" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("band", [4, 7])
+def test_a_wrapping_picture_has_no_seam(fill, band):
+    import tile
+
+    row, col = np.indices((48, 40))
+    picture = (127 + 60 * np.sin(2 * np.pi * row / 48) + 50 * np.cos(2 * np.pi * col / 40)).astype(np.uint8)
+    assert tile.frame(picture.shape, band).sum() == picture.size - (48 - 2 * band) * (40 - 2 * band)
+    assert tile.seamless(picture, band)["tiles"] < 1.7
+    assert tile.twice(picture).shape == (96, 80)
+    assert tile.seamless(np.maximum(picture, (row == 0) * np.uint8(255)), band)["tiles"] > 5
+
+
+# -- benchmarks/front.py: the picture of the README shows what it says.
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def front(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    import front
+
+    return front
+
+
+def test_a_flat_height_map_has_flat_normals(front):
+    assert np.array_equal(np.unique(front.normals(np.full((5, 7), 3.0)).reshape(-1, 3), axis=0), [[128, 128, 255]])
+
+
+def test_a_slope_that_rises_to_the_right_faces_left(front):
+    slope = front.normals(np.tile(np.arange(9.0) * 10, (9, 1)))[4, 4]
+    assert slope[0] < 128 and slope[1] == 128
+
+
+def test_the_mast_is_in_the_hole(front):
+    photo, hole = front.mast(324)
+    assert photo.shape == (324, 324, 3) and 0.05 < hole.mean() < 0.3
+    assert photo[hole].max() > 50 + photo[:250, 200:235].max(), "it is lighter than the sky beside it"
+
+
+def test_samples_are_pieces_of_one_size(front):
+    sides = {name: sample.shape for name, sample in front.samples(front.SIDE).items()}
+    assert sides == {"wood": (129, 129, 3), "tissue": (162, 162, 3), "stars": (162, 162, 3)}
+
+
+@pytest.mark.slow
+def test_the_picture_has_samples_results_and_the_hole(front, any_device):
+    side = 100
+    sheet = np.array(front.front(simdtex.open_machine(str(any_device.index)), side))
+    line, wide = front.TEXT + 8, 2 * side + front.GAP
+    assert np.array_equal(sheet[line : line + side, wide : wide + side], front.samples(side)["tissue"])
+    below = line + side + front.GAP + 2 * side + front.GAP + line
+    given, filled = (sheet[below : below + 2 * side, left : left + 2 * side] for left in (0, wide))
+    photo, hole = front.mast(2 * side)
+    assert np.array_equal(given, photo) and np.array_equal(filled[~hole], photo[~hole])
+    assert (filled[hole] != photo[hole]).mean() > 0.8
+
+
+def test_the_picture_of_the_readme_is_light():
+    (name,) = re.findall(r"\]\((docs/_static/front\.\w+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert (ROOT / name).stat().st_size < 700_000
+
+
+def test_the_wall_of_bricks_is_seen_from_the_front():
+    wall = example("brick")
+    assert wall.shape == (264, 216) and wall.dtype == np.uint8
+    joints = np.argsort(wall.mean(0))[::-1][:24]  # the lightest columns are whole joints
+    assert (wall[:, joints].mean(0) > wall.mean() + 10).all()
+    assert example("gravel").shape == (512, 512)
