@@ -4,6 +4,7 @@
 //
 // near      (layers, PEs, N (C + 1))  of each neighbour the weighted values x_r u of the channels, and u = 1 - t_r
 // distance  (1, PEs, size)            of all candidates, or of this launch's, as many as a PE keeps
+// sample    (N, C, size)              neighbourhoods of the candidates, those of a neighbour and channel side by side
 // own       (C, n)                    values of the candidates themselves
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/vector.h"
@@ -14,12 +15,15 @@
 
 #define STEP 4 // vectors of candidates in registers together
 
-// simdtex.ops.lcpdf.Choice; `radius` is -1 where there is no density.
-#define WINDOW                                                                                             \
-    __global const uint *restrict noise, __global const float *restrict window, const float scale,         \
-        const int radius, const int top
+// simdtex.ops.lcpdf.Choice; `noise` and `gauss` are the tables of its window.
+#define CHOICE                                                                                                  \
+    const int draws, const int density, const float scale, TABLE(uint, noise), TABLE(float, gauss), const int radius, \
+        const int top
+
 // simdtex.maspar.instructions.Broadcast
-#define BROADCAST const int first, const int count, PLURAL(float, distance), PLURAL(float, least), PLURAL(int, chosen)
+#define BROADCAST                                                                                               \
+    const int first, const int count, TABLE(float, sample), TABLE(float, own), CHOICE, PLURAL(float, distance), \
+        PLURAL(float, least), PLURAL(int, chosen)
 #define DISTANCE(pe) (distance + (size_t)(pe) * distance_size + first % distance_size)
 
 // Keeps what has arrived from neighbour n, and adds its temperature to `heat`.
@@ -37,8 +41,7 @@ __kernel void maspar_lcpdf_keep(ARRAY, PLURAL(float, near), const int n, PLURAL(
 
 // Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the `least` so far and its
 // candidate, of several the first, `chosen` by ICM.
-// sample (N, C, size)  the neighbourhoods of the candidates, those of one neighbour and channel side by side
-__kernel void maspar_lcpdf_distance(ARRAY, BROADCAST, PLURAL(const float, near), TABLE(float, sample))
+__kernel void maspar_lcpdf_distance(ARRAY, BROADCAST, PLURAL(const float, near))
 {
     WHERE_ACTIVE(pe, k) {
         __global const float *z = &OF(near, k);
@@ -70,8 +73,8 @@ __kernel void maspar_lcpdf_distance(ARRAY, BROADCAST, PLURAL(const float, near),
 
 // The weights of equation (7), added to `sum`. With `choose`, the first candidate at which that exceeds the target is
 // `chosen`, if none was.
-__kernel void maspar_lcpdf_weigh(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PLURAL(ulong, sum),
-                                 PLURAL(const ulong, target), const int choose)
+__kernel void maspar_lcpdf_weigh(ARRAY, BROADCAST, PLURAL(ulong, sum), PLURAL(const ulong, target),
+                                 const int choose)
 {
     WHERE_ACTIVE(pe, k) {
         __global const float *d = DISTANCE(pe);
@@ -80,7 +83,7 @@ __kernel void maspar_lcpdf_weigh(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PL
         int taken = choose ? OF(chosen, k) : -1;
         for (int p = 0; p < count && taken < 0; ++p) {
             if (WEIGHS(d[p], smallest, scale))
-                total += mass_of(d[p], smallest, scale, own, own_size, first + p, noise, radius, top);
+                total += mass_of(d[p], smallest, scale, own, own_size, first + p, noise, density ? radius : -1, top);
             taken = choose && total > OF(target, k) ? first + p : -1;
         }
         OF(sum, k) = total;
@@ -91,7 +94,7 @@ __kernel void maspar_lcpdf_weigh(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PL
 
 // The weights of equation (7) given the grey levels x of all channels but c, added to the `mass` of each grey level,
 // which the first launch clears. With c = -1, the candidate that gives most is `chosen`; `most` is its weight so far.
-__kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PLURAL(ulong, mass), PLURAL(ulong, most),
+__kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, PLURAL(ulong, mass), PLURAL(ulong, most),
                                 PLURAL(const int, x), const int c)
 {
     WHERE_ACTIVE(pe, k) {
@@ -102,7 +105,7 @@ __kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PLU
             ulong w = weight(DISTANCE(pe)[p], OF(least, k), scale);
             for (int b = 0; b < C; ++b)
                 if (b != c)
-                    w = weight_near(w, abs((int)own[b * own_size + first + p] - (&OF(x, k))[b]), window, radius);
+                    w = weight_near(w, abs((int)own[b * own_size + first + p] - (&OF(x, k))[b]), gauss, radius);
             if (c >= 0)
                 m[(int)own[c * own_size + first + p]] += w;
             else if (w > OF(most, k)) {
@@ -114,14 +117,14 @@ __kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, TABLE(float, own), WINDOW, PLU
 }
 
 // The grey level x with the highest density, of several the lowest: the `mass` of all levels, smoothed by the kernel.
-__kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), WINDOW, PLURAL(int, x))
+__kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), CHOICE, PLURAL(int, x))
 {
     WHERE_ACTIVE(pe, k) {
         float best = -1.0f;
         for (int v = 0; v <= top; ++v) {
             float f = 0.0f;
             for (int y = max(0, v - radius); y <= min(top, v + radius); ++y)
-                f = fma((float)mass[(size_t)pe * mass_size + y], window[abs(v - y)], f);
+                f = fma((float)mass[(size_t)pe * mass_size + y], gauss[abs(v - y)], f);
             if (f > best) {
                 best = f;
                 OF(x, k) = v;
@@ -131,7 +134,7 @@ __kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), WINDOW, PLU
 }
 
 // A grey level of channel c, drawn from the kernel of equation (7) around that of the chosen candidate.
-__kernel void maspar_lcpdf_step(ARRAY, PLURAL(int, x), WINDOW, PLURAL(const int, place), const ulong seed,
+__kernel void maspar_lcpdf_step(ARRAY, PLURAL(int, x), CHOICE, PLURAL(const int, place), const ulong seed,
                                 const uint level, const uint turn, const int c)
 {
     WHERE_ACTIVE(pe, k) {

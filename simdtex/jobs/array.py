@@ -17,8 +17,9 @@ from simdtex.driver import check_shape, execute
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar.algorithm import AT_ONCE, STEPPED, Level, Problem, Program
+from simdtex.maspar.algorithm import Level, Problem, Program
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
+from simdtex.maspar.instructions import AT_ONCE, STEPPED
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
 from simdtex.methods.mrf.input import Input

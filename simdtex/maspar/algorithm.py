@@ -24,12 +24,6 @@ from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
 from simdtex.ops.lcpdf import Choice, Key, turns
 
-STEPPED = 64
-"""Candidates in the memory of a device are a multiple of this: four vectors of the longest."""
-
-AT_ONCE = 16
-"""The most times `STEPPED` candidates of one launch; fewer on an array beyond the largest MP-1."""
-
 
 class Level(NamedTuple):
     """The constants of a level on the ACU.
@@ -71,8 +65,9 @@ class Program:
             self.place.set(mp1.row * mp1.shape[1] + mp1.col)  # 2
             bits = mp1.random(self.place, Key(problem.seed, 0, 0), random.START)
             drawn = bits.share(problem.first.shape[1]).as_type("int32")
-            for word, entries in zip([self.source, *map(self.state.__getitem__, range(self.channels))], problem.first):
-                mp1.table(word, entries, drawn)
+            mp1.table(self.source, problem.first[0], drawn)
+            for c in range(self.channels):
+                mp1.table(self.state[c], problem.first[1 + c], drawn)
             self.temperature.set(1024)  # 5
 
     def relax(self, level: Level) -> Iterator[tuple[int, NDArray[np.bool_]]]:
@@ -112,13 +107,10 @@ class Pass:
         self.sum = mp1.plural("uint64", draws or mode)
         self.bits, self.target = mp1.plural("uint64", draws), mp1.plural("uint64", draws)
         self.mass = mp1.plural("uint64", (level.choice.window.top + 1) * mode, shared=True)
-        self.keeps = (draws or mode) and mp1.fits(4 * n)  # else each use computes all distances
+        self.keeps = bool(draws or mode) and mp1.fits(4 * n)  # else each use computes all distances
         mp1.reserve(4 * n if self.keeps else 4)
-        most = STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
-        held = n if self.keeps else min(n, most)
-        distance = mp1.expression("float32", held + -held % STEPPED, shared=True)
-        self.blocks = [Broadcast(p, min(n - p, most), distance, self.least, self.chosen) for p in range(0, n, most)]
-        self.own, self.sample = mp1.put(level.own), mp1.put(level.sample, STEPPED)
+        tables = (level.sample, level.own, level.choice)
+        self.blocks = Broadcast.blocks(mp1, self.keeps, *tables, self.least, self.chosen)
 
     def relax(self, chosen: Mask, sweep: int) -> None:
         """Relax the chosen sites."""
@@ -154,12 +146,12 @@ class Pass:
 
     def _distances(self, block: Broadcast) -> None:
         """Accumulate the distances (12) of a block of candidates, and find the least one, to which weights relate."""
-        mp1, terms = self.mp1, block.count * self.level.sample[..., 0].size
+        mp1, terms = self.mp1, block.size * self.level.sample[..., 0].size
         with mp1.section("distance"):
             mp1.count("broadcast", terms)
-            mp1.count("float", 4 * terms + block.count)
-            mp1.count("integer", block.count * (not self.level.choice.draws))  # the number of the least one
-            mp1.execute(instructions.lcpdf_distance, block, self.near, self.sample, C=self.channels)
+            mp1.count("float", 4 * terms + block.size)
+            mp1.count("integer", block.size * (not self.level.choice.draws))  # the number of the least one
+            mp1.execute(instructions.lcpdf_distance, block, self.near, C=self.channels)
 
     def _again(self) -> Iterator[Broadcast]:
         """Yield the blocks with their distances, which are computed again unless a PE keeps them."""
@@ -170,7 +162,7 @@ class Pass:
 
     def _draw(self) -> None:
         """Add up the weights (7) of all candidates and, to choose one, once more as far as a share of the sum."""
-        mp1, choice, shares = self.mp1, self.level.choice, self.channels * self.level.choice.density
+        mp1, shares = self.mp1, self.channels * self.level.choice.density
         for choose in (False, True):
             if choose:
                 self.target.set(self.bits.share(self.sum))
@@ -178,11 +170,10 @@ class Pass:
             self.sum.set(0)
             for block in self._again():
                 with mp1.section("draw" if choose else "weights"):
-                    mp1.count("float", EXP * block.count)
-                    mp1.count("broadcast", shares * block.count)  # the legal share of each channel's kernel
-                    mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.count)
-                    given = (block, self.own, choice, self.sum, self.target, int(choose))
-                    mp1.execute(instructions.lcpdf_weigh, *given, C=self.channels)
+                    mp1.count("float", EXP * block.size)
+                    mp1.count("broadcast", shares * block.size)  # the legal share of each channel's kernel
+                    mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.size)
+                    mp1.execute(instructions.lcpdf_weigh, block, self.sum, self.target, choose, C=self.channels)
 
     def _mode(self) -> None:
         """Move from the nearest candidates to the mode, channel by channel, and choose those that give most."""
@@ -195,11 +186,10 @@ class Pass:
             others = self.channels - (c >= 0)
             for block in self._again():
                 with mp1.section("weights"):
-                    mp1.count("float", (EXP + 2 * others) * block.count)  # converted, times the kernel
-                    mp1.count("broadcast", self.channels * block.count)
-                    mp1.count("integer", (2 + 2 * others) * block.count)
-                    given = (block, self.own, choice, self.mass, self.sum, x, c)
-                    mp1.execute(instructions.lcpdf_mode, *given, C=self.channels)
+                    mp1.count("float", (EXP + 2 * others) * block.size)  # converted, times the kernel
+                    mp1.count("broadcast", self.channels * block.size)
+                    mp1.count("integer", (2 + 2 * others) * block.size)
+                    mp1.execute(instructions.lcpdf_mode, block, self.mass, self.sum, x, c, C=self.channels)
             if c >= 0:
                 mp1.count("broadcast", greys * width)
                 mp1.count("integer", 3 * greys)
@@ -215,5 +205,4 @@ class Pass:
             if choice.density and choice.draws:
                 mp1.count("broadcast", len(choice.window.noise))
                 mp1.count("integer", PHILOX + len(choice.window.noise))
-                given = (program.state[c], choice, program.place, key, c)
-                mp1.execute(instructions.lcpdf_step, *given, C=self.channels)
+                mp1.execute(instructions.lcpdf_step, program.state[c], choice, program.place, key, c, C=self.channels)

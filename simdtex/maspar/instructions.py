@@ -19,6 +19,12 @@ from simdtex.random import below, draw4
 
 Array: TypeAlias = NDArray[Any]
 
+STEPPED = 64
+"""Candidates in the memory of a device are a multiple of this: four vectors of the longest."""
+
+AT_ONCE = 16
+"""The most times `STEPPED` candidates of one launch; fewer on an array beyond the largest MP-1."""
+
 
 class On(NamedTuple):
     """The PEs that execute an instruction: ``at`` are their layers and their numbers, (active,) each."""
@@ -99,74 +105,88 @@ def lcpdf_keep(on: On, near: Array, number: int, arrived: Array, heat: Array) ->
 
 
 class Broadcast(NamedTuple):
-    """The ``count`` candidates that the ACU broadcasts, beginning with number ``first``, and what PEs compute of them.
+    """Candidates that the ACU broadcasts in a launch, and what the PEs compute of them.
 
-    ``distance`` are (1, PEs, size) float32; ``least``, the least one so far, and ``chosen``, a candidate, are plural.
+    ``begin`` is the number of the first of ``size`` candidates; of all candidates ``own`` (C, n) float32 are the values
+    and ``sample`` (N, C, n or more) those of their neighbours. ``choice`` has the Gaussian (7). ``distance`` are float32,
+    shared by the layers; ``least``, the least one so far, and ``chosen``, a candidate, are plural.
     """
 
-    first: int
-    count: int
+    begin: int
+    size: int
+    sample: Any
+    own: Any
+    choice: Choice
     distance: Any
     least: Any
     chosen: Any
 
+    @classmethod
+    def blocks(cls, mp1: Any, keeps: bool, sample: Any, own: Any, *more: Any) -> list[Broadcast]:
+        """Return all candidates in as few launches as an array allows; with ``keeps``, PEs keep all distances."""
+        n, most = own.shape[1], STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
+        held, tables = n if keeps else min(n, most), (mp1.put(sample, STEPPED), mp1.put(own))
+        distance = mp1.expression("float32", held + -held % STEPPED, shared=True)
+        choice, *plurals = more
+        return [cls(p, min(n - p, most), *tables, choice, distance, *plurals) for p in range(0, n, most)]
+
     @property
     def numbers(self) -> slice:
         """The candidates."""
-        return slice(self.first, self.first + self.count)
+        return slice(self.begin, self.begin + self.size)
 
     @property
     def kept(self) -> slice:
         """Their places among the distances that a PE keeps."""
-        at = self.first % self.distance.shape[-1]
-        return slice(at, at + self.count)
+        at = self.begin % self.distance.shape[-1]
+        return slice(at, at + self.size)
 
-    def weights(self, on: On, choice: Choice) -> NDArray[np.uint64]:
+    def weights(self, on: On) -> NDArray[np.uint64]:
         """Return the weights (7) in the active PEs, (candidates, PEs)."""
         d = np.concatenate([self.least[on.at].T, self.distance[0, on.at[1], self.kept].T])
-        return weights(d, choice.window.scale)[1:]
+        return weights(d, self.choice.window.scale)[1:]
 
 
-def lcpdf_distance(on: On, of: Broadcast, near: Array, sample: Array) -> None:
+def lcpdf_distance(on: On, of: Broadcast, near: Array) -> None:
     """Set the distances (12), and ``least`` and ``chosen`` to the nearest so far."""
-    neighbours, channels = sample.shape[:2]
+    neighbours, channels = of.sample.shape[:2]
     z = near[on.at].reshape(-1, neighbours, channels + 1).astype(np.float64)
-    d = np.zeros((len(z), of.count), np.float32)
+    d = np.zeros((len(z), of.size), np.float32)
     for k in range(neighbours):
         for c in range(channels):
-            e = z[:, k, c, None] - z[:, k, channels, None] * sample[k, c, of.numbers].astype(np.float64)
+            e = z[:, k, c, None] - z[:, k, channels, None] * of.sample[k, c, of.numbers].astype(np.float64)
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
     of.distance[0, on.at[1], of.kept] = d
     old = of.least[on.at]
     of.least[on.at] = np.minimum(d.min(1, keepdims=True), old)
-    nearest = of.first + d.argmin(1, keepdims=True)
+    nearest = of.begin + d.argmin(1, keepdims=True)
     of.chosen[on.at] = np.where(d.min(1, keepdims=True) < old, nearest, of.chosen[on.at])
 
 
-def lcpdf_weigh(on: On, of: Broadcast, own: Array, choice: Choice, total: Array, target: Array, choose: int) -> None:
+def lcpdf_weigh(on: On, of: Broadcast, total: Array, target: Array, choose: int) -> None:
     """Add the weights (7) to ``total``; with ``choose``, the first to exceed the target is chosen, if none was."""
-    w = masses(of.weights(on, choice), own[:, of.numbers, None], choice)
+    w = masses(of.weights(on), of.own[:, of.numbers, None], of.choice)
     sums = np.cumsum(w, 0, dtype=np.uint64) + total[on.at].T
     total[on.at] = sums[-1:].T
     if choose:
         beyond, old = sums > target[on.at].T, of.chosen[on.at]
-        found = np.where(beyond.any(0), of.first + beyond.argmax(0), -1)
+        found = np.where(beyond.any(0), of.begin + beyond.argmax(0), -1)
         of.chosen[on.at] = np.where(old < 0, found[:, None], old)
 
 
-def lcpdf_mode(on: On, of: Broadcast, own: Array, choice: Choice, mass: Array, most: Array, x: Array, c: int) -> None:
+def lcpdf_mode(on: On, of: Broadcast, mass: Array, most: Array, x: Array, c: int) -> None:
     """Add the weights (7) given all channels of ``x`` but ``c`` to the ``mass`` of each grey level.
 
     With ``c`` -1, the candidate that gives most is chosen, and ``most`` is its weight.
     """
-    grey = own[:, of.numbers].astype(np.int64)
-    w = weighed(x[on.at].T, of.weights(on, choice), grey, choice.window, c)
+    grey = of.own[:, of.numbers].astype(np.int64)
+    w = weighed(x[on.at].T, of.weights(on), grey, of.choice.window, c)
     if c < 0:
         better = w.max(0) > most[on.at][:, 0]
-        of.chosen[on.at] = np.where(better, of.first + w.argmax(0), of.chosen[on.at][:, 0])[:, None]
+        of.chosen[on.at] = np.where(better, of.begin + w.argmax(0), of.chosen[on.at][:, 0])[:, None]
         most[on.at] = np.maximum(w.max(0)[:, None], most[on.at])
     else:
-        sums = mass[0, on.at[1]].T * np.uint64(of.first > 0)
+        sums = mass[0, on.at[1]].T * np.uint64(of.begin > 0)
         np.add.at(sums, grey[c], w)
         mass[0, on.at[1]] = sums.T
 

@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine
-from simdtex.machine.reference import Reference
 from simdtex.maspar import instructions
 from simdtex.maspar.array import Layout, ProcessorArray
 from simdtex.maspar.costs import COSTS, PHILOX
 from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, Broadcast, On
-from simdtex.ops.lcpdf import Choice, Key
+from simdtex.ops.lcpdf import Key
 
 TYPES = {"int32": "int", "float32": "float", "uint64": "ulong"}
 """The types of variables, and their names in kernels."""
@@ -163,11 +162,8 @@ class MP1:
     def expression(self, dtype: str = "int32", size: int = 1, shared: bool = False) -> Plural:
         """Return a plural without values, for the result of an expression; layers may share it one after another."""
         shape = (1 if shared else self.layers, self.array.size, size)
-        if isinstance(self.machine, Reference):
-            return Plural(self, np.zeros(shape, dtype))
-        return Plural(
-            self, self.machine.empty(shape, dtype) if self.machine else np.broadcast_to(np.zeros(1, dtype), shape)
-        )
+        zeros = np.broadcast_to(np.zeros(1, dtype), shape)
+        return Plural(self, self.machine.empty(shape, dtype) if hasattr(self.machine, "empty") else self.put(zeros))
 
     def reserve(self, size: int) -> None:
         """Take bytes of every PE's memory; raise ValueError if it does not suffice."""
@@ -240,12 +236,12 @@ class MP1:
                 instruction(On(self.layout, self.mask.at), *map(_viewed, args))
                 return
             rows, cols, blocks = self.array.rows, self.array.cols, self.array.mapping == "hierarchical"
-            struct, over = np.zeros((), LAYOUT), self.mask.over
-            struct[()] = (rows, cols, self.layout.high, self.layout.wide, blocks, over.start, over.stop)
+            high, wide, over = self.layout.high, self.layout.wide, self.mask.over
+            struct = np.array((rows, cols, high, wide, blocks, over.start, over.stop), LAYOUT)[()]
             given = [part for arg in args for part in _expanded(launcher, arg)]
             defines |= {"V": launcher.vector} if "C" in defines else {}
             name, group = f"maspar_{instruction.__name__}", (gcd(self.array.size, 64),)
-            launcher.launch(name, (self.array.size,), struct[()], self.mask.plane, *given, local=group, defines=defines)
+            launcher.launch(name, (self.array.size,), struct, self.mask.plane, *given, local=group, defines=defines)
 
     def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float = 0) -> Plural:
         """Set a plural to an operation of the arithmetic unit, and return it."""
@@ -329,11 +325,10 @@ def _expanded(launcher: Launcher, arg: Any) -> list[Any]:
     """Return the arguments of a kernel for one of an instruction, as in kernels/maspar."""
     if isinstance(arg, Plural):
         return [arg.data, arg.data.shape[-1], arg.word]
-    if isinstance(arg, Broadcast):
-        return [part for each in arg for part in _expanded(launcher, each)]
-    if isinstance(arg, Choice):
-        win, tables = arg.window, (arg.window.noise, arg.window.gauss)
-        return [*map(launcher.constant, tables), win.scale, win.radius if arg.density else -1, win.top]
     if isinstance(arg, Key):
         return [np.uint64(arg.seed), np.uint32(arg.level), np.uint32(arg.turn)]
+    if isinstance(arg, tuple):
+        return [part for each in arg for part in _expanded(launcher, each)]
+    if isinstance(arg, np.ndarray):
+        arg = launcher.constant(arg)
     return [arg, arg.shape[-1]] if getattr(arg, "shape", ()) else [arg]
