@@ -13,7 +13,7 @@ from simdtex.experiments.ising import Experiment
 from simdtex.experiments.ising import ising as experiment
 from simdtex.maspar.array import DIRECTIONS, MAPPINGS, ProcessorArray, path
 from simdtex.maspar.coloring import coloring
-from simdtex.maspar.costs import COSTS, FULL
+from simdtex.maspar.costs import CLOCK, COSTS, FULL
 from simdtex.maspar.ising import ising
 from simdtex.maspar.machine import MP1
 from simdtex.maspar.walk import Walk
@@ -164,7 +164,7 @@ def test_instructions_are_counted_with_their_costs():
         mp1.xnet(mp1.row, 0, 1, 3)
     assert vars(mp1.counts["inside", "x-net"]) == {"instructions": 6, "active": 3 * 2}
     assert mp1.seconds()["inside"] == {"x-net": 6 * 4 * FULL / 23e9}
-    assert round(COSTS["float"].clocks) == 171 and round(COSTS["integer"].clocks) == 8
+    assert [round(COSTS[kind].seconds / CLOCK) for kind in ("integer", "float", "x-net", "router")] == [8, 171, 36, 640]
     assert {cost.source for cost in COSTS.values() if "Blank 1990" not in cost.source} == {"assumption"}
 
 

@@ -17,6 +17,7 @@ from simdtex.driver import check_shape, execute
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
+from simdtex.maspar import EXECUTED
 from simdtex.maspar.algorithm import Level, Problem, Program
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
 from simdtex.maspar.instructions import AT_ONCE, STEPPED
@@ -30,9 +31,6 @@ from simdtex.run import Callback, Output, Progress, Stage
 
 MEMORY = {"16K": 2**14, "64K": 2**16}
 """The bytes of a PE's memory, in the two sizes that were sold."""
-
-EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel")
-"""The options that the program executes; all others have the paper's values."""
 
 
 class Step(NamedTuple):

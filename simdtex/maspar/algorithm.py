@@ -88,7 +88,7 @@ class Program:
                 bits = random.draw4(seed, level.number, sweep, np.arange(colors), random.SCHEDULE)[0]
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
-                        mp1.count("reduction")  # which layers have a site to relax
+                        mp1.count(reduction=1)  # which layers have a site to relax
                     if chosen.layers:
                         relaxation.relax(chosen, sweep)  # 6.2.2
                         yield sweep, chosen.active
@@ -109,8 +109,7 @@ class Pass:
         self.mass = mp1.plural("uint64", (level.choice.window.top + 1) * mode, shared=True)
         self.keeps = bool(draws or mode) and mp1.fits(4 * n)  # else each use computes all distances
         mp1.reserve(4 * n if self.keeps else 4)
-        tables = (level.sample, level.own, level.choice)
-        self.blocks = Broadcast.blocks(mp1, self.keeps, *tables, self.least, self.chosen)
+        self.blocks = Broadcast.blocks(mp1, level, self.keeps, self.least, self.chosen)
 
     def relax(self, chosen: Mask, sweep: int) -> None:
         """Relax the chosen sites."""
@@ -140,17 +139,15 @@ class Pass:
         mp1 = self.mp1
         self.heat.set(0)
         for number, there in self.walk.neighbours(self.program.state):
-            mp1.count("float", 1 + self.channels)
-            mp1.count("integer")
+            mp1.count(float=1 + self.channels, integer=1)
             mp1.execute(instructions.lcpdf_keep, self.near, number, there, self.heat, C=self.channels)
 
     def _distances(self, block: Broadcast) -> None:
         """Accumulate the distances (12) of a block of candidates, and find the least one, to which weights relate."""
         mp1, terms = self.mp1, block.size * self.level.sample[..., 0].size
         with mp1.section("distance"):
-            mp1.count("broadcast", terms)
-            mp1.count("float", 4 * terms + block.size)
-            mp1.count("integer", block.size * (not self.level.choice.draws))  # the number of the least one
+            number = block.size * (not self.level.choice.draws)  # of the least one
+            mp1.count(broadcast=terms, float=4 * terms + block.size, integer=number)
             mp1.execute(instructions.lcpdf_distance, block, self.near, C=self.channels)
 
     def _again(self) -> Iterator[Broadcast]:
@@ -162,7 +159,7 @@ class Pass:
 
     def _draw(self) -> None:
         """Add up the weights (7) of all candidates and, to choose one, once more as far as a share of the sum."""
-        mp1, shares = self.mp1, self.channels * self.level.choice.density
+        mp1, shares = self.mp1, self.channels * self.level.choice.density  # legal shares of kernels
         for choose in (False, True):
             if choose:
                 self.target.set(self.bits.share(self.sum))
@@ -170,9 +167,8 @@ class Pass:
             self.sum.set(0)
             for block in self._again():
                 with mp1.section("draw" if choose else "weights"):
-                    mp1.count("float", EXP * block.size)
-                    mp1.count("broadcast", shares * block.size)  # the legal share of each channel's kernel
-                    mp1.count("integer", (2 + 2 * choose + WIDE * shares) * block.size)
+                    each = (2 + 2 * choose + WIDE * shares) * block.size
+                    mp1.count(float=EXP * block.size, broadcast=shares * block.size, integer=each)
                     mp1.execute(instructions.lcpdf_weigh, block, self.sum, self.target, choose, C=self.channels)
 
     def _mode(self) -> None:
@@ -186,14 +182,11 @@ class Pass:
             others = self.channels - (c >= 0)
             for block in self._again():
                 with mp1.section("weights"):
-                    mp1.count("float", (EXP + 2 * others) * block.size)  # converted, times the kernel
-                    mp1.count("broadcast", self.channels * block.size)
-                    mp1.count("integer", (2 + 2 * others) * block.size)
+                    real, each = (EXP + 2 * others) * block.size, (2 + 2 * others) * block.size  # converted, times (7)
+                    mp1.count(float=real, broadcast=self.channels * block.size, integer=each)
                     mp1.execute(instructions.lcpdf_mode, block, self.mass, self.sum, x, c, C=self.channels)
             if c >= 0:
-                mp1.count("broadcast", greys * width)
-                mp1.count("integer", 3 * greys)
-                mp1.count("float", (2 * width + 1) * greys)  # smoothed, and the highest
+                mp1.count(broadcast=greys * width, integer=3 * greys, float=(2 * width + 1) * greys)
                 mp1.execute(instructions.lcpdf_highest, self.mass, choice, x[c], C=self.channels)
 
     def _take(self, key: Key) -> None:
@@ -203,6 +196,5 @@ class Pass:
         for c in range(0 if choice.mode else self.channels):
             mp1.table(program.state[c], self.level.own[c], self.chosen)
             if choice.density and choice.draws:
-                mp1.count("broadcast", len(choice.window.noise))
-                mp1.count("integer", PHILOX + len(choice.window.noise))
+                mp1.count(broadcast=len(choice.window.noise), integer=PHILOX + len(choice.window.noise))
                 mp1.execute(instructions.lcpdf_step, program.state[c], choice, program.place, key, c, C=self.channels)

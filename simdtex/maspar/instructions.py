@@ -108,8 +108,8 @@ class Broadcast(NamedTuple):
     """Candidates that the ACU broadcasts in a launch, and what the PEs compute of them.
 
     ``begin`` is the number of the first of ``size`` candidates; of all candidates ``own`` (C, n) float32 are the values
-    and ``sample`` (N, C, n or more) those of their neighbours. ``choice`` has the Gaussian (7). ``distance`` are float32,
-    shared by the layers; ``least``, the least one so far, and ``chosen``, a candidate, are plural.
+    and ``sample`` (N, C, n or more) those of their neighbours. ``choice`` has the Gaussian (7). The layers share
+    ``distance``, float32; ``least``, the least one so far, and ``chosen``, a candidate, are plural.
     """
 
     begin: int
@@ -122,13 +122,13 @@ class Broadcast(NamedTuple):
     chosen: Any
 
     @classmethod
-    def blocks(cls, mp1: Any, keeps: bool, sample: Any, own: Any, *more: Any) -> list[Broadcast]:
-        """Return all candidates in as few launches as an array allows; with ``keeps``, PEs keep all distances."""
-        n, most = own.shape[1], STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
-        held, tables = n if keeps else min(n, most), (mp1.put(sample, STEPPED), mp1.put(own))
+    def blocks(cls, mp1: Any, level: Any, keeps: bool, least: Any, chosen: Any) -> list[Broadcast]:
+        """Return the candidates in as few launches as an array allows; with ``keeps``, PEs keep all distances."""
+        n, most = level.own.shape[1], STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
+        held = n if keeps else min(n, most)
         distance = mp1.expression("float32", held + -held % STEPPED, shared=True)
-        choice, *plurals = more
-        return [cls(p, min(n - p, most), *tables, choice, distance, *plurals) for p in range(0, n, most)]
+        tables = (mp1.put(level.sample, STEPPED), mp1.put(level.own), level.choice)
+        return [cls(p, min(n - p, most), *tables, distance, least, chosen) for p in range(0, n, most)]
 
     @property
     def numbers(self) -> slice:

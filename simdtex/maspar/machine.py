@@ -162,8 +162,8 @@ class MP1:
     def expression(self, dtype: str = "int32", size: int = 1, shared: bool = False) -> Plural:
         """Return a plural without values, for the result of an expression; layers may share it one after another."""
         shape = (1 if shared else self.layers, self.array.size, size)
-        zeros = np.broadcast_to(np.zeros(1, dtype), shape)
-        return Plural(self, self.machine.empty(shape, dtype) if hasattr(self.machine, "empty") else self.put(zeros))
+        zeros, empty = np.broadcast_to(np.zeros(1, dtype), shape), getattr(self.machine, "empty", None)
+        return Plural(self, empty(shape, dtype) if empty else self.put(zeros))
 
     def reserve(self, size: int) -> None:
         """Take bytes of every PE's memory; raise ValueError if it does not suffice."""
@@ -220,12 +220,14 @@ class MP1:
         finally:
             self.mask = outer
 
-    def count(self, kind: str, number: int | list[int] = 1) -> None:
-        """Count a number of instructions of a kind for every layer, or one number for each."""
-        counts, total = self.mask.counts, self.counts[self._section, kind]
-        numbers = number[self.mask.over] if isinstance(number, list) else [number] * len(counts)
-        total.instructions += sum(numbers)
-        total.active += sum(map(mul, numbers, counts))
+    def count(self, **numbers: int | list[int]) -> None:
+        """Count numbers of instructions, by kind as in `COSTS`, for every layer, or one number for each."""
+        counts = self.mask.counts
+        for kind, number in numbers.items():
+            each = number[self.mask.over] if isinstance(number, list) else [number] * len(counts)
+            total = self.counts[self._section, kind]
+            total.instructions += sum(each)
+            total.active += sum(map(mul, each, counts))
 
     def execute(self, instruction: Callable[..., None], *args: Any, **defines: int | str) -> None:
         """Run a function of `simdtex.maspar.instructions` under the current mask, or its kernel on a device."""
@@ -247,8 +249,8 @@ class MP1:
         """Set a plural to an operation of the arithmetic unit, and return it."""
         kind, singular = a.data.dtype, not isinstance(b, Plural)
         real = kind.kind == "f"
-        self.count("float" if real and operation not in MOVES else "integer", kind.itemsize // 4)
-        self.count("broadcast", singular and operation not in ("copy", "bit", "lowest"))
+        cost = {"float" if real and operation not in MOVES else "integer": kind.itemsize // 4}
+        self.count(**cost, broadcast=int(singular and operation not in ("copy", "bit", "lowest")))
         number = kind.type(b if singular else 0)
         defines = {"T": TYPES[kind.name], "TO": TYPES[to.data.dtype.name]} | ({} if real else {"WHOLE": 1})
         code = [*OPERATIONS].index(operation)
@@ -263,7 +265,7 @@ class MP1:
         """
         kind, size = plural.data.dtype, plural.data.shape[-1]
         moves = self.array.moves(self.layout.grid, down * distance, right * distance)
-        self.count("x-net", [size * kind.itemsize // 4 * one for one in moves])
+        self.count(**{"x-net": [size * kind.itemsize // 4 * one for one in moves]})
         to = self.expression(kind.name, size)
         self.execute(instructions.xnet, to, plural[0], down, right, distance, T=TYPES[kind.name])
         return to
@@ -271,7 +273,7 @@ class MP1:
     def router(self, to: Plural, plural: Plural, row: Plural, col: Plural) -> None:
         """Set all words to those of the pixel in ``row`` and ``col`` of each PE, wherever that is."""
         kind = plural.data.dtype
-        self.count("router", plural.data.shape[-1] * kind.itemsize // 4)
+        self.count(router=plural.data.shape[-1] * kind.itemsize // 4)
         self.execute(instructions.xnet_router, to[0], plural[0], row, col, T=TYPES[kind.name])
 
     def sum(self, plural: Plural) -> int:
@@ -287,14 +289,14 @@ class MP1:
         return self.sum(plural != 0) > 0
 
     def _reduced(self, plural: Plural, least: bool) -> NDArray[np.int64]:
-        self.count("reduction")
+        self.count(reduction=1)
         part = self.expression("int64", shared=True)
         self.execute(instructions.xnet_reduce, part, plural, int(least), T=TYPES[plural.data.dtype.name])
         return np.asarray(self.machine.get(part.data) if self.machine else part.data)
 
     def random(self, place: Plural, key: Key, purpose: int) -> Plural:
         """Return 64 random bits of each PE, keyed by ``key``, the place of its pixel and the purpose."""
-        self.count("integer", PHILOX)
+        self.count(integer=PHILOX)
         bits = self.expression("uint64")
         self.execute(instructions.random, bits, place, key, np.uint32(purpose))
         return bits
@@ -302,8 +304,7 @@ class MP1:
     def table(self, to: Plural, entries: ArrayLike, index: Plural) -> None:
         """Set a plural to the entry ``index`` of a table, which the ACU broadcasts entry by entry."""
         held = np.asarray(entries, to.data.dtype)
-        self.count("broadcast", len(held))
-        self.count("integer", len(held))
+        self.count(broadcast=len(held), integer=len(held))
         self.execute(instructions.table, to, self.put(held), index, T=TYPES[held.dtype.name])
 
     def seconds(self) -> dict[str, dict[str, float]]:
