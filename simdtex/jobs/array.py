@@ -193,7 +193,7 @@ def _run(
             f'{memory}; give more memory, pixel="source" or relaxation="gibbs"'
         )
     n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
-    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 128)) + 4 * STEPPED * AT_ONCE
+    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 160)) + 4 * STEPPED * AT_ONCE
     remedy = 'give a smaller array or sample, or memory="16K"'
     require(machine, array.size * held + 4 * terms * n, 4 * terms * n, remedy)
     program, steps, stages = Program(mp1, problem(run)), [], []

@@ -32,9 +32,6 @@ TYPES = {"int32": "int", "float32": "float", "uint64": "ulong"}
 LAYOUT = np.dtype([(name, np.int32) for name in ("rows", "cols", "high", "wide", "blocks", "begin", "end")], align=True)
 """The struct ``Layout`` of kernels/maspar/layout.h."""
 
-MOVES = ("copy", "put")
-"""The operations that take as long for a float as for an integer."""
-
 
 @dataclass
 class Count:
@@ -249,7 +246,7 @@ class MP1:
         """Set a plural to an operation of the arithmetic unit, and return it."""
         kind, singular = a.data.dtype, not isinstance(b, Plural)
         real = kind.kind == "f"
-        cost = {"float" if real and operation not in MOVES else "integer": kind.itemsize // 4}
+        cost = {"float" if real and operation not in ("copy", "put") else "integer": kind.itemsize // 4}
         self.count(**cost, broadcast=int(singular and operation not in ("copy", "bit", "lowest")))
         number = kind.type(b if singular else 0)
         defines = {"T": TYPES[kind.name], "TO": TYPES[to.data.dtype.name]} | ({} if real else {"WHOLE": 1})
