@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl, texture
-from hypothesis import given
-from hypothesis import strategies as st
 
 import simdtex
 from simdtex.maspar.accounting import Account
-from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
+from simdtex.maspar.array import ProcessorArray, parse_array
 from simdtex.maspar.costs import COSTS
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Choice, window
@@ -32,49 +30,31 @@ def test_hierarchical_by_hand():
     assert pe.tolist() == [0, 0, 1, 2, 0, 4, 6]
 
 
-@given(
-    st.tuples(st.integers(1, 9), st.integers(1, 9)),
-    st.tuples(st.integers(1, 20), st.integers(1, 20)),
-    st.sampled_from(MAPPINGS),
-)
-def test_every_pixel_has_a_place_of_its_own(pes, shape, mapping):
-    array, grid = ProcessorArray(*pes, mapping), Grid(*shape)
-    layer, pe = array.place(grid.sites(), grid)
-    high, wide = array.layers(grid)
-    assert pe.min() >= 0 and pe.max() < array.size
-    assert layer.min() >= 0 and layer.max() < high * wide
-    assert len(set(zip(layer.tolist(), pe.tolist(), strict=True))) == grid.plane
-
-
-@pytest.mark.parametrize("mapping", MAPPINGS)
-@pytest.mark.parametrize(("order", "shifts"), [(1, 4), (2, 8), (8, 24)])
-def test_shifts_of_a_picture_of_the_arrays_size(order, shifts, mapping):
-    """Each move of the walk brings all sites one more neighbour."""
-    assert ProcessorArray(8, 8, mapping).shifts(Grid(8, 8), neighbourhood_offsets(order)) == shifts
-
-
-def test_neighbours_of_a_coarser_level_are_farther():
+def test_shifts():
+    """The walk brings all sites a neighbour with each move, which is longer at a coarser level."""
     array, offsets = ProcessorArray(16, 16), neighbourhood_offsets(1)
     assert [array.shifts(Grid(16, 16, 2**n), offsets) for n in range(4)] == [4, 8, 16, 32]
-
-
-def test_shifts_of_blocks():
-    """Left and two moves to the right: in blocks of 2 x 2 pixels, half of the words stay on their PE."""
-    offsets = np.array([[0, -1], [0, 1]], np.int32)
+    offsets = np.array([[0, -1], [0, 1]], np.int32)  # left, and two moves to the right
     assert ProcessorArray(4, 4).shifts(Grid(8, 8), offsets) == 3 * 4
-    assert ProcessorArray(4, 4, "hierarchical").shifts(Grid(8, 8), offsets) == 3 * 2
+    assert ProcessorArray(4, 4, "hierarchical").shifts(Grid(8, 8), offsets) == 3 * 2  # half of them stay on their PE
 
 
-@pytest.mark.parametrize("text", ["", "128", "0x4", "4x0", "4x4x4", "-4x4", "4.0x4", "maspar", "x", "128X128", " 4x4"])
-def test_texts_that_name_no_array(text):
-    with pytest.raises(ValueError, match="give rows x columns such as 128x128, or one of: maspar-mp1-1k"):
-        parse_array(text)
-
-
-def test_too_large_an_array():
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (
+            "|128|0x4|4x0|4x4x4|-4x4|4.0x4|maspar|x|128X128| 4x4",
+            "give rows x columns such as 128x128, or one of: maspar",
+        ),
+        ("2048x2049|4096x4096", "is beyond 4194304; give a smaller one, say 128x128"),
+        ("4x4:round-robin|4x4:", "choose one of: cut-and-stack, hierarchical"),
+    ],
+)
+def test_texts_that_name_no_array(texts, message):
+    for text in texts.split("|"):
+        with pytest.raises(ValueError, match=message):
+            parse_array(text)
     assert parse_array("2048x2048").size == 2**22
-    with pytest.raises(ValueError, match="give a smaller one, say 128x128"):
-        parse_array("2048x2049")
 
 
 @pytest.mark.parametrize("name", ["4x8", "maspar-mp1-1k"])
@@ -86,12 +66,6 @@ def test_a_text_may_name_the_mapping(name):
     ]
     assert parse_array(name + ":hierarchical").size == parse_array(name).size
     assert parse_array("1k:hierarchical") == parse_array("maspar-mp1-1k:hierarchical")
-
-
-@pytest.mark.parametrize("text", ["4x4:round-robin", "4x4:"])
-def test_an_unknown_mapping(text):
-    with pytest.raises(ValueError, match="choose one of: cut-and-stack, hierarchical"):
-        parse_array(text)
 
 
 def account(array, grid, steps, order=1, candidates=10):

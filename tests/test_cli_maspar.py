@@ -35,22 +35,10 @@ def test_the_command_writes_what_synth_writes_and_prints_the_times_of_1998(tmp_p
 def test_the_page_has_the_seconds_the_active_pes_and_a_film(tmp_path, monkeypatch):
     monkeypatch.setattr(report, "FRAMES", 3)
     write(tmp_path / "sample.png", texture((14, 13)))
-    words = [
-        "maspar",
-        "sample.png",
-        "-o",
-        "out.png",
-        "--order",
-        "2",
-        "--seed",
-        "3",
-        "--size",
-        "12x10",
-        "--array",
-        "8x8",
-    ]
+    words = ["maspar", "sample.png", "-o", "out.png", "--order", "2", "--seed", "3", "--size", "12x10"]
+    more = ["--array", "8x8", "--report", "page", "--film", "coloring,raster", "--device", "reference"]
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, [*words, "--report", "page", "--film", "coloring,raster", "--device", "reference"])
+    done = CliRunner().invoke(main, words + more)
     assert done.exit_code == 0, done.output
     page = (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
     for word in ("simdtex maspar sample.png", "8x8 PEs (cut-and-stack, 4 virtual layers)", "idle PEs", "film"):

@@ -1,23 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// An instruction of the PEs' arithmetic unit: word w of c becomes an operation of a word of a and a word of b, or of a word
-// of a and a number that the ACU broadcasts (b_size 0). PEs outside the mask change nothing.
-//
-// A variable has c_size words of each PE and layer, mask (layers, PEs) is 1 where a PE is active. The operations have the
-// numbers of simdtex.maspar.instructions.OPERATIONS.
+// An instruction of the PEs' arithmetic unit: word c becomes an operation of words a and b, or of a and a number that
+// the ACU broadcasts. The operations have the numbers of simdtex.maspar.instructions.OPERATIONS.
 #pragma OPENCL FP_CONTRACT OFF
 #include "maspar/layout.h"
 
-__kernel void maspar_alu(const Layout g, __global const uchar *restrict mask, const int operation, __global TO *c,
-                         const int c_size, const int c_word, __global const T *a, const int a_size, const int a_word,
-                         __global const T *b, const int b_size, const int b_word, const T number)
+__kernel void maspar_alu(ARRAY, const int operation, PLURAL(TO, c), PLURAL(const T, a), PLURAL(const T, b),
+                         const int singular, const T number)
 {
-    const int pe = get_global_id(0);
-    if (pe >= PES(g))
-        return;
-    for (int k = pe; k < LAYERS(g) * PES(g); k += PES(g)) {
-        if (!mask[k])
-            continue;
-        const T x = a[k * a_size + a_word], y = b_size ? b[k * b_size + b_word] : number;
+    WHERE_ACTIVE(pe, k) {
+        const T x = OF(a, k), y = singular ? number : OF(b, k);
         TO z = (TO)x;
         switch (operation) {
         case 1: z = (TO)(x + y); break;
@@ -41,6 +32,6 @@ __kernel void maspar_alu(const Layout g, __global const uchar *restrict mask, co
         case 18: z = (TO)mul_hi(x, y); break; // x as a fraction of y
 #endif
         }
-        c[k * c_size + c_word] = z;
+        OF(c, k) = z;
     }
 }

@@ -1,18 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The places of a picture's pixels on a processor array: each PE holds one pixel in each virtual layer. A kernel has one
-// work-item for each PE, which loops over the layers from `first` to `last` - 1 where it has these arguments.
+// All kernels of the processor array have one work-item for each PE. A PE holds one pixel in each virtual layer; mask
+// (layers, PEs) is 1 where it is active. PEs outside the mask change nothing.
 #ifndef SIMDTEX_LAYOUT_H
 #define SIMDTEX_LAYOUT_H
 
-// simdtex.maspar.instructions.LAYOUT is the same.
+// simdtex.maspar.machine.LAYOUT is the same.
 typedef struct {
     int rows, cols; // PEs
     int high, wide; // virtual layers by rows and by columns
     int blocks;     // whether the mapping is hierarchical: blocks of high x wide pixels on each PE
+    int begin, end; // the layers that execute the instruction, up to `end` - 1
 } Layout;
 
 #define PES(g) ((g).rows * (g).cols)
-#define LAYERS(g) ((g).high * (g).wide)
+
+// The first arguments of every kernel; then plural variables (layers, PEs, size), and tables of the ACU (..., size).
+#define ARRAY const Layout g, __global const uchar *restrict mask
+#define PLURAL(TYPE, x) __global TYPE *x, const int x##_size, const int x##_word
+#define TABLE(TYPE, x) __global const TYPE *restrict x, const int x##_size
+
+// Executes a statement for PE `pe` in one layer after another, wherever it is active; its address in a variable is `k`.
+#define WHERE_ACTIVE(pe, k)                                                                                    \
+    for (int pe = get_global_id(0), k = g.begin * PES(g) + pe; pe < PES(g) && k < g.end * PES(g); k += PES(g)) \
+        if (mask[k])
+
+#define OF(x, k) x[(size_t)(k) * x##_size + x##_word]
 
 // Row and column of the pixel in a layer of a PE, in the picture padded to whole layers.
 inline int2 pixel_of(const Layout g, const int layer, const int pe)

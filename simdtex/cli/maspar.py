@@ -12,6 +12,7 @@ from simdtex.cli.inputs import channels, output_shape, read_material
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import SEED, given, option, output_option, paper_options, report_option, size_option
 from simdtex.cli.places import READ, WRITE
+from simdtex.maspar import EXECUTED
 
 
 @job(
@@ -45,7 +46,7 @@ from simdtex.cli.places import READ, WRITE
     words=("16K", "64K"),
     help="Give each PE this memory; where it does not hold all distances, they are computed three times.",
 )
-@paper_options("order", "levels", "boundary", "relaxation", "pixel")
+@paper_options(*EXECUTED)
 @option(
     "--film",
     default="coloring,checkerboard,synchronous,raster",

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from math import sqrt
-from typing import Any, Literal, overload
+from math import prod, sqrt
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,10 @@ from simdtex.driver import check_shape, execute
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar.algorithm import AT_ONCE, Level, Problem, Program, Step
+from simdtex.maspar import EXECUTED
+from simdtex.maspar.algorithm import Level, Problem, Program
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
-from simdtex.maspar.instructions import STEPPED
+from simdtex.maspar.instructions import AT_ONCE, STEPPED
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
 from simdtex.methods.mrf.input import Input
@@ -31,8 +32,19 @@ from simdtex.run import Callback, Output, Progress, Stage
 MEMORY = {"16K": 2**14, "64K": 2**16}
 """The bytes of a PE's memory, in the two sizes that were sold."""
 
-EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel")
-"""The options that the program executes; all others have the paper's values."""
+
+class Step(NamedTuple):
+    """A step of the program: its level and sweep, and a mask of the PEs that relaxed sites, packed into bits."""
+
+    level: int
+    sweep: int
+    packed: NDArray[np.uint8]
+    shape: tuple[int, int, int]
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """The mask, (layers, rows, cols) of PEs."""
+        return np.unpackbits(self.packed, count=prod(self.shape)).reshape(self.shape).astype(bool)
 
 
 @dataclass(frozen=True, repr=False)
@@ -181,7 +193,7 @@ def _run(
             f'{memory}; give more memory, pixel="source" or relaxation="gibbs"'
         )
     n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
-    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 128)) + 4 * STEPPED * AT_ONCE
+    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 160)) + 4 * STEPPED * AT_ONCE
     remedy = 'give a smaller array or sample, or memory="16K"'
     require(machine, array.size * held + 4 * terms * n, 4 * terms * n, remedy)
     program, steps, stages = Program(mp1, problem(run)), [], []
@@ -199,9 +211,9 @@ def _run(
 
     follow = _progress(run, callback, lambda k: run.grid(k).view(values(program.state)[-1]), picture)
     for number in reversed(range(run.levels)):
-        for step in program.relax(level_of(run, number)):
-            steps.append(step)
-            follow(step)
+        for sweep, active in program.relax(level_of(run, number)):
+            steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
+            follow(steps[-1])
         stages.append(Stage(number, picture(number)))
     counts: dict[str, dict[str, Count]] = {}
     for (section, kind), count in mp1.counts.items():

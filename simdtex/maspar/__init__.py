@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
+EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel")
+"""The options that `synthesize` executes; all others have the paper's values."""
+
 
 def __getattr__(name: str) -> Any:
     if name == "synthesize":  # checks its input as other jobs do, and so is one of them

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 
 import numpy as np
@@ -96,6 +97,31 @@ class ProcessorArray:
         """Return the X-Net shifts that bring the sites of all layers one word from every neighbour, along a `path`."""
         s = grid.spacing
         return sum(sum(self.moves(grid, down * s, right * s)) for down, right, _ in path(offsets))
+
+
+class Layout:
+    """The places of the pixels of a picture (rows, cols) on an array.
+
+    ``padded`` is the picture padded to whole layers, ``pixel`` (layers, PEs, 2) are row and column of each PE's pixel
+    in it, and ``address`` (rows, cols) is layer * PEs + PE.
+    """
+
+    def __init__(self, array: ProcessorArray, shape: tuple[int, int]) -> None:
+        self.array, self.grid = array, Grid.of(shape)
+        self.high, self.wide = array.layers(self.grid)
+        self.padded = Grid(array.rows * self.high, array.cols * self.wide)
+
+    @cached_property
+    def address(self) -> NDArray[np.int64]:
+        """The address of each pixel."""
+        layer, pe = self.array.place(self.padded.sites(), self.padded)
+        return (layer * self.array.size + pe).reshape(self.padded.shape)
+
+    @cached_property
+    def pixel(self) -> NDArray[np.int64]:
+        """The pixel at each address."""
+        place = np.argsort(self.address, axis=None)
+        return np.stack(np.divmod(place, self.padded.width), 1).reshape(-1, self.array.size, 2)
 
 
 def path(offsets: NDArray[np.int32]) -> list[tuple[int, int, int | None]]:

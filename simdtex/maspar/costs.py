@@ -11,7 +11,8 @@ FULL = 16384
 CLOCK = 80e-9
 """Seconds of a clock; sources give 80 to 83 ns."""
 
-PUBLISHED = "Blank 1990, Nickolls 1990, netlib report on array processors"
+PUBLISHED = "published figures: Blank 1990, Nickolls 1990, netlib report on array processors"
+"""Which of the three gives which figure is not verified."""
 
 WORD = 4
 """Bytes of a word."""
@@ -22,11 +23,6 @@ class Cost(NamedTuple):
 
     seconds: float
     source: str
-
-    @property
-    def clocks(self) -> float:
-        """The same in clocks."""
-        return self.seconds / CLOCK
 
 
 COSTS = {

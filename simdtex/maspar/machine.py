@@ -8,21 +8,29 @@ singular, and an instruction that uses one broadcasts it. PEs outside the activi
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partialmethod
+from functools import cached_property, partialmethod
+from math import gcd
 from operator import mul
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.machine.interface import Array, Machine, Operation
+from simdtex.machine.interface import Array, Launcher, Machine
 from simdtex.maspar import instructions
-from simdtex.maspar.array import ProcessorArray
+from simdtex.maspar.array import Layout, ProcessorArray
 from simdtex.maspar.costs import COSTS, PHILOX
+from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, Broadcast, On
 from simdtex.ops.lcpdf import Key
+
+TYPES = {"int32": "int", "float32": "float", "uint64": "ulong"}
+"""The types of variables, and their names in kernels."""
+
+LAYOUT = np.dtype([(name, np.int32) for name in ("rows", "cols", "high", "wide", "blocks", "begin", "end")], align=True)
+"""The struct ``Layout`` of kernels/maspar/layout.h."""
 
 
 @dataclass
@@ -34,23 +42,33 @@ class Count:
 
 
 class Mask:
-    """The PEs that are active: ``active`` (layers, PEs) here, ``plane`` on the machine, ``counts`` in each layer."""
+    """The PEs that are active, (layers, PEs): ``active`` here, ``plane`` on the machine.
 
-    def __init__(self, active: NDArray[np.bool_], plane: Array = None) -> None:
-        self.active, self.plane = active, plane
-        self.counts: list[int] = active.sum(1).tolist()
+    ``over`` are the layers that execute an instruction, all or a single one; ``counts`` are the active PEs in each.
+    """
+
+    def __init__(self, active: NDArray[np.bool_], plane: Array = None, over: slice | None = None) -> None:
+        self.active, self.plane, self.over = active, plane, over or slice(0, len(active))
+        self.counts: list[int] = active[self.over].sum(1).tolist()
 
     @property
-    def layers(self) -> list[int]:
+    def layers(self) -> list[Mask]:
         """The virtual layers that have active PEs."""
-        return [layer for layer, count in enumerate(self.counts) if count]
+        each = [slice(n, n + 1) for n in range(len(self.active))]
+        return [Mask(self.active, self.plane, one) for one, count in zip(each, self.counts, strict=True) if count]
+
+    @cached_property
+    def at(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Layers and numbers of the active PEs."""
+        layer, pe = np.nonzero(self.active[self.over])
+        return layer + self.over.start, pe
 
 
 class Plural:
     """A variable with words of one type for each PE and layer; ``[k]`` is its k-th word.
 
-    Operators return expressions, which all active PEs compute from first words. Expressions are in registers, take no
-    memory, and have no value in inactive PEs.
+    Operators return expressions, which all active PEs compute from first words. Expressions take no memory, and have no
+    value in inactive PEs.
     """
 
     def __init__(self, mp1: MP1, data: Array, word: int = 0) -> None:
@@ -69,7 +87,7 @@ class Plural:
         return self.mp1.alu("copy", self.mp1.expression(dtype), self)
 
     def _with(self, operation: str, other: Plural | float = 0) -> Plural:
-        dtype = "int32" if operation in instructions.COMPARISONS else self.data.dtype.name
+        dtype = "int32" if operation in COMPARISONS else self.data.dtype.name
         return self.mp1.alu(operation, self.mp1.expression(dtype), self, other)
 
     __add__ = partialmethod(_with, "add")
@@ -119,8 +137,8 @@ class MP1:
         self, machine: Machine | None, array: ProcessorArray, shape: tuple[int, int], memory: float = 2**16
     ) -> None:
         self.machine, self.array, self.shape, self.memory = machine, array, shape, memory
-        self.layout = instructions.Layout(array, shape)
-        self.layers, self.used, self._section = self.layout.layers, 0, ""
+        self.layout = Layout(array, shape)
+        self.layers, self.used, self._section = self.layout.high * self.layout.wide, 0, ""
         self.counts: dict[tuple[str, str], Count] = defaultdict(Count)
         self.everywhere = self.mask = self._mask(np.broadcast_to(True, (self.layers, array.size)))
         self.row, self.col = self.plural(), self.plural()
@@ -129,19 +147,20 @@ class MP1:
             self.mask = self._mask(np.all(pixel < np.array(shape), -1))
             self.row.data, self.col.data = (machine.put(pixel[..., [axis]].astype(np.int32)) for axis in (0, 1))
 
-    def put(self, values: NDArray[Any]) -> Array:
-        """Return a table of the ACU, from which it broadcasts, on the machine."""
-        return self.machine.put(values) if self.machine else values
-
-    def _mask(self, active: NDArray[np.bool_]) -> Mask:
-        return Mask(active, self.machine and self.machine.put(active.astype(np.uint8)))
-
-    def expression(self, dtype: str = "int32", shape: tuple[int, ...] | None = None) -> Plural:
-        """Return a plural without values, for the result of an expression."""
-        shape = shape or (self.layers, self.array.size, 1)
+    def put(self, values: NDArray[Any], whole: int = 1) -> Array:
+        """Return a table of the ACU on the machine, with zeros up to a multiple of ``whole`` entries."""
         if not self.machine:
-            return Plural(self, np.broadcast_to(np.zeros(1, dtype), shape))
-        return Plural(self, instructions.register(self.machine, shape, dtype))
+            return values
+        return self.machine.put(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, -values.shape[-1] % whole)]))
+
+    def _mask(self, active: NDArray[np.bool_], over: slice | None = None) -> Mask:
+        return Mask(active, self.machine and self.machine.put(active.astype(np.uint8)), over)
+
+    def expression(self, dtype: str = "int32", size: int = 1, shared: bool = False) -> Plural:
+        """Return a plural without values, for the result of an expression; layers may share it one after another."""
+        shape = (1 if shared else self.layers, self.array.size, size)
+        zeros, empty = np.broadcast_to(np.zeros(1, dtype), shape), getattr(self.machine, "empty", None)
+        return Plural(self, empty(shape, dtype) if empty else self.put(zeros))
 
     def reserve(self, size: int) -> None:
         """Take bytes of every PE's memory; raise ValueError if it does not suffice."""
@@ -156,11 +175,15 @@ class MP1:
         """Return whether ``size`` more bytes fit the memory of a PE."""
         return self.used + size <= self.memory
 
-    def plural(self, dtype: str = "int32", size: int = 1) -> Plural:
-        """Return a plural variable of ``size`` words in the memory of every PE, 0 at first."""
-        self.reserve(np.dtype(dtype).itemsize * size * self.layers)
-        shape = (self.layers, self.array.size, size)
-        return Plural(self, self.machine.put(np.zeros(shape, dtype))) if self.machine else self.expression(dtype, shape)
+    def plural(self, dtype: str = "int32", size: int = 1, shared: bool = False) -> Plural:
+        """Return a plural variable of ``size`` words in the memory of every PE, 0 at first.
+
+        With ``shared``, one layer after another uses the same words.
+        """
+        made = self.expression(dtype, size, shared)
+        self.reserve(np.dtype(dtype).itemsize * size * made.data.shape[0])
+        made.data = self.put(np.broadcast_to(np.zeros(1, dtype), made.data.shape))
+        return made
 
     @contextmanager
     def frame(self) -> Iterator[None]:
@@ -187,34 +210,48 @@ class MP1:
         if isinstance(condition, Mask):
             self.mask = condition
         elif self.machine:
-            self.mask = self._mask((self.machine.get(condition.data)[..., condition.word] != 0) & outer.active)
+            holds = self.machine.get(condition.data)[..., condition.word] != 0
+            self.mask = self._mask(holds & outer.active, outer.over)
         try:
             yield self.mask
         finally:
             self.mask = outer
 
-    def count(self, kind: str, number: int | list[int] = 1, layer: int | None = None) -> None:
-        """Count a number of instructions of a kind in a layer, or in each of all layers."""
-        counts = self.mask.counts if layer is None else [self.mask.counts[layer]]
-        numbers = number if isinstance(number, list) else [number] * len(counts)
-        total = self.counts[self._section, kind]
-        total.instructions += sum(numbers)
-        total.active += sum(map(mul, numbers, counts))
+    def count(self, **numbers: int | list[int]) -> None:
+        """Count numbers of instructions, by kind as in `COSTS`, for every layer, or one number for each."""
+        counts = self.mask.counts
+        for kind, number in numbers.items():
+            each = number[self.mask.over] if isinstance(number, list) else [number] * len(counts)
+            total = self.counts[self._section, kind]
+            total.instructions += sum(each)
+            total.active += sum(map(mul, each, counts))
 
-    def execute(self, operation: Operation[..., Any], *args: Any) -> Any:
-        """Run an instruction on the device, if there is one, under the current mask."""
-        on = instructions.On(self.layout, self.mask.plane)
-        return operation(self.machine, on, *args) if self.machine else None
+    def execute(self, instruction: Callable[..., None], *args: Any, **defines: int | str) -> None:
+        """Run a function of `simdtex.maspar.instructions` under the current mask, or its kernel on a device."""
+        if not self.machine:
+            return
+        with self.machine.running() as launcher:
+            if launcher is None:
+                instruction(On(self.layout, self.mask.at), *map(_viewed, args))
+                return
+            rows, cols, blocks = self.array.rows, self.array.cols, self.array.mapping == "hierarchical"
+            high, wide, over = self.layout.high, self.layout.wide, self.mask.over
+            struct = np.array((rows, cols, high, wide, blocks, over.start, over.stop), LAYOUT)[()]
+            given = [part for arg in args for part in _expanded(launcher, arg)]
+            defines |= {"V": launcher.vector} if "C" in defines else {}
+            name, group = f"maspar_{instruction.__name__}", (gcd(self.array.size, 64),)
+            launcher.launch(name, (self.array.size,), struct, self.mask.plane, *given, local=group, defines=defines)
 
     def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float = 0) -> Plural:
         """Set a plural to an operation of the arithmetic unit, and return it."""
-        self.count("float" if a.data.dtype.kind == "f" else "integer", a.data.dtype.itemsize // 4)
-        if isinstance(b, Plural):
-            other, number = (b.data, b.word), 0.0
-        else:
-            other, number = None, b
-            self.count("broadcast", operation not in ("copy", "bit", "lowest"))
-        self.execute(instructions.alu, operation, (to.data, to.word), (a.data, a.word), other, number)
+        kind, singular = a.data.dtype, not isinstance(b, Plural)
+        real = kind.kind == "f"
+        cost = {"float" if real and operation not in ("copy", "put") else "integer": kind.itemsize // 4}
+        self.count(**cost, broadcast=int(singular and operation not in ("copy", "bit", "lowest")))
+        number = kind.type(b if singular else 0)
+        defines = {"T": TYPES[kind.name], "TO": TYPES[to.data.dtype.name]} | ({} if real else {"WHOLE": 1})
+        code = [*OPERATIONS].index(operation)
+        self.execute(instructions.alu, code, to, a, a if singular else b, int(singular), number, **defines)
         return to
 
     def xnet(self, plural: Plural, down: int, right: int, distance: int = 1) -> Plural:
@@ -223,16 +260,18 @@ class MP1:
         The last row and column of the picture, padded to whole layers, are next to its first. Words move one PE at a
         time, if they leave the PE.
         """
+        kind, size = plural.data.dtype, plural.data.shape[-1]
         moves = self.array.moves(self.layout.grid, down * distance, right * distance)
-        self.count("x-net", [instructions.words(plural.data) * one for one in moves])
-        to = self.expression(plural.data.dtype.name, plural.data.shape)
-        self.execute(instructions.xnet, to.data, plural.data, (down, right), distance)
+        self.count(**{"x-net": [size * kind.itemsize // 4 * one for one in moves]})
+        to = self.expression(kind.name, size)
+        self.execute(instructions.xnet, to, plural[0], down, right, distance, T=TYPES[kind.name])
         return to
 
     def router(self, to: Plural, plural: Plural, row: Plural, col: Plural) -> None:
         """Set all words to those of the pixel in ``row`` and ``col`` of each PE, wherever that is."""
-        self.count("router", instructions.words(plural.data))
-        self.execute(instructions.router, to.data, plural.data, row.data, col.data)
+        kind = plural.data.dtype
+        self.count(router=plural.data.shape[-1] * kind.itemsize // 4)
+        self.execute(instructions.xnet_router, to[0], plural[0], row, col, T=TYPES[kind.name])
 
     def sum(self, plural: Plural) -> int:
         """Return the sum of an int32 word over all active PEs, to the ACU."""
@@ -247,23 +286,23 @@ class MP1:
         return self.sum(plural != 0) > 0
 
     def _reduced(self, plural: Plural, least: bool) -> NDArray[np.int64]:
-        self.count("reduction")
-        part = self.execute(instructions.reduction, (plural.data, plural.word), least)
-        return np.asarray(self.machine.get(part)) if self.machine else np.zeros(1, np.int64)
+        self.count(reduction=1)
+        part = self.expression("int64", shared=True)
+        self.execute(instructions.xnet_reduce, part, plural, int(least), T=TYPES[plural.data.dtype.name])
+        return np.asarray(self.machine.get(part.data) if self.machine else part.data)
 
     def random(self, place: Plural, key: Key, purpose: int) -> Plural:
         """Return 64 random bits of each PE, keyed by ``key``, the place of its pixel and the purpose."""
-        self.count("integer", PHILOX)
+        self.count(integer=PHILOX)
         bits = self.expression("uint64")
-        self.execute(instructions.random_bits, bits.data, place.data, key, purpose)
+        self.execute(instructions.random, bits, place, key, np.uint32(purpose))
         return bits
 
     def table(self, to: Plural, entries: ArrayLike, index: Plural) -> None:
         """Set a plural to the entry ``index`` of a table, which the ACU broadcasts entry by entry."""
         held = np.asarray(entries, to.data.dtype)
-        self.count("broadcast", len(held))
-        self.count("integer", len(held))
-        self.execute(instructions.table, (to.data, to.word), self.put(held), index.data)
+        self.count(broadcast=len(held), integer=len(held))
+        self.execute(instructions.table, to, self.put(held), index, T=TYPES[held.dtype.name])
 
     def seconds(self) -> dict[str, dict[str, float]]:
         """Return the modelled seconds of a MasPar MP-1 by section of the program and kind of instruction."""
@@ -271,3 +310,23 @@ class MP1:
         for (section, kind), count in self.counts.items():
             found.setdefault(section, {})[kind] = count.instructions * COSTS[kind].seconds
         return found
+
+
+def _viewed(arg: Any) -> Any:
+    """Return an argument of an instruction in NumPy."""
+    if isinstance(arg, Broadcast):
+        return Broadcast(*map(_viewed, arg))
+    return arg.data[..., arg.word :] if isinstance(arg, Plural) else arg
+
+
+def _expanded(launcher: Launcher, arg: Any) -> list[Any]:
+    """Return the arguments of a kernel for one of an instruction, as in kernels/maspar."""
+    if isinstance(arg, Plural):
+        return [arg.data, arg.data.shape[-1], arg.word]
+    if isinstance(arg, Key):
+        return [np.uint64(arg.seed), np.uint32(arg.level), np.uint32(arg.turn)]
+    if isinstance(arg, tuple):
+        return [part for each in arg for part in _expanded(launcher, each)]
+    if isinstance(arg, np.ndarray):
+        arg = launcher.constant(arg)
+    return [arg, arg.shape[-1]] if getattr(arg, "shape", ()) else [arg]
