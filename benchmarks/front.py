@@ -93,9 +93,7 @@ def front(machine, side=SIDE):
     lower = {
         "a photograph": photo,
         "the right mast removed": simdtex.fill(photo, hole, **options),
-        "a normal map, arranged like the wood": apply_source_map(
-            made[0][1].source, normals(given["wood"].mean(axis=2))
-        ),
+        "a normal map, arranged like the wood": apply_source_map(made[0][1].source, relief),
     }
     for number, (label, picture) in enumerate(lower.items()):
         parts += [(number * wide, below, label), (number * wide, below + line, picture)]
