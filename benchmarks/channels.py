@@ -7,26 +7,14 @@ Writes an image for each seed, side by side. All arithmetic is in whole numbers,
 on a pixel.
 """
 
-from __future__ import annotations
-
-import argparse
-from collections.abc import Iterable, Iterator
 from itertools import count
-from pathlib import Path
-from typing import Any
 
+import common
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from simdtex.io.image import write
+from simdtex.io import image
 from simdtex.random import as_seed, philox
-
-HERE = Path(__file__).resolve().parent
-
-Pixels = NDArray[np.uint8]
-Path = NDArray[np.int64]
-"""(n, 3): row and column in fixed point, and heading."""
 
 LEAST = 32  # pixels of a side
 SHARE = 0.3  # of the channels
@@ -56,37 +44,16 @@ SETTLE = 120  # steps that a swing takes to forget its start
 POOL = 1024  # random numbers drawn at once
 
 
-def channels(shape: tuple[int, int], rng: Any = None) -> Pixels:
-    """Make a training image of sinuous channels that run from left to right.
+def channels(shape, rng=None):
+    """Make an image (rows, cols) uint8 of channels, 1, that run from left to right: about 8 pixels wide, 0.3 of it.
 
-    Channels are about 8 pixels wide and cover about 0.3 of the image, less exactly in small ones. They meander, cross,
-    part and meet again, and a few end inside: mostly 6 to 10 dead ends in 250 x 250 pixels.
-
-    Parameters
-    ----------
-    shape : (rows, cols)
-        Pixels, at least 32 each.
-    rng : None, int or numpy.random.Generator
-        The seed: the same integer gives the same bytes on every platform.
-
-    Returns
-    -------
-    ndarray of uint8, (rows, cols)
-        1 in channels, 0 elsewhere.
-
-    Raises
-    ------
-    ValueError
-        A side is too short.
-
-    Notes
-    -----
-    About 0.4 s for 250 x 250 pixels.
+    They meander, cross, part and meet again, and a few end inside: mostly 6 to 10 dead ends in 250 x 250 pixels. The
+    same seed gives the same bytes on every platform. About 0.4 s for 250 x 250 pixels.
     """
     rows, cols = shape
     if min(rows, cols) < LEAST:
         raise ValueError(f"the shape is {rows} x {cols} pixels: give at least {LEAST} x {LEAST}")
-    scene = _Scene((rows, cols), as_seed(rng))
+    scene = Scene((rows, cols), as_seed(rng))
     wanted = int(SHARE * rows * cols)
     while scene.pixels.sum() < wanted // 2:
         scene.add_main()
@@ -96,38 +63,37 @@ def channels(shape: tuple[int, int], rng: Any = None) -> Pixels:
         if len(scene.tips) == ends or scene.pixels.sum() >= wanted:
             break
         scene.add_end()
-    tries = 0
-    while scene.pixels.sum() < wanted:
-        if tries < PATIENCE:
+    for tried in count():
+        if scene.pixels.sum() >= wanted:
+            return scene.pixels
+        if tried < PATIENCE:
             scene.add_branch()
         else:  # no branch has room any more
             scene.add_main()
-        tries += 1
-    return scene.pixels
 
 
-class _Scene:
-    """The image so far: pixels, courses, free ends and joints of the channels, and the distance from any channel."""
+class Scene:
+    """The image so far: pixels, courses, free ends and joints of the channels, and the distance from any channel.
 
-    def __init__(self, shape: tuple[int, int], seed: int) -> None:
-        self.pixels = np.zeros(shape, np.uint8)
-        self.room = np.full(shape, FAR)
-        self.paths: list[Path] = []
-        self.tips: list[Path] = []
-        self.joints: list[Path] = []
-        self.words = _words(seed)
+    A course is (n, 3): row and column in fixed point, and heading.
+    """
 
-    def below(self, limit: int) -> int:
+    def __init__(self, shape, seed):
+        self.pixels, self.room = np.zeros(shape, np.uint8), np.full(shape, FAR)
+        self.paths, self.tips, self.joints = [], [], []
+        self.words = words(seed)
+
+    def below(self, limit):
         """Draw a number from 0 to limit - 1."""
         return next(self.words) * limit >> 32
 
-    def turned(self, last: int, now: int) -> int:
+    def turned(self, last, now):
         """Return the heading after two others, at random."""
         push = self.below(2 * PUSH - 1) - (PUSH - 1)
         heading = (AFTER * now - BEFORE * last >> 16) + push * FINE
         return max(-STEEPEST * FINE, min(STEEPEST * FINE, heading))
 
-    def walk(self, start: tuple[int, int], swing: tuple[int, int], steps: int, towards: int) -> Path:
+    def walk(self, start, swing, steps, towards):
         """Draw a course of so many steps of a pixel, to the right (1) or to the left (-1)."""
         (last, now), (row, col) = swing, (place * PIXEL for place in start)
         path = []
@@ -139,7 +105,7 @@ class _Scene:
             last, now = now, self.turned(last, now)
         return np.array(path, dtype=np.int64)
 
-    def add_main(self) -> None:
+    def add_main(self):
         """Add a channel across the whole picture, where it has most room."""
         rows, cols = self.pixels.shape
         found = []
@@ -149,75 +115,70 @@ class _Scene:
             for _ in range(SETTLE):
                 last, now = now, self.turned(last, now)
             found.append(self.walk(start, (last, now), 2 * cols + 2 * OUTSIDE, 1))
-        clear = [path for path in found if _is_far(path, self.tips, CLEAR + WIDTH)]
+        clear = [path for path in found if is_far(path, self.tips, CLEAR + WIDTH)]
         self.draw(max(clear or found, key=self.mean_room))
 
-    def add_branch(self) -> None:
+    def add_branch(self):
         """Add a channel that leaves another and goes on until it meets one, or out of the picture."""
         ways = []
         for _ in range(TRIES):
             path = self.leaving(1, 2 * self.pixels.shape[1])
             if path is None:
                 continue
-            met = np.flatnonzero(_values_at(self.pixels, path)[LEAVING:])
+            met = np.flatnonzero(values_at(self.pixels, path)[LEAVING:])
             way = path if len(met) == 0 else path[: LEAVING + int(met[0]) + MEETING]
-            if _is_far(way, self.tips, CLEAR + WIDTH) and _is_far(way[-1:], self.joints, APART):
+            if is_far(way, self.tips, CLEAR + WIDTH) and is_far(way[-1:], self.joints, APART):
                 ways.append(way)
         if ways:
             way = max(ways, key=lambda way: self.mean_room(way[LEAVING // 2 :]))
             self.draw(way)
             self.joints += [way[0, :2], way[-1, :2]]
 
-    def add_end(self) -> None:
+    def add_end(self):
         """Add a channel that leaves another and ends inside, or begins inside and meets another, if there is room."""
         path = self.leaving(1 if self.below(2) else -1, LEAVING + 10 + self.below(60))
         if path is None:
             return
         tip, shape = path[-1, :2] // PIXEL, np.array(self.pixels.shape)
-        if not _inside(path, self.pixels).all() or (tip < 2 * CLEAR).any() or (tip >= shape - 2 * CLEAR).any():
+        if not inside(path, self.pixels).all() or (tip < 2 * CLEAR).any() or (tip >= shape - 2 * CLEAR).any():
             return
-        room = _values_at(self.room, path)[LEAVING:] - WIDTH // 2
-        if (room <= CLEAR // 2).any() or room[-1] <= CLEAR:
-            return
-        self.draw(path)
-        self.tips.append(path[-1, :2])
-        self.joints.append(path[0, :2])
+        room = values_at(self.room, path)[LEAVING:] - WIDTH // 2
+        if (room > CLEAR // 2).all() and room[-1] > CLEAR:
+            self.draw(path)
+            self.tips.append(path[-1, :2])
+            self.joints.append(path[0, :2])
 
-    def leaving(self, towards: int, steps: int) -> Path | None:
+    def leaving(self, towards, steps):
         """Draw a course that leaves some channel at an angle; None if it would do so near a joint or an end."""
         path = self.paths[self.below(len(self.paths))]
         start = path[(at := self.below(len(path))) : at + 1]
-        if not (_inside(start, self.pixels).all() and _is_far(start, self.joints + self.tips, APART)):
+        if not (inside(start, self.pixels).all() and is_far(start, self.joints + self.tips, APART)):
             return None
         row, col, heading = (int(part) for part in start[0])
         turn = (340 + self.below(300)) * (1 if self.below(2) else -1)
         swing = max(-STEEPEST, min(STEEPEST, heading * towards + turn)) * FINE
         return self.walk((row // PIXEL, col // PIXEL), (swing, swing), steps, towards)
 
-    def mean_room(self, path: Path) -> float:
+    def mean_room(self, path):
         """Return the mean distance of a course from other channels, where it is inside, pixels."""
-        inside = int(_inside(path, self.pixels).sum())
-        return int(_values_at(self.room, path).sum()) / max(FAR, inside)  # a course that soon leaves has little
+        own = int(inside(path, self.pixels).sum())
+        return int(values_at(self.room, path).sum()) / max(FAR, own)  # a course that soon leaves has little
 
-    def draw(self, path: Path) -> None:
+    def draw(self, path):
         """Draw a course in place, as discs of one width."""
         width = WIDTH - 1 + self.below(3)
-        reach = width // 2 + 1
-        offsets = np.arange(-reach, reach + 1)
+        around = np.stack(np.mgrid[tuple([slice(-(width // 2) - 1, width // 2 + 2)] * 2)], -1)
         centres = path[:, np.newaxis, np.newaxis, :2]
-        rows, cols = np.broadcast_arrays(
-            centres[..., 0] // PIXEL + offsets[:, np.newaxis], centres[..., 1] // PIXEL + offsets
-        )
+        places = centres // PIXEL + around
         # from the middles of pixels, in parts of a half pixel
-        apart = (rows * PIXEL + PIXEL // 2 - centres[..., 0]) ** 2 + (cols * PIXEL + PIXEL // 2 - centres[..., 1]) ** 2
-        height, across = self.pixels.shape
-        drawn = (4 * apart <= (width * PIXEL) ** 2) & (rows >= 0) & (rows < height) & (cols >= 0) & (cols < across)
-        self.pixels[rows[drawn], cols[drawn]] = 1
+        apart = ((places * PIXEL + PIXEL // 2 - centres) ** 2).sum(-1)
+        drawn = (4 * apart <= (width * PIXEL) ** 2) & ((places >= 0) & (places < self.pixels.shape)).all(-1)
+        self.pixels[tuple(places[drawn].T)] = 1
         self.paths.append(path)
         self.room = np.minimum(ndimage.distance_transform_edt(self.pixels == 0).astype(np.int64), FAR)
 
 
-def _words(seed: int) -> Iterator[int]:
+def words(seed):
     """Yield random numbers of 32 bits, by Philox."""
     counter = np.zeros((4, POOL), np.uint32)
     counter[0] = np.arange(POOL)
@@ -226,31 +187,27 @@ def _words(seed: int) -> Iterator[int]:
         yield from np.stack(philox(list(counter), (seed & 0xFFFFFFFF, seed >> 32)), axis=-1).ravel().tolist()
 
 
-def _inside(path: Path, picture: NDArray[Any]) -> NDArray[np.bool_]:
+def inside(path, picture):
     """Return which places of a course are inside of a picture."""
     places = path[:, :2] // PIXEL
-    return np.asarray(((places >= 0) & (places < np.array(picture.shape))).all(axis=1))
+    return ((places >= 0) & (places < picture.shape)).all(axis=1)
 
 
-def _values_at(picture: NDArray[Any], path: Path) -> NDArray[Any]:
+def values_at(picture, path):
     """Return the picture's values along a course, 0 outside."""
-    inside = _inside(path, picture)
-    row, col = np.where(inside[:, np.newaxis], path[:, :2] // PIXEL, 0).T
-    return np.asarray(picture[row, col] * inside)
+    there = inside(path, picture)
+    row, col = np.where(there[:, np.newaxis], path[:, :2] // PIXEL, 0).T
+    return picture[row, col] * there
 
 
-def _is_far(path: Path, places: Iterable[Path], apart: int) -> bool:
+def is_far(path, places, apart):
     """Return whether a course keeps so many pixels away from all of some places."""
-    return all(int(((path[:, :2] - place) ** 2).sum(axis=1).min()) > (apart * PIXEL) ** 2 for place in places)
+    return all(((path[:, :2] - place) ** 2).sum(axis=1).min() > (apart * PIXEL) ** 2 for place in places)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--shape", type=int, nargs=2, default=(256, 256))
-    parser.add_argument("--seed", type=int, nargs="+", default=(1, 7))
-    parser.add_argument("--out", type=Path, default=HERE.parent / "simdtex" / "experiments" / "channels.png")
-    options = parser.parse_args()
-    write(options.out, np.hstack([channels(tuple(options.shape), seed) for seed in options.seed]))
+@common.command
+def main(shape=(256, 256), seed=(1, 7), out=common.DOCS.parent / "simdtex" / "experiments" / "channels.png"):
+    image.write(out, np.hstack([channels(tuple(shape), each) for each in seed]))
 
 
 if __name__ == "__main__":

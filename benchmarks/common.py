@@ -63,8 +63,8 @@ def command(main):
 
 
 def chosen(known, names=""):
-    """The entries of a dictionary that a text names, ``"a,b"``; all without a text."""
-    wanted = names.split(",") if names else list(known)
+    """The entries of a dictionary that are named, by a list or as ``"a,b"``; all without names."""
+    wanted = names.split(",") if isinstance(names, str) and names else names or list(known)
     for name in wanted:
         if name not in known:
             raise ValueError(f"there is no {name}: choose of {', '.join(known)}")

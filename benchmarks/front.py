@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The picture and the times of the README, made from pictures that scikit-image carries.
 
-    python benchmarks/front.py [--out docs/_static/front.jpg] [--device TEXT]
+    python benchmarks/front.py [--out docs/_static/front.jpg] [--side 162] [--device TEXT]
     python benchmarks/front.py --times [--runs 5] [--methods multires pyramid] [--device TEXT]
 
 The picture has wood, tissue and stars below their samples, a photograph before and after a mast is removed, and a
@@ -11,15 +11,12 @@ runs ``simdtex synth`` as a process of its own for each method, on three colour 
 the median of the runs after the first. "start-up" is a process that makes one pixel.
 """
 
-import argparse
 import resource
-import subprocess
-import sys
 import tempfile
-import time
+from functools import partial
 from pathlib import Path
-from statistics import median
 
+import common
 import numpy as np
 import PIL.Image
 import PIL.ImageDraw
@@ -30,6 +27,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.model.source_map import apply_source_map
 
+FRONT = common.DOCS / "_static" / "front.jpg"
 SIDE = 162  # of a sample, pixels
 SEED = 1  # of every picture
 GAP, TEXT = 14, 15  # between pictures, and the height of letters, pixels
@@ -81,32 +79,35 @@ def placed(parts, size):
 
 def front(machine, side=SIDE):
     """The picture: three samples above their results, and a row with a removed mast and a map arranged alike."""
-    made, options = {}, {"device": machine, "full_output": True, "channel_axis": -1}
-    given = samples(side)
-    for name, sample in given.items():
-        made[name] = simdtex.synthesize(sample, (2 * side, 2 * side), rng=SEED, **options)
-    relief = normals(given["wood"].mean(axis=2))
+    options, given = {"device": machine, "channel_axis": -1, "rng": SEED}, samples(side)
+    made = [simdtex.synthesize(one, (2 * side, 2 * side), full_output=True, **options) for one in given.values()]
     photo, hole = mast(2 * side)
-    filled = simdtex.fill(photo, hole, channel_axis=-1, rng=SEED, device=machine)
     wide, line = 2 * side + GAP, TEXT + 8
     results = line + side + GAP
     below = results + 2 * side + GAP
-    parts = [
-        *((i * wide, line + side - len(given[name]), given[name]) for i, name in enumerate(given)),
-        *((i * wide, results, made[name][0]) for i, name in enumerate(given)),
-        *((i * wide, 0, f"{name}: the sample") for i, name in enumerate(given)),
-        *((i * wide + side + GAP, line + side - 3 * line, "below: more\nof it, without\na seam") for i in range(3)),
-        (0, below, "a photograph"),
-        (wide, below, "the right mast removed"),
-        (2 * wide, below, "a normal map, arranged like the wood"),
-        (0, below + line, photo),
-        (wide, below + line, filled),
-        (2 * wide, below + line, apply_source_map(made["wood"][1].source, relief)),
-    ]
+    parts = []
+    for left, (name, sample), (picture, _) in zip(range(0, 3 * wide, wide), given.items(), made, strict=True):
+        parts += [(left, line + side - len(sample), sample), (left, results, picture), (left, 0, f"{name}: the sample")]
+        parts.append((left + side + GAP, line + side - 3 * line, "below: more\nof it, without\na seam"))
+    relief = normals(given["wood"].mean(axis=2))
+    lower = {
+        "a photograph": photo,
+        "the right mast removed": simdtex.fill(photo, hole, **options),
+        "a normal map, arranged like the wood": apply_source_map(made[0][1].source, relief),
+    }
+    for number, (label, picture) in enumerate(lower.items()):
+        parts += [(number * wide, below, label), (number * wide, below + line, picture)]
     return placed(parts, (3 * wide - GAP, below + line + 2 * side))
 
 
-def processes(device, runs, methods):
+def process(words, folder):
+    """User CPU seconds and wall seconds of a command."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    wall = common.timed(common.python, *words, cwd=folder)[1]
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, wall
+
+
+def print_times(device, runs, methods):
     """Time every method on every sample as a process; print a line for each method."""
     colour = {
         "tissue": data.immunohistochemistry()[300:428, 290:418],
@@ -115,40 +116,25 @@ def processes(device, runs, methods):
     }
     print(f"{'':20} user CPU seconds   wall seconds")
     with tempfile.TemporaryDirectory() as folder:
-        for method in methods:
-            cpu, wall = [], []
-            for name, sample in colour.items():
-                write(Path(folder) / f"{name}.png", sample)
-                words = f"-m simdtex synth {name}.png -o more.png --size 256x256"
-                command = [sys.executable, *words.split()]
-                command += [*METHODS[method], "--seed", "1", "--quiet", *(["--device", device] if device else [])]
-                seconds = []
-                for _ in range(1 + runs):
-                    before, began = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-                    subprocess.run(command, cwd=folder, check=True)
-                    after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-                    seconds.append((after - before, time.perf_counter() - began))
-                cpu.append(median(each for each, _ in seconds[1:]))
-                wall.append(median(each for _, each in seconds[1:]))
-            print(f"{method:20} {min(cpu):.2f} to {max(cpu):.2f}       {min(wall):.2f} to {max(wall):.2f}", flush=True)
+        for name, sample in colour.items():
+            write(Path(folder) / f"{name}.png", sample)
+        for method, options in common.chosen(METHODS, methods).items():
+            more = [*options, "--seed", "1", "--quiet", *(["--device", device] if device else [])]
+            words = "-m simdtex synth {}.png -o more.png --size 256x256"
+            jobs = {name: partial(process, [*words.format(name).split(), *more], folder) for name in colour}
+            found = np.array([np.median(those, 0) for those in common.in_turns(runs, jobs).values()])
+            (least, low), (most, high) = found.min(0), found.max(0)
+            print(f"{method:20} {least:.2f} to {most:.2f}       {low:.2f} to {high:.2f}", flush=True)
 
 
-def main(argv=None):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("docs/_static/front.jpg"))
-    parser.add_argument("--side", type=int, default=SIDE, help="of the samples, pixels; results have twice that")
-    parser.add_argument("--times", action="store_true", help="print times instead")
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), metavar="METHOD")
-    parser.add_argument("--device")
-    options = parser.parse_args(argv)
-    machine = simdtex.open_machine(options.device)
-    print(machine.name)
-    if options.times:
-        processes(options.device, options.runs, options.methods)
+@common.command
+def main(out=FRONT, side=SIDE, times=False, runs=5, methods=tuple(METHODS), device=None):
+    machine = common.opened(device)
+    if times:
+        print_times(device, runs, methods)
         return
-    front(machine, options.side).save(options.out, quality=90)
-    print(f"{options.out}: {options.out.stat().st_size // 1024} KiB")
+    front(machine, side).save(out, quality=90)
+    print(f"{out}: {out.stat().st_size // 1024} KiB")
 
 
 if __name__ == "__main__":

@@ -7,8 +7,7 @@ The training image is that of the pages on simulation. Probabilities of channels
 the right; a line gives the shares in six strips, the means over the realisations. Weight 0 is a run without soft data.
 """
 
-import argparse
-
+import common
 import numpy as np
 
 import simdtex
@@ -17,28 +16,18 @@ from simdtex.experiments.ensemble import channels
 STRIPS = 6
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--weights", default="0,0.5,1,2")
-    parser.add_argument("--number", type=int, default=12, help="realisations")
-    parser.add_argument("--size", type=int, default=120, help="rows and columns")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    training, _ = channels()
-    shape = (options.size, options.size)
-    wanted = np.broadcast_to(np.linspace(0.02, 0.98, options.size), shape)
+def line(label, shares):
+    print(f"{label:12}" + "".join(f"{part.mean():6.2f}" for part in np.array_split(shares, STRIPS)))
 
-    def line(label, shares):
-        parts = np.array_split(shares, STRIPS)
-        print(f"{label:12}" + "".join(f"{part.mean():6.2f}" for part in parts))
 
+@common.command
+def main(weights="0,0.5,1,2", number=12, size=120, device=None):
+    wanted = np.broadcast_to(np.linspace(0.02, 0.98, size), (size, size))
+    given = {"shape": wanted.shape, "categorical": True, "rng": 1, "device": device}
     line("asked", wanted[0])
-    for weight in map(float, options.weights.split(",")):
+    for weight in map(float, weights.split(",")):
         soft = {"probabilities": np.stack([1 - wanted, wanted]), "soft_weight": weight} if weight else {}
-        made = simdtex.simulate(
-            training, options.number, shape=shape, categorical=True, rng=1, device=options.device, **soft
-        )
-        line(f"weight {weight:g}", made.values.mean((0, 1)))
+        line(f"weight {weight:g}", simdtex.simulate(channels()[0], number, **given, **soft).values.mean((0, 1)))
 
 
 if __name__ == "__main__":

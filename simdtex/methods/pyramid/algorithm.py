@@ -39,7 +39,7 @@ VALUES = 8
 """The most values per output pixel that kernels index: six oriented bands of a level, and a margin."""
 
 MEMORY = 160
-"""The most bytes per pixel of a picture on the device (measured by benchmarks/pyramid_cost.py)."""
+"""The most bytes per pixel of a picture on the device (benchmarks/memory.py)."""
 
 HOST = 20, 20, 3
 """Bytes per pixel on the host: in any case, per channel, and per byte of all channels (benchmarks/memory.py)."""

@@ -36,7 +36,7 @@ FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z":
 
 
 MEMORY = 240
-"""The most bytes per voxel on the device (measured by benchmarks/pyramid_cost.py)."""
+"""The most bytes per voxel on the device (benchmarks/memory.py)."""
 
 
 @documented
