@@ -38,7 +38,7 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     from simdtex.io.examples import EXAMPLES, example
     from simdtex.machine import open_machine
     from simdtex.report.sheet import contact_sheet
-    from simdtex.synthesis import synthesize
+    from simdtex.jobs.synthesis import synthesize
 
     shape = image.parse_size(size)
     names = [f"{name}.png" for name in (*EXAMPLES, "sheet")]

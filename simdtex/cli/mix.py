@@ -115,7 +115,7 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | No
     """
     from simdtex.io import image, volume
     from simdtex.report.solid import view
-    from simdtex.synthesis import synthesize_solid
+    from simdtex.jobs.synthesis import synthesize_solid
 
     shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")
     material = read_material([sample])

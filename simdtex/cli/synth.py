@@ -61,7 +61,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
     NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
     """
-    from simdtex.synthesis import synthesize
+    from simdtex.jobs.synthesis import synthesize
 
     context = click.get_current_context()
     check_tiles(context)

@@ -24,7 +24,7 @@ from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Relaxing
 from simdtex.schedules import Active, Info, Schedule, Setting, Watched
-from simdtex.synthesis import synthesize
+from simdtex.jobs.synthesis import synthesize
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
 

@@ -28,7 +28,7 @@ from simdtex.methods.mrf.replay import Replay
 from simdtex.model.colours import label_colours
 from simdtex.options import one_of, real, shown, whole
 from simdtex.run import Output
-from simdtex.synthesis import METHODS, replay, synthesize
+from simdtex.jobs.synthesis import replay, synthesize
 
 Array = NDArray[Any]
 Maps = dict[str, Array]

@@ -32,7 +32,7 @@ from simdtex.live.job import Message, Picture
 from simdtex.live.session import MAX_BYTES, Send, Session
 from simdtex.machine import Machine, open_machine
 from simdtex.options import whole
-from simdtex.synthesis import synthesize
+from simdtex.jobs.synthesis import synthesize
 
 TOKEN = "SIMDTEX_LIVE_TOKEN"
 """The environment variable with the token of the page's address, which keeps the address constant."""

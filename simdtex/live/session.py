@@ -36,7 +36,7 @@ from simdtex.model.colours import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
 from simdtex.options import one_of, resolve
-from simdtex.synthesis import synthesize
+from simdtex.jobs.synthesis import synthesize
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 
