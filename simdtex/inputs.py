@@ -71,7 +71,7 @@ class Input(Option):
     reader : str
         ``reader(given, files)`` of `simdtex.cli.inputs` returns the value from what the option was given.
     painter : str
-        The method of `simdtex.live.job.Job` that adds the value which is painted on the page.
+        The method of `simdtex.live.job.Job` that adds the value which is painted on the page, or follows from it.
     """
 
     doc: str = ""
@@ -86,6 +86,18 @@ class Input(Option):
     method: str = ""
     reader: str = ""
     painter: str = ""
+
+    def named(self, name: str) -> list[str]:
+        """Return the names of the option, as `click.option` takes them, of the input of this name."""
+        return self.flags.split() or [f"--{name.replace('_', '-')}"]
+
+    def flag(self, name: str) -> str:
+        """Return the long name of the option."""
+        return next(flag for flag in self.named(name) if flag.startswith("--"))
+
+    def parameter(self, name: str) -> str:
+        """Return the name of the option among the parameters of a command."""
+        return self.named(name)[-1].removeprefix("--").replace("-", "_")
 
     def described(self) -> str:
         """Return the entry in the docstring."""
@@ -233,6 +245,7 @@ class Guided:
         takes="pair",
         metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
         reader="read_guides",
+        painter="_guide",
         **TABLES,
     )
 
@@ -256,7 +269,8 @@ class Synth(Common, Guided, Sampled):
         doc="Rows and columns of the output, each 1 or more; smaller or larger than the sample.",
         positional=True,
         checker="as_size",
-        painter="_synthesize",
+        flags="--size",
+        painter="_size",
     )
     method: Literal["mrf", "multires", "pyramid"] = given(
         "mrf",
@@ -264,6 +278,7 @@ class Synth(Common, Guided, Sampled):
         "Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid)",
         "Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1; De Bonet's "
         "multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).",
+        painter="_method",
     )
     known_source: ArrayLike | None = given(
         None,
@@ -310,7 +325,7 @@ class Fill(Common):
         positional=True,
         checker="as_hole",
         takes="file",
-        painter="_fill",
+        painter="_hole",
     )
     invert: Any = given(None, Switch(), "Fill all but the white parts of --mask", command_only=True)
     grow: int = given(0, Whole(0), "Make the holes wider by this many pixels")
@@ -363,7 +378,7 @@ class Extend(Common):
         none="both, if no direction is given",
         takes="direction",
         metavar="[x|y|both]",
-        painter="_extend",
+        painter="_seam",
     )
     band: int | None = given(
         None,
@@ -567,7 +582,7 @@ class Classify(Common):
         multiple=True,
         group=DATA,
         reader="read_classes",
-        painter="_classify",
+        painter="_classes",
     )
     strokes: Any = given(
         None,

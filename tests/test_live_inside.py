@@ -7,7 +7,7 @@ import pytest
 from live import Fake, texture
 
 import simdtex
-from simdtex.live.inside import BARS, SET_COLOURS
+from simdtex.live.results import BARS, SET_COLOURS
 from simdtex.live.job import Picture, paint
 
 SAMPLE = texture(24, 28)

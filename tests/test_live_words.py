@@ -7,7 +7,7 @@ import click
 import pytest
 
 from simdtex import cli
-from simdtex.live.words import TABLES, controls
+from simdtex.live.job import TABLES, controls
 from simdtex.options import table
 
 
