@@ -27,7 +27,7 @@ def lap(name):
     laps[name] = began[-1] - began[-2]
 import numpy
 lap("import numpy")
-import simdtex.cli.synth, simdtex.io.image, simdtex.synthesis, simdtex.methods.mrf
+import simdtex.cli.textures, simdtex.io.image, simdtex.jobs.synthesis, simdtex.methods.mrf
 lap("import simdtex")
 import pyopencl
 lap("import pyopencl")

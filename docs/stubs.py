@@ -1,6 +1,6 @@
 """The types of the public names for editors and type checkers: writes ``simdtex/__init__.pyi`` from the tables.
 
-``python docs/stubs.py`` writes the file; with ``--check``, as in ``make lint``, it exits with 1 if that would change it.
+``python docs/stubs.py`` writes the file; with ``--check``, as in ``make lint``, it exits with 1 if it would differ.
 """
 
 import sys
@@ -30,7 +30,13 @@ METHODS = {
 
 FUNCTIONS = (
     ("synth", "synthesize", "Mrf", "Synthesize", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),
-    ("synth", "synthesize", "Multires", "SynthesizeMultires", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),
+    (
+        "synth",
+        "synthesize",
+        "Multires",
+        "SynthesizeMultires",
+        ("full_output", TUPLE.format("OutputWithSource"), PICTURE),
+    ),
     ("synth", "synthesize", "Pyramid", "SynthesizePyramid", ("full_output", TUPLE.format("Output"), PICTURE)),
     ("solid", "synthesize_solid", "Solid", "SynthesizeSolid", ("full_output", TUPLE.format("Output"), PICTURE)),
     ("fill", "fill", "Mrf", "Fill", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),

@@ -135,8 +135,8 @@ class Watched:
     callback: Callback | None = given(
         None,
         Data("callable"),
-        doc="Called several times a second with the progress of the run, a `simdtex.run.Progress` of the job or method. "
-        "An error that it raises ends the run.",
+        doc="Called several times a second with a `simdtex.run.Progress`, whose class is that of the job or method. An "
+        "error that it raises ends the run.",
         identity=False,
     )
 
@@ -257,8 +257,8 @@ class Synth(Common, Guided, Sampled):
     sample: ArrayLike = given(
         UNSET,
         Data(f"{PICTURE}; or a list of such"),
-        doc="The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN or "
-        "masked, and there may be several samples of one type, of any sizes.",
+        doc="The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN "
+        "or masked, and there may be several samples of one type, of any sizes.",
         positional=True,
         checker="as_samples",
         identity="of_inputs",
@@ -404,8 +404,8 @@ class Cells(Sampled):
         None,
         Data("(x, y) or (x, y, z)"),
         "Place the centre of the first cell here, in the units of the table of --known",
-        "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. None "
-        "is 0.",
+        "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. "
+        "None is 0.",
         none="that of a grid TRAINING_IMAGE, else 0,0",
         takes="numbers",
         metavar="X,Y[,Z]",
@@ -465,8 +465,8 @@ class Simulate(Seeded, Guided, Cells):
     shape: tuple[int, ...] | None = given(
         None,
         Data("(int, int) or (int, int, int)"),
-        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the first "
-        "map below, if that is an array, else of the training image.",
+        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the "
+        "first map below, if that is an array, else of the training image.",
     )
     region: ArrayLike | None = given(
         None,

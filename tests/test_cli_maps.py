@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import simdtex
 from simdtex import checkpoint as checkpoints
 from simdtex.cli import main
-from simdtex.cli.maps import Folder
+from simdtex.cli.inputs import Folder
 from simdtex.io import image
 from simdtex.io.atomic import NotWritten
 from simdtex.model.source_map import apply_source_map, load_source_map

@@ -7,8 +7,8 @@ import pytest
 from live import Fake, texture
 
 import simdtex
-from simdtex.live.results import BARS, SET_COLOURS
 from simdtex.live.job import Picture, paint
+from simdtex.live.results import BARS, SET_COLOURS
 
 SAMPLE = texture(24, 28)
 RULES = {"order": 4, "channel_axis": -1, "device": "reference"}

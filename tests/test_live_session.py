@@ -19,8 +19,8 @@ from simdtex.io.image import read_bytes
 from simdtex.live import results
 from simdtex.live import session as sessions
 from simdtex.live.job import LABELS, Picture
-from simdtex.live.session import Levels
 from simdtex.live.results import Results
+from simdtex.live.session import Levels
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
 from simdtex.model.labels import read_labels

@@ -15,7 +15,7 @@ import xarray
 import zarr
 
 from simdtex import distributed
-from simdtex.cli.ending import catch_signals
+from simdtex.cli.command import catch_signals
 from simdtex.io.grids import read_grid
 from simdtex.io.realisations import check_realisations_path, write_realisations
 from simdtex.options import DataWarning

@@ -137,7 +137,7 @@ def interrupted(tmp_path, way, module, size="64", before=None):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-@pytest.mark.parametrize("module", ["simdtex.cli", "click", "click.core", "simdtex.cli.synth", "numpy", "PIL"])
+@pytest.mark.parametrize("module", ["simdtex.cli", "click", "click.core", "simdtex.cli.textures", "numpy", "PIL"])
 @pytest.mark.parametrize("way", WAYS)
 def test_ctrl_c_during_imports_ends_with_one_line(tmp_path, way, module):
     result = interrupted(tmp_path, way, module)
@@ -158,12 +158,12 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
 @pytest.mark.parametrize("module", ["simdtex.machine.runtimes", "weakref", "_weakrefset"])
 def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
     """In the search for runtimes, which would leave its temporary folder, and in callbacks of what is collected."""
-    from simdtex.cli import ending
+    from simdtex.cli import command
 
     assert find_spec(module)
     over, names = [], {"__name__": module, "signal": signal, "time": time}
     exec("def search(over):\n signal.raise_signal(signal.SIGINT)\n time.sleep(0.05)\n over.append(True)", names)
-    with pytest.raises(KeyboardInterrupt), ending.catch_signals(click.Context(click.Command("any"))):
+    with pytest.raises(KeyboardInterrupt), command.catch_signals(click.Context(click.Command("any"))):
         names["search"](over)
         for _ in range(600):  # until the signal comes again
             time.sleep(0.1)
@@ -171,7 +171,7 @@ def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
 
 
 def test_what_ctrl_c_leaves_undone_is_not_warned_of():
-    from simdtex.cli.ending import reporting
+    from simdtex.cli.command import reporting
 
     @click.command()
     @reporting()
