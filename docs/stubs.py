@@ -53,7 +53,7 @@ OF_A_METHOD = ("mask", "known", "known_source", "guide")
 
 HEAD = '''\
 # SPDX-License-Identifier: BSD-3-Clause
-# ruff: noqa: D101, D103, D418, E501
+# ruff: noqa: E501
 # fmt: off
 """The types of the public names for editors and type checkers; ``python docs/stubs.py`` writes this file."""
 
@@ -66,12 +66,6 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 IMPORTS
-from simdtex.io.hard_data import HardData
-from simdtex.machine import Machine
-from simdtex.methods.mrf.replay import Replay
-from simdtex.model.explanation import Explanation
-from simdtex.run import Callback, OutputWithSource
-from simdtex.schedules import Schedule
 
 __version__: str
 
@@ -79,6 +73,15 @@ ScheduleName = Literal[
     SCHEDULES
 ]
 '''
+
+
+USED = """\
+from simdtex.io.hard_data import HardData
+from simdtex.machine import Machine
+from simdtex.methods.mrf.replay import Replay
+from simdtex.model.explanation import Explanation
+from simdtex.run import Callback, OutputWithSource
+from simdtex.schedules import Schedule"""
 
 
 def type_of(one):
@@ -137,8 +140,9 @@ def stub():
     """The text of the file."""
     public = {function for _, function, *_ in FUNCTIONS} | {"explain", "replay", "quality"}
     homes = {one: home for home, names in simdtex._NAMES.items() for one in names if one not in public}
-    found = sorted(f"from {home} import {one} as {one}" for one, home in homes.items())
-    found.insert(1, "from simdtex.experiments import quality as quality")
+    found = [f"from {home} import {one} as {one}" for one, home in homes.items()]
+    found += ["from simdtex.experiments import quality as quality", *USED.splitlines()]
+    found.sort(key=lambda line: (line.split()[1], " as " in line, line))
     written = fill(str(list(SCHEDULES))[1:-1], 116).replace("\n", "\n    ")
     lines = [HEAD.replace("IMPORTS", "\n".join(found)).replace("SCHEDULES", written)]
     for name, method in METHODS.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# ruff: noqa: D101, D103, D418, E501
+# ruff: noqa: E501
 # fmt: off
 """The types of the public names for editors and type checkers; ``python docs/stubs.py`` writes this file."""
 
@@ -15,22 +15,22 @@ from simdtex.checkpoint import Checkpoint as Checkpoint
 from simdtex.experiments import quality as quality
 from simdtex.io.grids import read_grid as read_grid
 from simdtex.io.grids import write_grid as write_grid
+from simdtex.io.hard_data import HardData
 from simdtex.io.hard_data import place_hard_data as place_hard_data
 from simdtex.io.hard_data import read_hard_data as read_hard_data
 from simdtex.jobs.classification import TextureClassifier as TextureClassifier
 from simdtex.jobs.synthesis import lcpdf as lcpdf
 from simdtex.live.widget import Live as Live
+from simdtex.machine import Machine
 from simdtex.machine import open_machine as open_machine
 from simdtex.machine.devices import DeviceError as DeviceError
 from simdtex.machine.devices import devices as devices
-from simdtex.model.show import show as show
-from simdtex.run import Output as Output
-from simdtex.run import Progress as Progress
-from simdtex.io.hard_data import HardData
-from simdtex.machine import Machine
 from simdtex.methods.mrf.replay import Replay
 from simdtex.model.explanation import Explanation
+from simdtex.model.show import show as show
 from simdtex.run import Callback, OutputWithSource
+from simdtex.run import Output as Output
+from simdtex.run import Progress as Progress
 from simdtex.schedules import Schedule
 
 __version__: str

@@ -83,6 +83,28 @@ def test_a_whole_run_on_the_reference_needs_no_heavy_module(tmp_path):
     assert os.path.exists(out)
 
 
+@pytest.mark.parametrize(
+    ("library", "words", "extra"),
+    [
+        ("jinja2", ["synth", "a.png", "-o", "b.png", "--report", "page"], "reports"),
+        ("matplotlib", ["schedules", "a.png"], "reports"),
+        ("nrrd", ["solid", "a.png", "-o", "b.nrrd"], "volumes"),
+    ],
+)
+def test_a_library_of_an_extra_costs_a_sentence(tmp_path, monkeypatch, library, words, extra):
+    monkeypatch.chdir(tmp_path)
+    write("a.png", np.arange(256, dtype=np.uint8).reshape(16, 16))
+    for name in [name for name in sys.modules if name.startswith(("simdtex.report", library))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, library, None)
+    said = CliRunner().invoke(cli.main, words)
+    assert (said.exit_code, said.output) == (
+        2,
+        f"simdtex: {library} is not installed; pip install 'simdtex[{extra}]'\n",
+    )
+    assert os.listdir() == ["a.png"]
+
+
 def test_every_public_name_is_there():
     assert set(dir(simdtex)) >= PUBLIC
     assert set(simdtex.__all__) == PUBLIC - {"__version__"}

@@ -165,6 +165,9 @@ def command(*examples: tuple[str, str], usual: str = "") -> Callable[[Callable[.
 UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset", "h5netcdf.", "h5py.")
 """Beginnings of modules in which an exception does harm: see `postponed`."""
 
+REPORTS = ("jinja2", "matplotlib")
+"""The libraries of the extra ``reports``."""
+
 RESUME, FAILURES = f"{__name__}.resume", f"{__name__}.failures"
 """Keys of a context's `meta`: the path that ``simdtex resume`` takes, and errors that wait for the end."""
 
@@ -186,6 +189,11 @@ def reporting() -> Iterator[None]:
         if isinstance(error, BrokenPipeError) and _printing(error):
             raise  # the reader has read enough; click ends the process without a word
         settle(error)
+    except ModuleNotFoundError as error:
+        library = str(error.name).partition(".")[0]
+        if library not in REPORTS:
+            raise
+        settle(ValueError(f"{library} is not installed; pip install 'simdtex[reports]'"))
     except MemoryError:
         note("there is not enough memory; give a smaller size")
         sys.exit(2)
