@@ -54,11 +54,11 @@ class Input(Option):
     command_only : bool
         Whether only the command has it, which says by it how files are read.
     checker : str
-        ``checker(name, value, call)`` of `simdtex.jobs.inputs` returns the value, unless it is None, as the job takes
-        it. The ``call`` has all inputs by name, the earlier ones as their checkers returned them.
+        A key of `simdtex.jobs.inputs.CHECKS`: ``check(name, value, call)`` returns the value, unless it is None, as the
+        job takes it. The ``call`` has all inputs by name, the earlier ones as their checks returned them.
     identity : bool or str
-        Whether the value identifies a run in a checkpoint, as it is in the call once the job is planned; or
-        ``identity(call, name)`` of `simdtex.jobs.inputs` returns what does.
+        Whether the value identifies a run in a checkpoint, as it is in the call once the job is planned; or a key of
+        `simdtex.jobs.inputs.IDENTITIES`: ``identity(call, name)`` returns what does.
     flags : str
         The names on the command line, separated by spaces: by default that of the field. Empty `help`: no option.
     takes : str
@@ -117,7 +117,7 @@ PATHS: dict[str, Any] = {"takes": "file", "group": DATA}
 CELLS: dict[str, Any] = {"group": DATA, "identity": False}
 TABLES: dict[str, Any] = {"group": DATA, "method": "mrf"}
 READING: dict[str, Any] = {**TABLES, "command_only": True}
-MAP: dict[str, Any] = {**PATHS, "checker": "as_data", "identity": "of_maps", "reader": "read_map"}
+MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader": "read_map"}
 NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
 
 
@@ -179,7 +179,7 @@ class Sampled:
         Data("(rows, cols) bool array, or a list of such"),
         "Take pixels only from the white parts of this mask, of the sample's size; give one for each sample",
         "``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.",
-        identity="of_inputs",
+        identity="arrays",
         flags="--sample-mask",
         multiple=True,
         method="mrf",
@@ -194,8 +194,8 @@ class Sampled:
         "``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN "
         "for unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some "
         "variables (channels) of a pixel may be known and others not.",
-        checker="as_data",
-        identity="of_inputs",
+        checker="data",
+        identity="arrays",
         method="mrf",
         reader="read_known",
         **PATHS,
@@ -241,7 +241,7 @@ class Guided:
         "``mrf``: two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the "
         "output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means "
         "no guide. With several samples, the first is a list of pictures.",
-        identity="of_inputs",
+        identity="arrays",
         takes="pair",
         metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
         reader="read_guides",
@@ -260,15 +260,15 @@ class Synth(Common, Guided, Sampled):
         doc="The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN "
         "or masked, and there may be several samples of one type, of any sizes.",
         positional=True,
-        checker="as_samples",
-        identity="of_inputs",
+        checker="samples",
+        identity="arrays",
     )
     shape: tuple[int, int] = given(
         UNSET,
         Data("(int, int)"),
         doc="Rows and columns of the output, each 1 or more; smaller or larger than the sample.",
         positional=True,
-        checker="as_size",
+        checker="rows and columns",
         flags="--size",
         painter="_size",
     )
@@ -285,7 +285,7 @@ class Synth(Common, Guided, Sampled):
         Data("(rows, cols, 2) int array"),
         doc="``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 "
         "for pixels from elsewhere. Known pixels with a position suggest candidates that continue it.",
-        identity="of_inputs",
+        identity="arrays",
     )
 
 
@@ -298,14 +298,14 @@ class Solid(Common):
         Data(PICTURE),
         doc="The texture. It should be isotropic, since every slice of the block looks like it.",
         positional=True,
-        checker="as_picture",
+        checker="picture",
     )
     shape: tuple[int, int, int] = given(
         UNSET,
         Data("(int, int, int)"),
         doc="Depth, rows and columns of the block, each 1 or more. It repeats without a seam in every direction.",
         positional=True,
-        checker="as_block",
+        checker="block",
     )
 
 
@@ -314,7 +314,7 @@ class Fill(Common):
     """The inputs of `simdtex.fill`."""
 
     image: ArrayLike = given(
-        UNSET, Data(PICTURE), doc="The picture; any real type.", positional=True, checker="as_picture_with_gaps"
+        UNSET, Data(PICTURE), doc="The picture; any real type.", positional=True, checker="picture with gaps"
     )
     mask: ArrayLike | None = given(
         None,
@@ -323,7 +323,7 @@ class Fill(Common):
         "True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.",
         none="the parts of PICTURE that are not fully opaque, or NaN; the output then has no alpha",
         positional=True,
-        checker="as_hole",
+        checker="hole",
         takes="file",
         painter="_hole",
     )
@@ -340,7 +340,7 @@ class Fill(Common):
         Data("array of the image's type"),
         "Fill with this texture, not with that around the hole; may be repeated",
         "The texture to fill with, or a list of several. None: the rest of the picture.",
-        checker="as_texture",
+        checker="texture",
         flags="--sample samples",
         takes="file",
         multiple=True,
@@ -363,7 +363,7 @@ class Extend(Common):
         Data(PICTURE),
         doc="The picture, which is also the sample; any real type.",
         positional=True,
-        checker="as_picture",
+        checker="picture",
     )
     left: int = given(0, Whole(0), "Add this many pixels at the left")
     right: int = given(0, Whole(0), "Add this many pixels at the right")
@@ -457,8 +457,8 @@ class Simulate(Seeded, Guided, Cells):
         doc="The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values "
         "are categories. With `channel_axis` it has one more axis, for variables.",
         positional=True,
-        checker="as_training",
-        identity="of_inputs",
+        checker="training",
+        identity="arrays",
     )
     n: int = given(UNSET, Whole(1), "Make this many realisations", none="1", flags="-n --number", positional=True)
     first: int = given(0, Whole(0), "Start with the realisation of this number")
@@ -537,7 +537,7 @@ class Estimate(Watched, Cells):
         Data("(rows, cols) array, or a list of such"),
         doc="The training image, as in `simdtex.simulate`; one variable.",
         positional=True,
-        checker="as_training",
+        checker="training",
     )
     shape: tuple[int, int] | None = given(
         None,
@@ -566,7 +566,7 @@ class Classify(Common):
         Data("(rows, cols) or, with `channel_axis`, (rows, cols, bands) array"),
         doc="The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.",
         positional=True,
-        checker="as_picture_with_gaps",
+        checker="picture with gaps",
     )
     textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike = given(
         UNSET,
@@ -623,7 +623,7 @@ class Mix(Common):
         positional=True,
     )
     shape: tuple[int, int] = given(
-        UNSET, Data("(int, int)"), doc="Rows and columns of the output.", positional=True, checker="as_size"
+        UNSET, Data("(int, int)"), doc="Rows and columns of the output.", positional=True, checker="rows and columns"
     )
     palette: int | None = given(
         None,

@@ -118,7 +118,7 @@ def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
             inputs.Data("(rows, cols) array"),
             "Use the frame in this file",
             "The frame of the picture.",
-            checker="as_frame",
+            checker="frame",
             takes="file",
             reader="read_frame",
         )
@@ -137,7 +137,7 @@ def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
         return checks.Work(interrupted, mrf.Options(), call.channel_axis)
 
     monkeypatch.setitem(inputs.TABLES_OF, "fill", Fill)
-    monkeypatch.setattr(checks, "as_frame", lambda name, value, call: call.image[0] + value, raising=False)
+    monkeypatch.setitem(checks.CHECKS, "frame", lambda name, value, call: call.image[0] + value)
     monkeypatch.setattr(readers, "read_frame", lambda path, files: f"{files.flag} {path}", raising=False)
     filled = checks.public("fill", mrf.Options)(planned)
     assert signature(filled).parameters["frame"].default is None

@@ -30,7 +30,7 @@ from simdtex.run import Callback, Output, OutputWithSource
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""
 
-LEAST = 16
+FEWEST_CANDIDATES = 16
 """The fewest candidates at the coarsest level of a hole, since its known surroundings determine the layout."""
 
 GIVEN = 100
@@ -201,7 +201,7 @@ class Whole(NamedTuple):
     source: NDArray[np.int32]
 
 
-class Around(NamedTuple):
+class WindowSample(NamedTuple):
     """The sample of a window.
 
     ``corner`` is its first pixel in the picture; ``place`` is the position of the window's pixels in it, None for a
@@ -243,13 +243,13 @@ class Filling:
             at = (window.rows, window.cols)
             hole = self.hole[at]
             if number == len(finished):
-                around = self.around(window)
-                seen = callback and partial(self._show, callback, whole, window, around, number, len(parts))
+                sample = self.sample_of(window)
+                seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                made, output = drive(self.plan(window, around), machine, seed, seen, now)
+                made, output = drive(self.plan(window, sample), machine, seed, seen, now)
                 assert output.source is not None and output.temperature is not None
                 about = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
-                finished.append(Made(around.corner, made[hole], output.temperature[hole], output.source[hole], about))
+                finished.append(Made(sample.corner, made[hole], output.temperature[hole], output.source[hole], about))
                 inside = None
                 checkpointing.offer(None, lambda: (finished, None))
             found = finished[number]
@@ -264,7 +264,14 @@ class Filling:
         return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
-        self, callback: Callback, whole: Whole, window: Window, around: Around, number: int, count: int, progress: Any
+        self,
+        callback: Callback,
+        whole: Whole,
+        window: Window,
+        sample: WindowSample,
+        number: int,
+        count: int,
+        progress: Any,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
         at = (window.rows, window.cols)
@@ -272,7 +279,7 @@ class Filling:
         shown = {
             "image": lambda: pasted(whole.image, progress.image()),
             "temperature": lambda: pasted(whole.temperature, progress.temperature()),
-            "source": lambda: pasted(whole.source, shifted(progress.source(), around.corner)),
+            "source": lambda: pasted(whole.source, shifted(progress.source(), sample.corner)),
         }
         return callback(replace(progress, **shown, fraction=(number + progress.fraction) / count))
 
@@ -302,32 +309,32 @@ class Filling:
             whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
         return whole
 
-    def around(self, window: Window) -> Around:
+    def sample_of(self, window: Window) -> WindowSample:
         """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
-            return Around(self.sample, (0, 0), None)
+            return WindowSample(self.sample, (0, 0), None)
         at = (window.rows, window.cols)
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
         near = (slice(top, window.rows.stop + reach), slice(left, window.cols.stop + reach))
         place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
-        return Around(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
+        return WindowSample(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
-    def plan(self, window: Window, around: Around) -> mrf.Plan:
+    def plan(self, window: Window, sample: WindowSample) -> mrf.Plan:
         """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
         at, options, guide = (window.rows, window.cols), self.options, None
-        pictures, hole, least = around.pictures, self.hole[at], window.levels and options.levels is None
+        pictures, hole, least = sample.pictures, self.hole[at], window.levels and options.levels is None
         known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
         values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
-        if around.place is not None and pictures.known and _has_tones(options, pictures):
-            row, col = around.place[0, 0].tolist()
+        if sample.place is not None and pictures.known and _has_tones(options, pictures):
+            row, col = sample.place[0, 0].tolist()
             guide = Surroundings(pictures.pixels[0], pictures.known[0], values, ~hole, (row, col))
         return mrf.plan(
             pictures,
             hole.shape,
-            replace(options, overview=LEAST) if least else options,
-            Given(values, known, around.place, suggests=False),
+            replace(options, overview=FEWEST_CANDIDATES) if least else options,
+            Given(values, known, sample.place, suggests=False),
             guide,
             most=max(window.levels, _fewest_levels(pictures)) if window.levels else None,
         )
@@ -379,7 +386,7 @@ class HoleReplay:
         if len(parts) > 1:
             raise ValueError(f"{len(parts)} holes are filled by runs of their own; fill one hole to look into its run")
         (window,) = parts
-        sample = job.around(window)
+        sample = job.sample_of(window)
         self._replay = Replay(job.plan(window, sample), machine, seed)
         self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, sample.corner
         self._whole = job.begin()

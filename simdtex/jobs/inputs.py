@@ -86,7 +86,7 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
                 value = getattr(call, name)
                 one.check(name, value)
                 if one.checker and value is not None:
-                    setattr(call, name, globals()[one.checker](name, value, call))
+                    setattr(call, name, CHECKS[one.checker](name, value, call))
             return call, plan(call)
 
         @wraps(plan)
@@ -98,7 +98,7 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
                 for name, one in own.items():
                     if one.identity:
                         found[name] = (
-                            getattr(call, name) if one.identity is True else globals()[one.identity](call, name)
+                            getattr(call, name) if one.identity is True else IDENTITIES[one.identity](call, name)
                         )
                 return found | {"options": work.options}
 
@@ -123,68 +123,6 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
 def _parameter(name: str, one: Input, type_: str) -> Parameter:
     kind = Parameter.POSITIONAL_OR_KEYWORD if one.positional else Parameter.KEYWORD_ONLY
     return Parameter(name, kind, default=Parameter.empty if one.default is UNSET else one.default, annotation=type_)
-
-
-# The checks and identities that declarations name: ``checker(name, value, call)`` and ``identity(call, name)``
-
-
-def as_samples(name: str, value: Any, call: Any) -> Pictures:
-    """Return a sample or several, with the mask."""
-    return check_samples(value, call.channel_axis, call.mask)
-
-
-def as_training(name: str, value: Any, call: Any) -> Pictures:
-    """Return training images; one of three axes, without that of the variables, is a volume."""
-    call.axes = 3 if getattr(value, "ndim", 2) - (call.channel_axis is not None) == 3 else 2
-    call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))
-    return found
-
-
-def as_texture(name: str, value: Any, call: Any) -> Pictures:
-    """Return samples that are like the picture and not from it."""
-    found = check_samples(value, call.channel_axis)
-    check_alike("the sample", found.pixels[0], "the picture", call.image[0])
-    return found
-
-
-def as_picture(name: str, value: Any, call: Any) -> NDArray[Any]:
-    """Return a picture, (rows, cols, channels)."""
-    return check_sample(value, call.channel_axis)
-
-
-def as_picture_with_gaps(name: str, value: Any, call: Any) -> tuple[NDArray[Any], Mask]:
-    """Return a picture, (rows, cols, channels), and the mask of its unknown pixels."""
-    return check_picture(value, call.channel_axis)
-
-
-def as_hole(name: str, value: Any, call: Any) -> Mask:
-    """Return the mask of a hole in the picture."""
-    return check_mask(value, call.image[0].shape[:2])
-
-
-def as_size(name: str, value: Any, call: Any) -> tuple[int, int]:
-    """Return rows and columns."""
-    return check_shape(value)
-
-
-def as_block(name: str, value: Any, call: Any) -> tuple[int, ...]:
-    """Return depth, rows and columns."""
-    return check_sides(value, ("depth", "rows", "columns"))
-
-
-def as_data(name: str, value: Any, call: Any) -> HardData | NDArray[Any]:
-    """Return known values, or a map of a simulation, as an array or as a table."""
-    return as_known(value, name, call.sample if name == "known" else None)
-
-
-def of_inputs(call: Any, name: str) -> Any:
-    """Return what identifies one of the arrays in ``call.inputs``."""
-    return call.inputs.identity()["sample" if name == "training" else name]
-
-
-def of_maps(call: Any, name: str) -> Any:
-    """Return the digest of a map of a simulation."""
-    return call.maps.digests().get(name)
 
 
 # The arrays of a job
@@ -584,3 +522,40 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
     if np.isinf(found).any():
         raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
     return found
+
+
+# The checks and identities that declarations name
+
+
+def _training(name: str, value: Any, call: Any) -> Pictures:
+    """Return training images; one of three axes, without that of the variables, is a volume."""
+    call.axes = 3 if getattr(value, "ndim", 2) - (call.channel_axis is not None) == 3 else 2
+    call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))
+    return found
+
+
+def _texture(name: str, value: Any, call: Any) -> Pictures:
+    """Return samples that are like the picture and not from it."""
+    found = check_samples(value, call.channel_axis)
+    check_alike("the sample", found.pixels[0], "the picture", call.image[0])
+    return found
+
+
+CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
+    "samples": lambda name, value, call: check_samples(value, call.channel_axis, call.mask),
+    "training": _training,
+    "texture": _texture,
+    "picture": lambda name, value, call: check_sample(value, call.channel_axis),
+    "picture with gaps": lambda name, value, call: check_picture(value, call.channel_axis),
+    "hole": lambda name, value, call: check_mask(value, call.image[0].shape[:2]),
+    "rows and columns": lambda name, value, call: check_shape(value),
+    "block": lambda name, value, call: check_sides(value, ("depth", "rows", "columns")),
+    "data": lambda name, value, call: as_known(value, name, call.sample if name == "known" else None),
+}
+"""The checks that declarations name; see `simdtex.inputs.Input`."""
+
+IDENTITIES: dict[str, Callable[[Any, str], Any]] = {
+    "arrays": lambda call, name: call.inputs.identity()["sample" if name == "training" else name],
+    "maps": lambda call, name: call.maps.digests().get(name),
+}
+"""What identifies a run, of inputs that the plan has placed in ``call.inputs`` and ``call.maps``."""

@@ -45,7 +45,7 @@ from simdtex.run import Callback, Output, Progress, Simulating
 if TYPE_CHECKING:
     import xarray
 
-AT_ONCE = 4
+MOST_TOGETHER = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""
 
 
@@ -324,7 +324,7 @@ def placing(call: Any) -> Placing:
 def _together(machine: Machine, jobs: int | None, n: int) -> int:
     """Return how many realisations are made at a time."""
     if jobs is None:
-        jobs = 1 if machine.kind == "gpu" else min(AT_ONCE, os.cpu_count() or 1)
+        jobs = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
     return min(jobs, n)
 
 
