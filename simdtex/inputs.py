@@ -104,9 +104,14 @@ class Input(Option):
         return self.doc or super().described()
 
 
-def given(default: Any, kind: Any, help: str = "", doc: str = "", **more: Any) -> Any:
+def given(kind: Any, help: str = "", doc: str = "", default: Any = None, **more: Any) -> Any:
     """Return a field that declares an input; the arguments are those of `Input`."""
     return field(default=default, metadata={"option": Input(default, kind, help, doc=doc, **more)})
+
+
+def needed(kind: Any, help: str = "", doc: str = "", **more: Any) -> Any:
+    """Return a field that declares a required input, which needs no name."""
+    return given(kind, help, doc, UNSET, positional=True, **more)
 
 
 DATA, OUTPUTS, DEVICE = "Data and guides", "Further outputs", "Device and messages"
@@ -126,14 +131,12 @@ class Watched:
     """The inputs that all functions share."""
 
     device: str | Machine | None = given(
-        None,
         Data("str or Machine"),
         doc='Part of a device\'s name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes '
         "SIMDTEX_DEVICE, else a GPU, else a CPU.",
         identity=False,
     )
     callback: Callback | None = given(
-        None,
         Data("callable"),
         doc="Called several times a second with a `simdtex.run.Progress`, whose class is that of the job or method. An "
         "error that it raises ends the run.",
@@ -146,16 +149,14 @@ class Seeded(Watched):
     """The inputs of functions that draw random numbers."""
 
     channel_axis: int | None = given(
-        None, Data("int"), doc="The axis of pictures that holds channels; None for grey pictures.", identity=False
+        Data("int"), doc="The axis of pictures that holds channels; None for grey pictures.", identity=False
     )
     rng: int | np.random.Generator | None = given(
-        None,
         Data("int or numpy.random.Generator"),
         doc="The seed. The same seed gives the same bytes on every device. None draws a random seed.",
         identity=False,
     )
     checkpoint: str | os.PathLike[str] | Checkpoint | None = given(
-        None,
         Data("path or simdtex.Checkpoint"),
         doc="A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, "
         "the run continues from it, to the same bytes. The file is removed when the function returns.",
@@ -167,7 +168,7 @@ class Seeded(Watched):
 class Common(Seeded):
     """The inputs of functions that return the result of a run."""
 
-    full_output: bool = given(False, Data("bool"), doc="Return a `simdtex.run.Output` too.", identity=False)
+    full_output: bool = given(Data("bool"), doc="Return a `simdtex.run.Output` too.", identity=False, default=False)
 
 
 @dataclass
@@ -175,7 +176,6 @@ class Sampled:
     """The inputs about the sample and what is known of the output."""
 
     mask: ArrayLike | Sequence[ArrayLike] | None = given(
-        None,
         Data("(rows, cols) bool array, or a list of such"),
         "Take pixels only from the white parts of this mask, of the sample's size; give one for each sample",
         "``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.",
@@ -187,7 +187,6 @@ class Sampled:
         **PATHS,
     )
     known: ArrayLike | HardData | str | os.PathLike[str] | None = given(
-        None,
         Data("array of `shape` (and the channel axis), HardData, pandas.DataFrame or path"),
         "Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of Geo-EAS, or "
         "a picture or a grid whose unknown pixels are transparent or NaN",
@@ -201,7 +200,6 @@ class Sampled:
         **PATHS,
     )
     columns: Any = given(
-        None,
         Data(""),
         "Take these columns of the table of --known as x, y, z and value, by name or, without a header, by number; the "
         "variable of a grid is value",
@@ -211,7 +209,6 @@ class Sampled:
         **READING,
     )
     categories: Any = given(
-        None,
         Data(""),
         "Take these numbers for the texts in the table of --known, as sand=1,shale=0",
         takes="categories",
@@ -219,10 +216,10 @@ class Sampled:
         **READING,
     )
     missing: Any = given(
-        None,
-        Number(0),
+        Data(""),
         "Take this number in tables and grids as unknown, too; may be repeated",
         none="codes such as -999, outside of the values of the sample",
+        takes="number",
         metavar="VALUE",
         multiple=True,
         **READING,
@@ -234,7 +231,6 @@ class Guided:
     """A guide."""
 
     guide: tuple[Any, Any] | None = given(
-        None,
         Data("(array, array)"),
         "Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of labels or "
         "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples",
@@ -254,34 +250,29 @@ class Guided:
 class Synth(Common, Guided, Sampled):
     """The inputs of `simdtex.synthesize`."""
 
-    sample: ArrayLike = given(
-        UNSET,
+    sample: ArrayLike = needed(
         Data(f"{PICTURE}; or a list of such"),
         doc="The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN "
         "or masked, and there may be several samples of one type, of any sizes.",
-        positional=True,
         checker="samples",
         identity="arrays",
     )
-    shape: tuple[int, int] = given(
-        UNSET,
+    shape: tuple[int, int] = needed(
         Data("(int, int)"),
         doc="Rows and columns of the output, each 1 or more; smaller or larger than the sample.",
-        positional=True,
         checker="rows and columns",
         flags="--size",
         painter="_size",
     )
     method: Literal["mrf", "multires", "pyramid"] = given(
-        "mrf",
         Choice(("mrf", "multires", "pyramid")),
         "Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid)",
         "Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1; De Bonet's "
         "multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).",
+        default="mrf",
         painter="_method",
     )
     known_source: ArrayLike | None = given(
-        None,
         Data("(rows, cols, 2) int array"),
         doc="``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 "
         "for pixels from elsewhere. Known pixels with a position suggest candidates that continue it.",
@@ -293,18 +284,14 @@ class Synth(Common, Guided, Sampled):
 class Solid(Common):
     """The inputs of `simdtex.synthesize_solid`."""
 
-    sample: ArrayLike = given(
-        UNSET,
+    sample: ArrayLike = needed(
         Data(PICTURE),
         doc="The texture. It should be isotropic, since every slice of the block looks like it.",
-        positional=True,
         checker="picture",
     )
-    shape: tuple[int, int, int] = given(
-        UNSET,
+    shape: tuple[int, int, int] = needed(
         Data("(int, int, int)"),
         doc="Depth, rows and columns of the block, each 1 or more. It repeats without a seam in every direction.",
-        positional=True,
         checker="block",
     )
 
@@ -313,11 +300,8 @@ class Solid(Common):
 class Fill(Common):
     """The inputs of `simdtex.fill`."""
 
-    image: ArrayLike = given(
-        UNSET, Data(PICTURE), doc="The picture; any real type.", positional=True, checker="picture with gaps"
-    )
+    image: ArrayLike = needed(Data(PICTURE), doc="The picture; any real type.", checker="picture with gaps")
     mask: ArrayLike | None = given(
-        None,
         Data("(rows, cols) bool array"),
         "Fill the white parts of this mask, of the same size",
         "True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.",
@@ -327,16 +311,15 @@ class Fill(Common):
         takes="file",
         painter="_hole",
     )
-    invert: Any = given(None, Switch(), "Fill all but the white parts of --mask", command_only=True)
-    grow: int = given(0, Whole(0), "Make the holes wider by this many pixels")
+    invert: Any = given(Switch(), "Fill all but the white parts of --mask", command_only=True)
+    grow: int = given(Whole(0), "Make the holes wider by this many pixels", default=0)
     feather: int = given(
-        0,
         Whole(0),
         "Blend the filled pixels with the picture up to this many pixels around the holes",
+        default=0,
         more="Values without a mean (categories, 16 different pixels or fewer) change half-way instead.",
     )
     sample: ArrayLike | None = given(
-        None,
         Data("array of the image's type"),
         "Fill with this texture, not with that around the hole; may be repeated",
         "The texture to fill with, or a list of several. None: the rest of the picture.",
@@ -346,7 +329,6 @@ class Fill(Common):
         multiple=True,
     )
     reach: int | None = given(
-        None,
         Whole(1),
         "Fill a hole from the surroundings up to this far away, in pixels",
         more="It has no effect with `sample`.",
@@ -358,30 +340,27 @@ class Fill(Common):
 class Extend(Common):
     """The inputs of `simdtex.extend`."""
 
-    image: ArrayLike = given(
-        UNSET,
+    image: ArrayLike = needed(
         Data(PICTURE),
         doc="The picture, which is also the sample; any real type.",
-        positional=True,
         checker="picture",
     )
-    left: int = given(0, Whole(0), "Add this many pixels at the left")
-    right: int = given(0, Whole(0), "Add this many pixels at the right")
-    top: int = given(0, Whole(0), "Add this many pixels at the top")
-    bottom: int = given(0, Whole(0), "Add this many pixels at the bottom")
+    left: int = given(Whole(0), "Add this many pixels at the left", default=0)
+    right: int = given(Whole(0), "Add this many pixels at the right", default=0)
+    top: int = given(Whole(0), "Add this many pixels at the top", default=0)
+    bottom: int = given(Whole(0), "Add this many pixels at the bottom", default=0)
     seamless: bool | Literal["x", "y"] = given(
-        False,
         Data('bool or {"x", "y"}'),
         "Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`",
         "Whether the result wraps around: in both directions, or only left and right (x) or top and bottom (y). If no "
         "pixels are added in such a direction, a band along its edges is replaced.",
+        default=False,
         none="both, if no direction is given",
         takes="direction",
         metavar="[x|y|both]",
         painter="_seam",
     )
     band: int | None = given(
-        None,
         Whole(1),
         "Replace this many pixels along each edge that no pixels are added to, so that the output tiles",
         none="an eighth of the shorter side, 8 to 64",
@@ -393,7 +372,6 @@ class Cells(Sampled):
     """The inputs about the training image, and where its cells and data lie."""
 
     channels: Any = given(
-        None,
         Switch(),
         "Treat the last axis of a .npy of three axes as channels",
         none="such a file is a volume",
@@ -401,7 +379,6 @@ class Cells(Sampled):
         command_only=True,
     )
     origin: Sequence[float] | None = given(
-        None,
         Data("(x, y) or (x, y, z)"),
         "Place the centre of the first cell here, in the units of the table of --known",
         "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. "
@@ -412,7 +389,6 @@ class Cells(Sampled):
         **CELLS,
     )
     cell: Sequence[float] | None = given(
-        None,
         Data("(x, y) or (x, y, z)"),
         "Make cells of this size, in the same units",
         "The size of a cell. None is 1; without `origin` and `cell`, coordinates are columns and rows.",
@@ -422,21 +398,20 @@ class Cells(Sampled):
         **CELLS,
     )
     several: Literal["refuse", "mean", "most"] = given(
-        "refuse",
         Choice(("refuse", "mean", "most")),
         "Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent "
         "value (most)",
+        default="refuse",
         more="There is no mean of categories. See `simdtex.place_hard_data`.",
         **CELLS,
     )
     outside: Literal["refuse", "skip"] = given(
-        "refuse",
         Choice(("refuse", "skip")),
         "Treat data of a table outside of the cells as an error (refuse), or leave them out (skip)",
+        default="refuse",
         **CELLS,
     )
     variables: Any = given(
-        None,
         Data(""),
         "Take this variable of a grid TRAINING_IMAGE; may be repeated",
         none="all",
@@ -451,25 +426,21 @@ class Cells(Sampled):
 class Simulate(Seeded, Guided, Cells):
     """The inputs of `simdtex.simulate`."""
 
-    training: ArrayLike = given(
-        UNSET,
+    training: ArrayLike = needed(
         Data("(rows, cols) or (layers, rows, cols) array, or a list of (rows, cols) arrays"),
         doc="The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values "
         "are categories. With `channel_axis` it has one more axis, for variables.",
-        positional=True,
         checker="training",
         identity="arrays",
     )
-    n: int = given(UNSET, Whole(1), "Make this many realisations", none="1", flags="-n --number", positional=True)
-    first: int = given(0, Whole(0), "Start with the realisation of this number")
+    n: int = needed(Whole(1), "Make this many realisations", none="1", flags="-n --number")
+    first: int = given(Whole(0), "Start with the realisation of this number", default=0)
     shape: tuple[int, ...] | None = given(
-        None,
         Data("(int, int) or (int, int, int)"),
         doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the "
         "first map below, if that is an array, else of the training image.",
     )
     region: ArrayLike | None = given(
-        None,
         Data("(rows, cols) or (layers, rows, cols) bool array"),
         "Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation",
         "True for cells that are simulated. All other cells have no value: NaN in floats, else the attribute "
@@ -477,7 +448,6 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = given(
-        None,
         Data("(categories, rows, cols) array, or table or its path"),
         "Follow these probabilities of the categories, in ascending order of category: a table of x, y and one column "
         "for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN",
@@ -487,7 +457,6 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     image_map: ArrayLike | None = given(
-        None,
         Data("(rows, cols) or (training images, rows, cols) array"),
         "Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
         "their weights",
@@ -496,7 +465,6 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     rotation: ArrayLike | None = given(
-        None,
         Data("(rows, cols) array"),
         "Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn",
         "Rotation of the training image at each cell, in degrees from x to y (from columns to rows), rounded to "
@@ -504,7 +472,6 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     scale: ArrayLike | None = given(
-        None,
         Data("(rows, cols) array"),
         "Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2",
         "Factor by which the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root "
@@ -512,14 +479,13 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     source: bool = given(
-        False,
         Switch(),
         "Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz",
         "Return the position in the training image of each cell of each realisation too.",
+        default=False,
         group=OUTPUTS,
     )
     jobs: int | None = given(
-        None,
         Whole(1),
         "Make this many realisations at a time",
         none="one for each core, at most 4; on a GPU 1",
@@ -532,28 +498,25 @@ class Simulate(Seeded, Guided, Cells):
 class Estimate(Watched, Cells):
     """The inputs of `simdtex.estimate`."""
 
-    training: ArrayLike = given(
-        UNSET,
+    training: ArrayLike = needed(
         Data("(rows, cols) array, or a list of such"),
         doc="The training image, as in `simdtex.simulate`; one variable.",
-        positional=True,
         checker="training",
     )
     shape: tuple[int, int] | None = given(
-        None,
         Data("(int, int)"),
         doc="Rows and columns of the result. None: those of `known` if it is an array, else of the training image.",
     )
-    categorical: bool = given(False, Switch(), "Treat values as categories", group=DATA)
-    nearest: int = given(8, Whole(0, 64), "Use this many data for each cell, the nearest")
+    categorical: bool = given(Switch(), "Treat values as categories", group=DATA, default=False)
+    nearest: int = given(Whole(0, 64), "Use this many data for each cell, the nearest", default=8)
     reach: int | None = given(
-        None, Whole(0), "Use data up to this many cells away", none="an eighth of the smaller side of TRAINING_IMAGE"
+        Whole(0), "Use data up to this many cells away", none="an eighth of the smaller side of TRAINING_IMAGE"
     )
     bandwidth: float = given(
-        1.0,
         Number(0, above=True),
         "Set the width of the Parzen kernel, in units of h_opt",
         "h in units of h_opt, equation (8).",
+        default=1.0,
     )
 
 
@@ -561,21 +524,17 @@ class Estimate(Watched, Cells):
 class Classify(Common):
     """The inputs of `simdtex.classify`."""
 
-    image: ArrayLike = given(
-        UNSET,
+    image: ArrayLike = needed(
         Data("(rows, cols) or, with `channel_axis`, (rows, cols, bands) array"),
         doc="The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.",
-        positional=True,
         checker="picture with gaps",
     )
-    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike = given(
-        UNSET,
+    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike = needed(
         Data("mapping of str to array or list of arrays, or (rows, cols) array of integers"),
         "Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
         "Transparent pixels are not used",
         "The samples of each class, of the picture's type, by the name of the class. Or training regions of the "
         "picture itself: 1, 2, ... where a pixel is of a class, and 0 elsewhere.",
-        positional=True,
         flags="--texture textures",
         takes="named",
         metavar="NAME=FILE",
@@ -585,20 +544,17 @@ class Classify(Common):
         painter="_classes",
     )
     strokes: Any = given(
-        None,
         Data(""),
         "Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE",
         command_only=True,
         **PATHS,
     )
     masks: Mapping[str, Any] | None = given(
-        None,
         Data("mapping of str to (rows, cols) bool array or list of arrays"),
         doc="True for pixels of the samples that may be used; a class without masks is used whole.",
         identity=False,
     )
     validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = given(
-        None,
         Data("mapping of str to array or list of arrays"),
         "Measure with this picture of a class how much the class varies",
         "Further pictures of a class, from which no exemplars are drawn. They measure how much the class varies, which "
@@ -616,17 +572,14 @@ class Classify(Common):
 class Mix(Common):
     """The inputs of `simdtex.mix`."""
 
-    samples: Sequence[ArrayLike] = given(
-        UNSET,
+    samples: Sequence[ArrayLike] = needed(
         Data("sequence of (rows, cols) or, with `channel_axis`, three-dimensional arrays"),
         doc="One or more, of one type and any sizes. With `channel_axis`, grey ones may have two axes.",
-        positional=True,
     )
-    shape: tuple[int, int] = given(
-        UNSET, Data("(int, int)"), doc="Rows and columns of the output.", positional=True, checker="rows and columns"
+    shape: tuple[int, int] = needed(
+        Data("(int, int)"), doc="Rows and columns of the output.", checker="rows and columns"
     )
     palette: int | None = given(
-        None,
         Data("int"),
         "Take the colours of this sample",
         "The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.",
@@ -634,7 +587,6 @@ class Mix(Common):
         **NUMBERED,
     )
     pattern: int | None = given(
-        None,
         Data("int"),
         "Take the pattern of this sample",
         "The sample whose subband histograms are matched.",
@@ -642,7 +594,6 @@ class Mix(Common):
         **NUMBERED,
     )
     average: Sequence[float] | None = given(
-        None,
         Data("sequence of float"),
         "Average the patterns with these weights, one for each sample",
         "A weight for every sample, 0 or more. By default all weights are equal.",
@@ -650,21 +601,18 @@ class Mix(Common):
         metavar="W,W,...",
     )
     low: int | None = given(
-        None,
         Data("int"),
         "Take the low frequencies of this sample, with --high",
         "The sample of the low frequencies.",
         **NUMBERED,
     )
     high: int | None = given(
-        None,
         Data("int"),
         "Take the high frequencies of this sample, with --low",
         "The sample of the high frequencies.",
         **NUMBERED,
     )
     split: int | None = given(
-        None,
         Whole(0),
         doc="Number of levels, from the finest on, that are high frequencies; by default half of them.",
     )

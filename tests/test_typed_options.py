@@ -114,7 +114,6 @@ def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
         """The inputs of a job."""
 
         frame: object = inputs.given(
-            None,
             inputs.Data("(rows, cols) array"),
             "Use the frame in this file",
             "The frame of the picture.",

@@ -90,7 +90,8 @@ DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 option = functools.partial(click.option, cls=Option)
 
 TYPES: dict[str, Any] = {
-    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "direction": DIRECTION},
+    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float},
+    "direction": DIRECTION,
     "columns": Parsed(pairs, "AXIS=NAME,..."),
     "categories": Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
 }
