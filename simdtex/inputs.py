@@ -114,7 +114,8 @@ def needed(kind: Any, help: str = "", doc: str = "", **more: Any) -> Any:
     return given(kind, help, doc, UNSET, positional=True, **more)
 
 
-DATA, OUTPUTS, DEVICE = "Data and guides", "Further outputs", "Device and messages"
+DATA, OUTPUTS = "Data and guides", "Further outputs"
+RUNS, DEVICE = "Large outputs and interrupted runs", "Device and messages"
 """Groups of options."""
 
 PICTURE = "(rows, cols) or, with `channel_axis`, (rows, cols, channels) array"
@@ -132,8 +133,12 @@ class Watched:
 
     device: str | Machine | None = given(
         Data("str or Machine"),
-        doc='Part of a device\'s name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes '
+        "Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`",
+        'Part of a device\'s name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes '
         "SIMDTEX_DEVICE, else a GPU, else a CPU.",
+        none="SIMDTEX_DEVICE, else a GPU, else a CPU",
+        metavar="TEXT",
+        group=DEVICE,
         identity=False,
     )
     callback: Callback | None = given(
@@ -153,13 +158,21 @@ class Seeded(Watched):
     )
     rng: int | np.random.Generator | None = given(
         Data("int or numpy.random.Generator"),
-        doc="The seed. The same seed gives the same bytes on every device. None draws a random seed.",
+        "Use this seed: the same seed gives the same output on every device",
+        "The seed. The same seed gives the same bytes on every device. None draws a random seed.",
+        none="a random one, printed",
+        flags="--seed",
+        takes="integer",
         identity=False,
     )
     checkpoint: str | os.PathLike[str] | Checkpoint | None = given(
         Data("path or simdtex.Checkpoint"),
-        doc="A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, "
+        "Keep the state of the run in this file; `simdtex resume FILE` continues it",
+        "A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, "
         "the run continues from it, to the same bytes. The file is removed when the function returns.",
+        takes="new file",
+        metavar="FILE",
+        group=RUNS,
         identity=False,
     )
 
@@ -618,6 +631,9 @@ class Mix(Common):
     )
 
 
+SHARED = table(Common)
+"""The inputs that most functions share."""
+
 TABLES_OF: dict[str, Any] = {
     **{"synth": Synth, "solid": Solid, "fill": Fill, "extend": Extend, "simulate": Simulate, "estimate": Estimate},
     **{"classify": Classify, "mix": Mix},
@@ -627,9 +643,8 @@ TABLES_OF: dict[str, Any] = {
 
 def inputs(job: str) -> dict[str, Input]:
     """Return the inputs of a job by name: those that the function takes without a name first, the shared ones last."""
-    shared: dict[str, Any] = {**table(Common)}
     found: dict[str, Any] = {**table(TABLES_OF[job])}
-    order = sorted(found, key=lambda name: (not found[name].positional, name in shared))
+    order = sorted(found, key=lambda name: (not found[name].positional, name in SHARED))
     return {name: found[name] for name in order}
 
 

@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
-from simdtex.inputs import Input, inputs
+from simdtex.inputs import SHARED, Input, inputs
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -90,7 +90,8 @@ DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 option = functools.partial(click.option, cls=Option)
 
 TYPES: dict[str, Any] = {
-    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float},
+    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float, "integer": int},
+    "new file": WRITE,
     "direction": DIRECTION,
     "columns": Parsed(pairs, "AXIS=NAME,..."),
     "categories": Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
@@ -131,8 +132,9 @@ def paper_options(*names: str) -> Callable[[Command], Command]:
 
 
 def input_options(job: str, *names: str) -> Callable[[Command], Command]:
-    """Return a decorator that adds to a command the options of a job's inputs; of those ``names``, if there are any."""
-    found = {name: one for name, one in inputs(job).items() if one.help and (not names or name in names)}
+    """Return a decorator that adds to a command the options of the inputs of a job alone, or of those of ``names``."""
+    wanted = names or inputs(job).keys() - SHARED.keys()
+    found = {name: one for name, one in inputs(job).items() if one.help and name in wanted}
     return together(*(_option(job, name, {"": one}) for name, one in found.items()))
 
 
@@ -160,11 +162,13 @@ def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[C
 
 def _help(job: str, one: Declared) -> str:
     """Return the help of an option, with its default in the job."""
-    default, shown = one.default_of(job), one.none.replace("`", "")
-    if not shown and default and default is not UNSET:
+    default = one.default_of(job)
+    if default is None or (isinstance(one, Input) and one.none):
+        shown = one.none.replace("`", "")
+    elif default is False or (isinstance(one, Input) and default in (0, UNSET)):
+        shown = ""
+    else:
         shown = f"{default:g}" if isinstance(default, float) else str(default)
-    elif not shown and default is not False and not isinstance(one, Input):
-        shown = f"{default:g}"
     return f"{one.help}.  [{shown}]" if shown else f"{one.help}."
 
 
@@ -179,18 +183,7 @@ def output_option(help: str, type: Any = EITHER, **how: Any) -> Callable[[Comman
 
 
 OUTPUT = output_option("Write this picture, or a folder of maps.")
-SEED = option(
-    "--seed",
-    type=int,
-    help="Use this seed: the same seed gives the same output on every device.  [a random one, printed]",
-)
-DEVICE = option(
-    "--device",
-    metavar="TEXT",
-    group=DEVICE_GROUP,
-    help="Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`.  "
-    "[SIMDTEX_DEVICE, else a GPU, else a CPU]",
-)
+SEED, DEVICE, CHECKPOINT = (input_options("synth", name) for name in ("rng", "device", "checkpoint"))
 PROFILE = option(
     "--profile",
     is_flag=True,
@@ -210,13 +203,6 @@ PREVIEW = option(
     help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
-CHECKPOINT = option(
-    "--checkpoint",
-    type=WRITE,
-    metavar="FILE",
-    group=RUNS,
-    help="Keep the state of the run in this file; `simdtex resume FILE` continues it.",
-)
 
 
 material_options = together(
