@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -94,12 +95,7 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
             call, work = prepare(*args, **given)
 
             def identity() -> dict[str, Any]:
-                found: dict[str, Any] = {}
-                for name, one in own.items():
-                    if one.identity:
-                        found[name] = (
-                            getattr(call, name) if one.identity is True else IDENTITIES[one.identity](call, name)
-                        )
+                found = {name: IDENTITIES[one.identity](call, name) for name, one in own.items() if one.identity}
                 return found | {"options": work.options}
 
             run: Any = work.run if callable(work.run) else partial(drive, work.run)
@@ -107,17 +103,21 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
             made: Any = execute(plan.__name__, run, identity, *shared, call.checkpoint)
             return work.finish(*made) if work.finish else made
 
-        about, returns, more = cleandoc(plan.__doc__ or "").partition("Returns\n-------\n")
-        result, notes, more = more.partition("Notes\n-----\n")
-        tables = ", ".join(f"`{one.__module__.removesuffix('.options')}.{one.__qualname__}`" for one in methods)
-        options = f"**options\n    Those of the method, see {tables}.\n" if methods else ""
-        output = OUTPUT if "full_output" in own and "\noutput :" not in result else ""
-        result = f"{returns}{result.rstrip()}\n{output}\n"
-        function.__doc__ = f"{about}{entries(own)}\n{options}\n{result}{RAISES}\n{notes}{more}"
+        if plan.__doc__:
+            function.__doc__ = _described(plan.__doc__, own, methods)
         vars(function).update(__signature__=written, prepare=prepare)
         return lists(option_parameters(job, *methods, without=without))(function)
 
     return decorate
+
+
+def _described(doc: str, own: dict[str, Input], methods: tuple[Any, ...]) -> str:
+    """Return the docstring of a public function from one without the sections Parameters and Raises."""
+    about, returns, *notes = re.split(r"^(?=\w+\n---)", cleandoc(doc), flags=re.MULTILINE)
+    tables = ", ".join(f"`{one.__module__.removesuffix('.options')}.{one.__qualname__}`" for one in methods)
+    options = f"**options\n    Those of the method, see {tables}.\n" if methods else ""
+    output = OUTPUT if "full_output" in own and "\noutput :" not in returns else ""
+    return about + "\n".join([f"{entries(own)}\n{options}", f"{returns.rstrip()}\n{output}", RAISES, "".join(notes)])
 
 
 def _parameter(name: str, one: Input, type_: str) -> Parameter:
@@ -554,7 +554,8 @@ CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
 }
 """The checks that declarations name; see `simdtex.inputs.Input`."""
 
-IDENTITIES: dict[str, Callable[[Any, str], Any]] = {
+IDENTITIES: dict[bool | str, Callable[[Any, str], Any]] = {
+    True: getattr,
     "arrays": lambda call, name: call.inputs.identity()["sample" if name == "training" else name],
     "maps": lambda call, name: call.maps.digests().get(name),
 }
