@@ -152,11 +152,11 @@ def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[C
     if isinstance(first, Input):
         flags, type_ = first.named(name), TYPES.get(first.takes, type_)
         how |= {"metavar": first.metavar or ("FILE" if first.takes == "file" else None), "method": first.method}
-        how |= {"multiple": first.multiple}
+        how |= {"multiple": first.multiple, "default": None if first.default is UNSET else first.default or None}
         if type_ is DIRECTION:
             words, how["is_flag"], how["flag_value"] = [*DIRECTIONS], False, "both"
     if is_flag(kind):
-        return option(*flags, is_flag=True, default=None, **how)
+        return option(*flags, is_flag=True, **{**how, "default": None})
     return option(*flags, type=type_, words=words, **how)
 
 

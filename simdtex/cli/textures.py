@@ -70,7 +70,7 @@ REPORTED = "its pictures, and how evenly it uses the picture"
 @stages_option("every level, sweep or iteration")
 @report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @PROFILE
-def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str | None, **options: Any) -> Task | None:
+def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
     """Synthesise a picture of any size with the texture of SAMPLE.
 
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
@@ -78,7 +78,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     """
     from simdtex.jobs.synthesis import synthesize
 
-    context, method = click.get_current_context(), method or "mrf"
+    context = click.get_current_context()
     check_tiles(context)
     how = take_reading(options)
     target, material = read_lead(samples, output, options, how)
