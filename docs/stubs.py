@@ -48,9 +48,6 @@ FUNCTIONS = (
 )
 """The functions: job, name, options, keywords, and the switch that decides which of two types they return."""
 
-OF_A_METHOD = ("mask", "known", "known_source", "guide")
-"""What only the method ``mrf`` of `synthesize` takes."""
-
 HEAD = '''\
 # SPDX-License-Identifier: BSD-3-Clause
 # ruff: noqa: E501
@@ -111,7 +108,7 @@ def keywords_of(job, options, name, switch):
     bases = ", ".join([f"{options}Options"] * bool(options)) or "TypedDict"
     lines = [f"class {name}Keywords({bases}, total=False):"]
     for one, written in parameter_types(job).items():
-        if inputs(job)[one].positional or one == switch or (other and one in OF_A_METHOD):
+        if inputs(job)[one].positional or one == switch or (other and inputs(job)[one].method):
             continue
         lines.append(f"    {one}: {written}")
         if one == "method":

@@ -191,7 +191,7 @@ class Sampled:
     mask: ArrayLike | Sequence[ArrayLike] | None = given(
         Data("(rows, cols) bool array, or a list of such"),
         "Take pixels only from the white parts of this mask, of the sample's size; give one for each sample",
-        "``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.",
+        "True for pixels of the sample that may be taken; all other pixels are still neighbours.",
         identity="arrays",
         flags="--sample-mask",
         multiple=True,
@@ -203,7 +203,7 @@ class Sampled:
         Data("array of `shape` (and the channel axis), HardData, pandas.DataFrame or path"),
         "Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of Geo-EAS, or "
         "a picture or a grid whose unknown pixels are transparent or NaN",
-        "``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN "
+        "Conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN "
         "for unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some "
         "variables (channels) of a pixel may be known and others not.",
         checker="data",
@@ -247,7 +247,7 @@ class Guided:
         Data("(array, array)"),
         "Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of labels or "
         "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples",
-        "``mrf``: two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the "
+        "Two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the "
         "output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means "
         "no guide. With several samples, the first is a list of pictures.",
         identity="arrays",
@@ -287,9 +287,10 @@ class Synth(Common, Guided, Sampled):
     )
     known_source: ArrayLike | None = given(
         Data("(rows, cols, 2) int array"),
-        doc="``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 "
+        doc="The (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 "
         "for pixels from elsewhere. Known pixels with a position suggest candidates that continue it.",
         identity="arrays",
+        method="mrf",
     )
 
 

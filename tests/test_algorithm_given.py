@@ -7,7 +7,7 @@ import numpy as np
 import plain_mrf
 import pytest
 from cases import REFERENCE, assert_same_bits, texture
-from simdtex.jobs.maps import check_region
+from simdtex.jobs.inputs import check_region
 from test_algorithm import ELSEWHERE
 
 import simdtex

@@ -114,10 +114,14 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
 def _described(doc: str, own: dict[str, Input], methods: tuple[Any, ...]) -> str:
     """Return the docstring of a public function from one without the sections Parameters and Raises."""
     about, returns, *notes = re.split(r"^(?=\w+\n---)", cleandoc(doc), flags=re.MULTILINE)
+    alone = {name for name, one in own.items() if one.method and len(methods) > 1}  # of one of several methods
+    told = {name: replace(one, doc=f"``{one.method}``: {one.doc}") for name, one in own.items() if name in alone}
     tables = ", ".join(f"`{one.__module__.removesuffix('.options')}.{one.__qualname__}`" for one in methods)
     options = f"**options\n    Those of the method, see {tables}.\n" if methods else ""
     output = OUTPUT if "full_output" in own and "\noutput :" not in returns else ""
-    return about + "\n".join([f"{entries(own)}\n{options}", f"{returns.rstrip()}\n{output}", RAISES, "".join(notes)])
+    return about + "\n".join(
+        [f"{entries(own | told)}\n{options}", f"{returns.rstrip()}\n{output}", RAISES, "".join(notes)]
+    )
 
 
 def _parameter(name: str, one: Input, type_: str) -> Parameter:
