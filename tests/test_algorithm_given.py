@@ -7,12 +7,11 @@ import numpy as np
 import plain_mrf
 import pytest
 from cases import REFERENCE, assert_same_bits, texture
-from simdtex.jobs.inputs import check_region
 from test_algorithm import ELSEWHERE
 
 import simdtex
 from simdtex.driver import drive
-from simdtex.jobs.inputs import check_inputs
+from simdtex.jobs.inputs import check_inputs, check_region
 from simdtex.machine import open_machine
 from simdtex.methods import mrf
 from simdtex.model.soft import Soft
