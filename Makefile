@@ -79,6 +79,7 @@ lint:
 	$(call install,dev,[dev])
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
+	$(PY) docs/stubs.py --check
 	$(PY) -m mypy --strict simdtex
 
 # The gallery runs the examples. With Chromium, its driver and Selenium the pages are looked at in a browser, too.

@@ -359,7 +359,7 @@ def _interrupted(seconds):
 
 def _leave(_, frame):
     """Handle a Ctrl-C outside a command as `simdtex.__main__` does, but without ending the process."""
-    from simdtex.cli.ending import postponed
+    from simdtex.cli.command import postponed
 
     if postponed(frame):
         return

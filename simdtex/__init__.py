@@ -3,54 +3,20 @@
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # as type checkers know it by this name, without what importing typing takes
-if TYPE_CHECKING:
-    from typing import Any
-
-    from simdtex.checkpoint import Checkpoint as Checkpoint
-    from simdtex.experiments import quality as quality
-    from simdtex.io.grids import read_grid as read_grid
-    from simdtex.io.grids import write_grid as write_grid
-    from simdtex.io.hard_data import place_hard_data as place_hard_data
-    from simdtex.io.hard_data import read_hard_data as read_hard_data
-    from simdtex.jobs.classification import TextureClassifier as TextureClassifier
-    from simdtex.jobs.classification import classify as classify
-    from simdtex.jobs.estimation import estimate as estimate
-    from simdtex.jobs.filling import extend as extend
-    from simdtex.jobs.filling import fill as fill
-    from simdtex.jobs.simulation import simulate as simulate
-    from simdtex.live.widget import Live as Live
-    from simdtex.machine import open_machine as open_machine
-    from simdtex.machine.devices import DeviceError as DeviceError
-    from simdtex.machine.devices import devices as devices
-    from simdtex.methods.pyramid.mixtures import mix as mix
-    from simdtex.model.show import show as show
-    from simdtex.run import Output as Output
-    from simdtex.run import Progress as Progress
-    from simdtex.synthesis import explain as explain
-    from simdtex.synthesis import lcpdf as lcpdf
-    from simdtex.synthesis import replay as replay
-    from simdtex.synthesis import synthesize as synthesize
-    from simdtex.synthesis import synthesize_solid as synthesize_solid
-
-    __version__: str
-
 _NAMES = {
     "simdtex.checkpoint": ("Checkpoint",),
     "simdtex.experiments": ("quality",),
     "simdtex.io.grids": ("read_grid", "write_grid"),
     "simdtex.io.hard_data": ("place_hard_data", "read_hard_data"),
     "simdtex.jobs.classification": ("TextureClassifier", "classify"),
-    "simdtex.jobs.estimation": ("estimate",),
     "simdtex.jobs.filling": ("extend", "fill"),
-    "simdtex.jobs.simulation": ("simulate",),
+    "simdtex.jobs.simulation": ("estimate", "simulate"),
+    "simdtex.jobs.synthesis": ("explain", "lcpdf", "mix", "replay", "synthesize", "synthesize_solid"),
     "simdtex.live.widget": ("Live",),
     "simdtex.machine": ("open_machine",),
     "simdtex.machine.devices": ("DeviceError", "devices"),
-    "simdtex.methods.pyramid.mixtures": ("mix",),
     "simdtex.model.show": ("show",),
     "simdtex.run": ("Output", "Progress"),
-    "simdtex.synthesis": ("explain", "lcpdf", "replay", "synthesize", "synthesize_solid"),
 }
 """The public names by their modules, each of which is loaded at its first use, so that the command line starts fast."""
 
@@ -65,12 +31,12 @@ _WORDS = {
 __all__ = sorted(name for names in _NAMES.values() for name in names)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     home = next((home for home, names in _NAMES.items() if name in names), None)
     if name == "__version__":
         from importlib.metadata import version
 
-        found: Any = version("simdtex")
+        found: object = version("simdtex")
     elif home:
         from importlib import import_module
 

@@ -21,14 +21,14 @@ def main() -> None:
         import signal
 
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started us ignores it
-            signal.signal(signal.SIGINT, leave)  # until a command begins: simdtex.cli.ending
+            signal.signal(signal.SIGINT, leave)  # until a command begins: simdtex.cli.command
         from simdtex.cli import main as command
 
         command()
     except KeyboardInterrupt:
         sys.exit(130)
     except OSError as error:  # of standard output, outside of a command
-        from simdtex.cli.ending import settle
+        from simdtex.cli.command import settle
 
         settle(error)
     finally:

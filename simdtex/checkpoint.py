@@ -121,7 +121,7 @@ class Checkpoint:
         self.path.unlink(missing_ok=True)
 
     @contextmanager
-    def opened(
+    def begin(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
     ) -> Iterator[tuple[int, Checkpointing]]:
         """Lock the file, and start a run or resume the run in the file; yield its seed and its checkpointing.
@@ -217,20 +217,20 @@ class Checkpoint:
 
 
 @contextmanager
-def opened(
+def begin_run(
     checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None,
     job: str,
     rng: Any,
     inputs: Callable[[], dict[str, Any]],
     device: str,
 ) -> Iterator[tuple[int, Checkpointing]]:
-    """Open the checkpoint of a public function, see `Checkpoint.opened`; a `Checkpointing` is used unchanged."""
+    """Open the checkpoint of a public function, see `Checkpoint.begin`; a `Checkpointing` is used unchanged."""
     if checkpoint is None or isinstance(checkpoint, Checkpointing):
         yield as_seed(rng), checkpoint or Checkpointing()
         return
     own = not isinstance(checkpoint, Checkpoint)
     kept = checkpoint if isinstance(checkpoint, Checkpoint) else Checkpoint(checkpoint)
-    with kept.opened(job, rng, inputs, device) as run:
+    with kept.begin(job, rng, inputs, device) as run:
         yield run
     if own:
         kept.remove()

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.checkpoint import Checkpoint, Checkpointing, opened
+from simdtex.checkpoint import Checkpoint, Checkpointing, begin_run
 from simdtex.machine import Machine, open_machine
 from simdtex.options import real_array, whole
 from simdtex.run import Callback, Output
@@ -147,7 +147,7 @@ def execute(
     """
     machine = open_machine(device)
     machine.profile()  # forget what was before
-    with opened(checkpoint, name, rng, inputs, machine.name) as (seed, checkpointing):
+    with begin_run(checkpoint, name, rng, inputs, machine.name) as (seed, checkpointing):
         image, output = run(machine, seed, seeing(callback, channel_axis), checkpointing)
     output.statistics.update(machine.profile() or {})
     picture = restored(image, channel_axis)

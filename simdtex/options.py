@@ -2,7 +2,7 @@
 """The table of options: the declarations in the fields of a method's `Options`, and the checks of values.
 
 An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. The declaration
-gives its check, its entry in the docstring, its type in ``simdtex/methods/typed_options.py``, and its entries on the
+gives its check, its entry in the docstring, its type in ``simdtex/__init__.pyi``, and its entries on the
 command line, on the live page and in the reference pages.
 """
 
@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from inspect import Parameter, signature
 from math import isfinite, prod
 from numbers import Integral, Real
-from textwrap import wrap
+from textwrap import indent, wrap
 from typing import Any, TypeVar
 
 import numpy as np
@@ -202,6 +202,16 @@ class Option:
         if value is not None or self.default is not None:
             self.kind.check(name, value)
 
+    def described(self) -> str:
+        """Return the declaration in sentences, but for the type and default."""
+        text = [f"{self.help}.", self.more, f"None: {self.none}." if self.none else ""]
+        text.append(f"In the paper: {self.symbol}." if self.symbol else "")
+        if self.jobs:
+            jobs = [f"``{quoted(value)}`` in ``{job}``" for job, value in self.jobs.items()]
+            text.append(f"By default {', '.join(jobs)}.")
+        text.append("" if self.paper is UNSET else f'With ``preset="paper"``: ``{quoted(self.paper)}``.')
+        return " ".join(sentence for sentence in text if sentence)
+
 
 PRESETS = ("default", "paper")
 
@@ -269,8 +279,8 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     return options(**values)
 
 
-def lists_options(job: str, *methods: Any, without: str = "") -> Callable[[F], F]:
-    """Return a decorator that lists options, but the one `without`, in a function's signature for ``**options``.
+def option_parameters(job: str, *methods: Any, without: str = "") -> list[Parameter]:
+    """Return the parameters that ``**options`` stands for in the function of a job, but for the one `without`.
 
     ``methods`` are classes of options. An option has the default of the first class that has it, and the types of all.
     """
@@ -283,39 +293,41 @@ def lists_options(job: str, *methods: Any, without: str = "") -> Callable[[F], F
         old = found.setdefault(name, new)
         found[name] = old.replace(annotation=" | ".join(dict.fromkeys([old.annotation, type_])))
     found.pop(without, None)
+    return list(found.values())
+
+
+def lists(parameters: Iterable[Parameter]) -> Callable[[F], F]:
+    """Return a decorator that lists parameters in a function's signature in the place of ``**options``.
+
+    The signature as it is written is kept as the attribute ``written``, for pages that describe options elsewhere.
+    """
 
     def decorate(function: F) -> F:
         written = signature(function)
         own = [one for one in written.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-        vars(function)["__signature__"] = written.replace(parameters=[*own, *found.values()])
+        more = [one for one in parameters if one.name not in written.parameters]
+        vars(function).update(written=written, __signature__=written.replace(parameters=[*own, *more]))
         return function
 
     return decorate
 
 
-INDENTED: dict[str, Any] = {"initial_indent": " " * 8, "subsequent_indent": " " * 8, "break_on_hyphens": False}
-
-
 def documented(options: type[T]) -> type[T]:
     """Append the section Parameters to the docstring of a class of options."""
-    lines = ["", "", "    Parameters", "    ----------"]
-    for name, one in table(options).items():
-        default = "optional" if one.default is None else f"default {quoted(one.default)}"
-        unit = f", in {one.unit}" if one.unit else ""
-        lines += [f"    {name} : {one.kind}{unit}, {default}", *wrap(described(one), 120, **INDENTED)]
-    options.__doc__ = f"{(options.__doc__ or '').rstrip()}" + "\n".join(lines) + "\n    "
+    options.__doc__ = f"{(options.__doc__ or '').rstrip()}\n\n{indent(entries(table(options)), '    ')}\n    "
     return options
 
 
-def described(one: Option) -> str:
-    """Return a declaration in sentences, but for the type and default."""
-    text = [f"{one.help}.", one.more, f"None: {one.none}." if one.none else ""]
-    text.append(f"In the paper: {one.symbol}." if one.symbol else "")
-    if one.jobs:
-        jobs = [f"``{quoted(value)}`` in ``{job}``" for job, value in one.jobs.items()]
-        text.append(f"By default {', '.join(jobs)}.")
-    text.append("" if one.paper is UNSET else f'With ``preset="paper"``: ``{quoted(one.paper)}``.')
-    return " ".join(sentence for sentence in text if sentence)
+def entries(declared: Mapping[str, Option]) -> str:
+    """Return the section Parameters of a docstring."""
+    lines = ["Parameters", "----------"]
+    for name, one in declared.items():
+        default = (
+            "" if one.default is UNSET else ", optional" if one.default is None else f", default {quoted(one.default)}"
+        )
+        lines.append(f"{name} : {one.kind}{f', in {one.unit}' if one.unit else ''}{default}")
+        lines += wrap(one.described(), 112, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
+    return "\n".join(lines)
 
 
 def quoted(value: Any) -> str:

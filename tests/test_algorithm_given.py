@@ -11,8 +11,7 @@ from test_algorithm import ELSEWHERE
 
 import simdtex
 from simdtex.driver import drive
-from simdtex.jobs.inputs import check_inputs
-from simdtex.jobs.maps import check_region
+from simdtex.jobs.inputs import check_inputs, check_region
 from simdtex.machine import open_machine
 from simdtex.methods import mrf
 from simdtex.model.given import Soft

@@ -189,15 +189,20 @@ def test_ctrl_c_leaves_no_file(folder):
         ("simdtex.bench.run.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], [], "nothing was written"),
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
-        ("simdtex.synthesis.synthesize", ["synth", "a.png", "-o", "o.png", "--stages", "st"], ["st/level0.png"], "st"),
         (
-            "simdtex.synthesis.synthesize",
+            "simdtex.jobs.synthesis.synthesize",
+            ["synth", "a.png", "-o", "o.png", "--stages", "st"],
+            ["st/level0.png"],
+            "st",
+        ),
+        (
+            "simdtex.jobs.synthesis.synthesize",
             ["synth", "a.png", "-o", "o.png", "--stages", "st"],
             [],
             "nothing was written",
         ),
         (
-            "simdtex.synthesis.synthesize",
+            "simdtex.jobs.synthesis.synthesize",
             ["synth", "a.png", "-o", "old.png", "--stages", "st"],
             ["old.png", "st/level0.png"],
             "old.png, st",

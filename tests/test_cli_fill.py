@@ -8,7 +8,7 @@ from commands import contents, pixels, refused, run
 
 import simdtex
 from simdtex import checkpoint as checkpoints
-from simdtex.cli.maps import Folder
+from simdtex.cli.inputs import Folder
 from simdtex.io import image
 from simdtex.io.files import NotWritten
 from simdtex.model.source_map import apply_source_map, load_source_map

@@ -24,7 +24,7 @@ from rasterio.transform import from_origin
 
 from simdtex import distributed
 from simdtex.cli import main
-from simdtex.cli.ending import catch_signals
+from simdtex.cli.command import catch_signals
 from simdtex.io import grids, image
 from simdtex.io.grids import MISSING, check_grid, is_grid, kind_of, read_grid, write_grid
 from simdtex.io.volume import check_realisations_path, write_realisations

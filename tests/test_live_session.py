@@ -23,11 +23,9 @@ from simdtex.io.image import read_bytes
 from simdtex.live import frames, results
 from simdtex.live import session as sessions
 from simdtex.live.frames import Layer, Window, parse_window, render
-from simdtex.live.inside import BARS, SET_COLOURS
-from simdtex.live.job import LABELS, Picture, paint
-from simdtex.live.levels import Levels
-from simdtex.live.results import Results
-from simdtex.live.words import TABLES, controls
+from simdtex.live.job import LABELS, TABLES, Picture, controls, paint
+from simdtex.live.results import BARS, SET_COLOURS, Results
+from simdtex.live.session import Levels
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
 from simdtex.model.display import read_labels

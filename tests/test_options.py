@@ -11,7 +11,7 @@ from cases import assert_same_bits, ising
 from click.testing import CliRunner
 
 import simdtex
-from simdtex.cli.ending import reporting
+from simdtex.cli.command import reporting
 from simdtex.experiments.comparison import compare
 from simdtex.experiments.ising import torus_energy
 from simdtex.machine.reference import Reference

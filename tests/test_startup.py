@@ -83,6 +83,28 @@ def test_a_whole_run_on_the_reference_needs_no_heavy_module(tmp_path):
     assert os.path.exists(out)
 
 
+@pytest.mark.parametrize(
+    ("library", "words", "extra"),
+    [
+        ("jinja2", ["synth", "a.png", "-o", "b.png", "--report", "page"], "reports"),
+        ("matplotlib", ["schedules", "a.png"], "reports"),
+        ("nrrd", ["solid", "a.png", "-o", "b.nrrd"], "volumes"),
+    ],
+)
+def test_a_library_of_an_extra_costs_a_sentence(tmp_path, monkeypatch, library, words, extra):
+    monkeypatch.chdir(tmp_path)
+    write("a.png", np.arange(256, dtype=np.uint8).reshape(16, 16))
+    for name in [name for name in sys.modules if name.startswith(("simdtex.report", library))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, library, None)
+    said = CliRunner().invoke(cli.main, words)
+    assert (said.exit_code, said.output) == (
+        2,
+        f"simdtex: {library} is not installed; pip install 'simdtex[{extra}]'\n",
+    )
+    assert os.listdir() == ["a.png"]
+
+
 def test_every_public_name_is_there():
     assert set(dir(simdtex)) >= PUBLIC
     assert set(simdtex.__all__) == PUBLIC - {"__version__"}
@@ -140,7 +162,7 @@ def interrupted(tmp_path, way, module, size="64", before=None):
 @pytest.mark.parametrize(
     ("way", "module"),
     [
-        *(("module", name) for name in ("simdtex.cli", "click", "click.core", "simdtex.cli.synth", "numpy", "PIL")),
+        *(("module", name) for name in ("simdtex.cli", "click", "click.core", "simdtex.cli.textures", "numpy", "PIL")),
         *(("script", name) for name in ("simdtex.cli", "numpy")),
     ],
 )
@@ -163,12 +185,12 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
 @pytest.mark.parametrize("module", ["simdtex.machine.devices", "weakref", "_weakrefset"])
 def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
     """In the search for runtimes, which would leave its temporary folder, and in callbacks of what is collected."""
-    from simdtex.cli import ending
+    from simdtex.cli import command
 
     assert find_spec(module)
     over, names = [], {"__name__": module, "signal": signal, "time": time}
     exec("def search(over):\n signal.raise_signal(signal.SIGINT)\n time.sleep(0.05)\n over.append(True)", names)
-    with pytest.raises(KeyboardInterrupt), ending.catch_signals(click.Context(click.Command("any"))):
+    with pytest.raises(KeyboardInterrupt), command.catch_signals(click.Context(click.Command("any"))):
         names["search"](over)
         for _ in range(600):  # until the signal comes again
             time.sleep(0.1)
@@ -176,7 +198,7 @@ def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
 
 
 def test_what_ctrl_c_leaves_undone_is_not_warned_of():
-    from simdtex.cli.ending import reporting
+    from simdtex.cli.command import reporting
 
     @click.command()
     @reporting()

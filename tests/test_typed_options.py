@@ -1,128 +1,36 @@
-"""The types of ``**options`` follow from the tables; run this file to write them anew. An option is declared once."""
+"""An option or an input is declared once: in Python, on the command line, on the live page, and in the types."""
 
 import re
+import runpy
 import subprocess
 import sys
 from dataclasses import dataclass
-from importlib import import_module
 from inspect import signature
 from pathlib import Path
-from textwrap import fill
+from types import SimpleNamespace
 
+import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import simdtex
+from simdtex import inputs
+from simdtex.checkpoint import Checkpoint, identity, read
+from simdtex.cli import inputs as readers
 from simdtex.cli.job import Task, job
+from simdtex.cli.options import input_options
+from simdtex.jobs import inputs as checks
 from simdtex.methods import classifier, mrf, pyramid
-from simdtex.methods.typed_options import Common
-from simdtex.options import (
-    PRESET,
-    Choice,
-    Number,
-    Numbers,
-    Other,
-    Switch,
-    Whole,
-    documented,
-    has_presets,
-    option,
-    resolve,
-    table,
-)
-from simdtex.schedules import SCHEDULES
+from simdtex.options import Number, documented, option, resolve
 
-FILE = Path(simdtex.__file__).with_name("methods") / "typed_options.py"
-OVERLOADED = {"full_output", "source"}
-PAIR = "tuple[float, float]"
-
-TABLES = {
-    "MrfOptions": ("mrf", "TypedDict"),
-    "MultiresSynth": ("multires", "Common"),
-    "PyramidOptions": ("pyramid", "TypedDict"),
-    "PyramidSynth": ("pyramid", "Common, PyramidOptions"),
-    "SolidSynth": ("pyramid.solid", "Common, PyramidOptions"),
-    "ClassifierOptions": ("classifier", "TypedDict"),
-}
-"""The method and the base of each class."""
-
-HEAD = '''# SPDX-License-Identifier: BSD-3-Clause
-"""The types of ``**options`` for editors and type checkers (PEP 692), from the tables of options.
-
-``python tests/test_typed_options.py`` writes this file.
-"""
-
-from __future__ import annotations
-
-import os
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Required, TypedDict
-
-import numpy as np
-from numpy.typing import ArrayLike
-
-from simdtex.checkpoint import Checkpoint
-from simdtex.io.hard_data import HardData
-from simdtex.machine import Machine
-from simdtex.run import Callback
-from simdtex.schedules import Schedule
-
-ScheduleName = Literal[
-    NAMES
-]  # fmt: skip
-
-
-class Common(TypedDict, total=False):
-    """What the public functions have in common."""
-
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    device: str | Machine | None
-    callback: Callback | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-'''
-FUNCTIONS = {
-    "MrfSynth": (simdtex.synthesize, "Common, MrfOptions"),
-    "FillOptions": (simdtex.fill, "Common, MrfOptions"),
-    "ExtendOptions": (simdtex.extend, "Common, MrfOptions"),
-    "SimulateOptions": (simdtex.simulate, "MrfOptions"),
-    "MixOptions": (simdtex.mix, "Common, PyramidOptions"),
-    "ClassifyOptions": (simdtex.classify, "Common, ClassifierOptions"),
-}
-"""The functions that have further arguments, which are given by name, and the options that they take."""
-
-
-def type_of(one):
-    kinds = {Number: "float", Whole: "int", Switch: "bool", Numbers: "tuple[float, ...] | list[float]"}
-    words = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, (Choice, Other)) else ""
-    found = kinds.get(type(one.kind), words)
-    if isinstance(one.kind, Other):
-        says = one.kind.says.replace("str or simdtex.schedules.", "ScheduleName | ").replace("array", "ArrayLike")
-        says = says.replace("str or two vectors", f"{words} | tuple[{PAIR}, {PAIR}]")
-        found = says.replace("tuple of int", "tuple[int, ...]").replace(" or ", " | ")
-    return f"{found} | None" if one.default is None else found
-
-
-def typed():
-    lines = [HEAD.replace("NAMES", fill(str(list(SCHEDULES))[1:-1], 116).replace("\n", "\n    "))]
-    for name, (method, base) in TABLES.items():
-        found = table(import_module(f"simdtex.methods.{method}").Options)
-        known = table(import_module("simdtex.methods.pyramid").Options) if "PyramidOptions" in base else {}
-        lines += [f"\nclass {name}({base}, total=False):", f'    """The options of the method ``{method}``."""', ""]
-        lines += [f"    method: Required[Literal[{method!r}]]"] if name in ("MultiresSynth", "PyramidSynth") else []
-        lines += [f"    preset: {type_of(PRESET)}"] if has_presets(found) and not known else []
-        lines += [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known] + [""]
-    for name, (func, bases) in FUNCTIONS.items():
-        known = OVERLOADED | Common.__annotations__.keys() if "Common" in bases else OVERLOADED
-        own = {one: func.__annotations__[one] for one in func.__kwdefaults__ if one not in known}
-        own |= {"method": 'Literal["mrf"]'} if "method" in own else {}
-        lines += [f"\nclass {name}({bases}, total=False):", f'    """The options of `simdtex.{func.__name__}`."""', ""]
-        lines += [f"    {one}: {written}" for one, written in own.items()] + [""]
-    return "\n".join(lines).replace("'", '"')
+ROOT = Path(simdtex.__file__).parents[1]
+SAMPLES = SimpleNamespace(channel_axis=None)
 
 
 def test_the_types_follow_from_the_tables():
-    assert FILE.read_text(encoding="utf-8") == typed(), "run: python tests/test_typed_options.py"
+    written = (ROOT / "simdtex" / "__init__.pyi").read_text(encoding="utf-8")
+    assert written == runpy.run_path(str(ROOT / "docs" / "stubs.py"))["stub"](), "run: python docs/stubs.py"
 
 
 USES = """\
@@ -147,7 +55,7 @@ simdtex.replay(sample, size, relaxation="icn")  # wrong
 def test_type_checkers_find_wrong_uses(tmp_path):
     (tmp_path / "uses.py").write_text(USES)
     command = [sys.executable, "-m", "mypy", "--strict", tmp_path / "uses.py"]
-    said = subprocess.run(command, cwd=FILE.parents[2], capture_output=True, text=True).stdout
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
     wrong = [str(number) for number, line in enumerate(USES.splitlines(), 1) if "wrong" in line]
     assert re.findall(r"uses.py:(\d+): error", said) == wrong, said
 
@@ -162,7 +70,7 @@ def test_signatures_list_options_with_the_defaults_of_the_job():
 
 def test_an_option_that_is_declared_is_everywhere(monkeypatch):
     """In Python with its default, check and preset, in the docstring, on the command line and on the live page."""
-    from simdtex.live import words
+    from simdtex.live import job as page
 
     how = {"jobs": {"mix": 0.75}, "shown": ("mix",), "group": "Appearance", "slider": (0, 1, 0.1)}
 
@@ -175,7 +83,7 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
 
     Options.__module__ = "simdtex.methods.pyramid"
     monkeypatch.setattr(pyramid, "Options", Options)
-    monkeypatch.setitem(words.TABLES, "pyramid", (Options, "mix"))
+    monkeypatch.setitem(page.TABLES, "pyramid", (Options, "mix"))
     given = [
         resolve(Options, job, values).glitter for job, values in [("synth", {}), ("mix", {}), ("mix", {"glitter": 1})]
     ]
@@ -184,7 +92,7 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
     with pytest.raises(ValueError, match="glitter is -1; give a number of at least 0"):
         resolve(Options, "synth", {"glitter": -1})
     assert "glitter : float, 0 or more, default 0.5\n" in Options.__doc__ and "Make it glitter." in Options.__doc__
-    assert {"name": "glitter", "default": 0.75}.items() <= words.controls("pyramid")[-1].items()
+    assert {"name": "glitter", "default": 0.75}.items() <= page.controls("pyramid")[-1].items()
 
     made = []
 
@@ -198,5 +106,50 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
     assert "--glitter FLOAT" in CliRunner().invoke(mix, ["--help"]).output
 
 
-if __name__ == "__main__":
-    FILE.write_text(typed(), encoding="utf-8")
+def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
+    """A parameter with its default, check, identity and entry in the docstring; an option of the command, and read."""
+
+    @dataclass
+    class Fill(inputs.Fill):
+        """The inputs of a job."""
+
+        frame: object = inputs.given(
+            inputs.Data("(rows, cols) array"),
+            "Use the frame in this file",
+            "The frame of the picture.",
+            checker="frame",
+            takes="file",
+            reader="read_frame",
+        )
+
+    def planned(call):
+        """Fill.
+
+        Returns
+        -------
+        image : array
+        """
+
+        def interrupted(*_):
+            raise KeyboardInterrupt
+
+        return checks.Work(interrupted, mrf.Options(), call.channel_axis)
+
+    monkeypatch.setitem(inputs.TABLES_OF, "fill", Fill)
+    monkeypatch.setitem(checks.CHECKS, "frame", lambda name, value, call: call.image[0] + value)
+    monkeypatch.setattr(readers, "read_frame", lambda path, files: f"{files.flag} {path}", raising=False)
+    filled = checks.public("fill", mrf.Options)(planned)
+    assert signature(filled).parameters["frame"].default is None
+    assert "frame : (rows, cols) array, optional\n    The frame of the picture.\n" in filled.__doc__
+    call, _ = filled.prepare(np.ones((2, 2)), frame=2)
+    assert (call.frame == 3).all() and call.grow == 0
+    with pytest.raises(ValueError, match="grow is -1; give 0 or more"):
+        filled.prepare(np.ones((2, 2)), grow=-1)
+    with pytest.raises(KeyboardInterrupt):
+        filled(np.ones((2, 2)), frame=2, checkpoint=Checkpoint(tmp_path / "kept"), device="reference")
+    assert read(tmp_path / "kept")[0]["inputs"]["frame"] == identity(np.full((2, 2, 1), 3.0))
+
+    command = click.command()(input_options("fill")(lambda **given: print(readers.read_inputs("fill", given, SAMPLES))))
+    said = CliRunner().invoke(command, ["--frame", "a.png"]).output
+    assert said == "{'channel_axis': None, 'frame': '--frame a.png'}\n"
+    assert "--frame FILE" in CliRunner().invoke(command, ["--help"]).output

@@ -68,8 +68,8 @@ def paper_values(method):
 
 def as_written(app, function, bound):
     """Leave the signature as it is written: `inspect` shows all options, which have tables of their own here."""
-    if isfunction(function):
-        vars(function).pop("__signature__", None)
+    if isfunction(function) and hasattr(function, "written"):
+        function.__signature__ = function.written
 
 
 def setup(app):

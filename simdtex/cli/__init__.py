@@ -47,8 +47,10 @@ GROUPS = {
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
 MODULES = {
-    **{"tile": "extend", "fill": "extend", "estimate": "simulate", "solid": "mix", "ising": "schedules"},
-    **{"demo": "machine", "devices": "machine", "bench": "machine"},
+    **dict.fromkeys(("synth", "extend", "tile", "fill", "mix", "solid"), "textures"),
+    **dict.fromkeys(("estimate", "classify"), "simulate"),
+    **dict.fromkeys(("live", "demo", "devices", "bench"), "machine"),
+    **{"resume": "tiles", "ising": "schedules"},
 }
 """The modules of commands that are not in the one of their name."""
 

@@ -1,29 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The files that a command reads: samples, masks, known values, guides, and other maps of a material."""
+"""The files of a command: samples, masks, known values and guides that are read, and the maps of a material."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.ending import note
+from simdtex.cli.command import note
+from simdtex.cli.places import Named, check_input, preview_of
+from simdtex.inputs import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
     from simdtex.io.grids import Frame
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image, Metadata
+    from simdtex.model.material import Maps
+
+SHEET = 4096
+"""The most pixels a side of a picture of copies; a larger one is reduced."""
 
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """How the name of a table of known values ends; a file of any other name is a picture."""
-
-
-MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
-"""The maps of a simulation, which have files of their own."""
 
 
 class Reading(NamedTuple):
@@ -53,14 +57,14 @@ PLAIN = Reading()
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``lies`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system; ``deep``
-    whether there is one volume; ``metadata`` what the file of the first says of its pixels.
+    ``georeference`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system;
+    ``deep`` whether there is one volume; ``metadata`` what the file of the first says of its pixels.
     """
 
     paths: tuple[Path, ...]
     pixels: list[NDArray[Any]]
     channel_axis: int | None
-    lies: Frame | None = None
+    georeference: Frame | None = None
     deep: bool = False
     metadata: Metadata | None = None
     crs: str = ""
@@ -176,11 +180,11 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
 
 
 class Read(NamedTuple):
-    """What a file holds: ``pixels``; the ``metadata`` of a picture; where cells of a grid lie, and its ``crs``."""
+    """What a file holds: ``pixels``; the ``metadata`` of a picture; the ``georeference`` of a grid, and its ``crs``."""
 
     pixels: NDArray[Any]
     metadata: Metadata | None = None
-    lies: Frame | None = None
+    georeference: Frame | None = None
     crs: str = ""
 
 
@@ -213,14 +217,14 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     """Read pictures or grids, or with ``how.deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, metadata, lie, crs = zip(*(read_pixels(path, how) for path in paths), strict=True)
+    pictures, metadata, georeferences, crs = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
         raise ValueError(f"{paths[volumes.index(True)]} is a volume: give one volume only")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0], crs[0])
+    return Material(tuple(paths), pixels, None if plain else -1, georeferences[0], volumes[0], metadata[0], crs[0])
 
 
 def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
@@ -274,10 +278,77 @@ def last_iteration(statistics: dict[str, Any]) -> str:
     return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
 
 
-def read_map(name: str, path: Path, how: Reading) -> HardData | NDArray[Any]:
-    """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
+class Files(NamedTuple):
+    """What the readers of files know of a command.
+
+    ``samples`` are its pictures, ``how`` the way to read, ``options`` the others; ``name`` is that of the input, and
+    ``flag`` its option.
+    """
+
+    samples: Material
+    how: Reading
+    options: dict[str, Any]
+    name: str
+    flag: str
+
+
+def read_inputs(job: str, options: dict[str, Any], samples: Material, how: Reading = PLAIN) -> dict[str, Any]:
+    """Return the inputs of a job that are in files, and the channel axis, by the parameters of its function.
+
+    Their options are taken out; ``labels`` is set if guides decide it. `simdtex.inputs` names the readers
+    ``reader(given, files)`` below.
+    """
+    found: dict[str, Any] = {"channel_axis": samples.channel_axis}
+    for name, one in inputs(job).items():
+        if one.reader:
+            given, files = options.pop(one.parameter(name)), Files(samples, how, options, name, one.flag(name))
+            found[name] = globals()[one.reader](given, files) if given else None
+    return found
+
+
+def read_masks(paths: Sequence[Path], files: Files) -> Any:
+    """Read the masks of samples."""
+    from simdtex.io import image
+
+    _check_flat(files)
+    check_each(files.flag, paths, files.samples)
+    masks = [image.read_mask(path, shape) for path, shape in zip(paths, files.samples.sizes, strict=True)]
+    return masks if files.samples.several else masks[0]
+
+
+def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[str, list[NDArray[Any]]]:
+    """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
+    found: dict[str, list[NDArray[Any]]] = {}
+    picture = files.samples
+    for name, paths in named:
+        if name in found:
+            raise ValueError(f"{files.flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
+        found[name] = []
+        for file in paths:
+            pixels = without_alpha(read_pixels(file).pixels, channels(picture.array))
+            check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
+            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
+    return found
+
+
+def read_number(text: str, files: Files) -> int:
+    """Return the number, from 0, of the sample that an option names by its path as given or its number from 1."""
+    samples = files.samples.paths
+    if Path(text) in samples:
+        return samples.index(Path(text))
+    if text.isdecimal() and 1 <= int(text) <= len(samples):
+        return int(text) - 1
+    raise ValueError(
+        f"{files.flag} {text} is none of the samples; give the path of one as in the command, or its number, 1 to "
+        f"{len(samples)}"
+    )
+
+
+def read_map(path: Path, files: Files) -> HardData | NDArray[Any]:
+    """Read a map of a simulation: of probabilities a table, too; any other a picture or a grid, channels in front."""
     from simdtex.io import grids, image
 
+    name, how = files.name, files.how._replace(channels=not files.samples.deep)
     if name == "probabilities" and (table := read_table(path, how)) is not None:
         return table
     if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
@@ -299,22 +370,23 @@ def read_table(path: Path, how: Reading) -> HardData | None:
     return read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=how.valid)
 
 
-def read_known(path: Path, samples: Material, how: Reading) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, files: Files) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     If values are ``categorical`` and the samples have one channel, a palette is categories.
     """
+    samples, how = files.samples, files.how
     variables = tuple((how.columns or {}).get("value", ()))
     how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     if (table := read_table(path, how)) is not None:
         return table
     how = how._replace(palette=how.palette and samples.channel_axis is None)
-    values, metadata, lies, _ = read_pixels(path, how)
+    values, metadata, georeference, _ = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    found = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    found = without_alpha(values, channels(values if georeference else samples.pixels[0]))  # a grid has no alpha
     return found.reshape(found.shape[:2]) if channels(found) == 1 else found
 
 
@@ -334,39 +406,20 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     )
 
 
-def read_data(samples: Material, options: dict[str, Any], how: Reading) -> dict[str, Any]:
-    """Return the mask, the known values and the guide that options name, as `simdtex.synthesize` takes them.
-
-    These options are taken out; ``labels`` is set if the guides decide it.
-    """
-    from simdtex.io import image
+def _check_flat(files: Files) -> None:
+    """Raise if pictures of samples are asked for, which are no pictures."""
     from simdtex.io.grids import kind_of
 
-    upward = how.deep and kind_of(samples.paths[0]) == "raster"
-    if (samples.deep or upward) and (options["sample_mask"] or options.get("guide")):
-        what = "a volume" if samples.deep else "a raster, whose rows are counted from the south"
-        remedy = "use simdtex.simulate in Python"
-        raise ValueError(f"{samples.paths[0]} is {what}, and --sample-mask and --guide are pictures; {remedy}")
-    masks = None
-    if paths := options.pop("sample_mask"):
-        check_each("--sample-mask", paths, samples)
-        masks = [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
-    file, guide = options.pop("known"), options.pop("guide", None)
-    found: dict[str, Any] = {
-        "channel_axis": samples.channel_axis,
-        "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples, how) if file else None,
-        "guide": None,
-    }
-    if guide is not None:
-        found["guide"], options["labels"] = read_guides(guide, samples, options["labels"])
-    return found
+    path = files.samples.paths[0]
+    if files.samples.deep or (files.how.deep and kind_of(path) == "raster"):
+        what = "a volume" if files.samples.deep else "a raster, whose rows are counted from the south"
+        raise ValueError(
+            f"{path} is {what}, and --sample-mask and --guide are pictures; use simdtex.simulate in Python"
+        )
 
 
-def read_guides(
-    pair: tuple[list[Path], Path], samples: Material, labels: bool | None
-) -> tuple[tuple[Any, NDArray[Any]], bool | None]:
-    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and whether it is of labels; None: as it looks.
+def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArray[Any]]:
+    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``; whether it is of labels goes to ``labels`` of the options.
 
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
     palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
@@ -376,15 +429,16 @@ def read_guides(
     from simdtex.methods.mrf.options import CATEGORIES, few
     from simdtex.methods.mrf.plan import LABELS
 
-    paths, out = pair
-    check_each("--guide", paths, samples)
+    _check_flat(files)
+    (paths, out), samples, labels = pair, files.samples, files.options["labels"]
+    check_each(files.flag, paths, samples)
     found = [read_pixels(path, Reading(palette=True)) for path in (*paths, out)]
-    pictures, lies = tuple(one.pixels for one in found), found[-1].lies
+    pictures, is_grid = tuple(one.pixels for one in found), found[-1].georeference is not None
     palettes = [one.metadata and one.metadata.palette for one in found]
     if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
         pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
     *own, wanted = pictures
-    shown = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
+    shown = without_alpha(wanted, channels(wanted if is_grid else own[0]))  # a grid has no alpha
     wanted, free = shown.data, planes(np.ma.getmaskarray(shown)).any(-1) | unknown_in(planes(shown.data))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
@@ -404,7 +458,8 @@ def read_guides(
     if free.any():
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
-    return (own if samples.several else own[0], wanted), labels
+    files.options["labels"] = labels
+    return (own if samples.several else own[0], wanted)
 
 
 def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:
@@ -413,3 +468,163 @@ def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:
     for number, colour in enumerate(known):
         found[(pixels == colour).all(-1)] = number
     return found
+
+
+@dataclass
+class Folder:
+    """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``.
+
+    ``maps`` are those that are read, ``lead`` first.
+    """
+
+    found: Maps
+    lead: Path
+    output: Path
+    maps: list[Also] = field(default_factory=list)
+
+    def read(self, lead: Material) -> None:
+        """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
+        from simdtex.io.files import earlier_files
+
+        for path in sorted(self.found.files, key=lambda path: path != self.lead):
+            maps = read_material([path]) if self.maps else lead
+            if maps.sizes != lead.sizes:
+                sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
+                raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
+            self.maps.append(Also(maps, self.output / _written(path, maps.pixels[0])))
+        names = [one.out.name for one in self.maps]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
+        earlier_files(self.output, "the maps", names.__contains__)
+        if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
+            note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
+
+    def write(self, metadata: Metadata | None, made: NDArray[Any], run: Any) -> None:
+        """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
+        from simdtex.io import image
+        from simdtex.io.files import atomic_folder
+        from simdtex.model.material import NORMALS, unit_normals
+
+        lead, *others = self.maps
+        if self.found.files[self.lead] in NORMALS and made.ndim == 3:
+            made = unit_normals(made, (made != lead.carried(run.source)).any(axis=2))
+        with atomic_folder(self.output) as temporary:
+            image.write(temporary / lead.out.name, made, metadata)
+            for one in others:
+                image.write(temporary / one.out.name, one.carried(run.source), one.maps.metadata)
+
+    def __str__(self) -> str:
+        return f"{self.output} ({len(self.maps)} maps arranged by {self.lead.name})"
+
+
+def arranged(
+    output: Folder | Path,
+    samples: Material,
+    metadata: Metadata | None,
+    options: dict[str, Any],
+    *,
+    kept: bool = True,
+    foreign: str = "",
+) -> list[Callable[[Any, Any], object]]:
+    """Return functions that write a picture or all maps of a folder, ``--also``, ``--source-map`` and ``--preview``.
+
+    These options are taken out. Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to
+    stay as they are, and its ``metadata`` holds for the output; a format that loses them is noted. ``foreign``: why
+    pixels are not from the sample, so that other maps have none for them.
+    """
+    from simdtex.io import image
+    from simdtex.model.source_map import save_source_map
+
+    also, source_map = options.pop("also"), options.pop("source_map")
+    if foreign and (also or isinstance(output, Folder)):
+        raise ValueError(f"{foreign}; {'leave --also out' if also else 'give one picture'}")
+    if source_map:
+        check_source_map(source_map, samples, everywhere=not foreign)
+    others, pixels = read_also(also, samples), samples.pixels[0]
+    if isinstance(output, Folder):
+        output.read(samples)
+        writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
+    else:
+        image.check_writable(output, pixels.dtype, channels(pixels))
+        if kept:
+            note_lossy(output, pixels, metadata)
+        writers = [lambda made, run: image.write(output, made, metadata)]
+    writers += [one.write for one in others]
+    if source_map:
+        writers.append(lambda made, run: save_source_map(source_map, run.source))
+    if options.pop("preview", False):
+        path = preview_of(output.output if isinstance(output, Folder) else output)
+        palette = metadata and metadata.palette
+        writers.append(lambda made, run: _write_copies(path, image.coloured(made, palette or None)))
+    return writers
+
+
+def check_source_map(path: Path, samples: Material, everywhere: bool) -> None:
+    """Raise where a source map cannot be written there; ``everywhere`` says that all pixels are from a sample."""
+    from simdtex.io import image
+    from simdtex.model.source_map import SOURCE_SUFFIXES
+
+    image.check_writable(path, suffixes=SOURCE_SUFFIXES)
+    far = max(max(sides) for sides in samples.sizes) > 2**16
+    if path.suffix.lower() == ".png" and (far or not everywhere):
+        what = "positions over 65535" if far else "pixels that are not from the sample"
+        raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
+
+
+def _write_copies(path: Path, made: NDArray[Any]) -> None:
+    """Write 3x3 copies of a picture, edge to edge, of at most `SHEET` pixels a side."""
+    from simdtex.io import image
+    from simdtex.report.sheet import fitted, rgb
+
+    image.write(path, fitted(np.tile(rgb(made), (3, 3, 1)), SHEET))
+
+
+def read_lead(
+    pictures: Sequence[Path], output: Path, options: dict[str, Any], how: Reading
+) -> tuple[Folder | Path, Material]:
+    """Return the output, and the pictures that decide its arrangement.
+
+    The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
+    folder. The roles of ``--map`` are taken out of the options.
+    """
+    from simdtex.model.material import READABLE, ROLES, find_maps
+
+    picture = pictures[0] if len(pictures) == 1 else Path("-")
+    whole = picture.is_dir()
+    folder = picture if whole else picture.parent
+    named, found = {}, None
+    roles: Sequence[tuple[str, list[Path]]] = options.pop("roles")
+    for role, (path, *_) in roles:
+        if role not in ROLES:
+            raise ValueError(f"--map names the role {role}; give one of the roles {', '.join(ROLES)}")
+        named[path if path.parent.parts else folder / path] = role
+    if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
+        lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
+        found = find_maps(folder, lead)
+        found.files.update(named)
+    if found is None or not (whole or picture in found.files):
+        if roles:
+            raise ValueError("--map requires a folder of maps: give a folder for the sample and for the output")
+        return output, read_material(pictures, how)
+    albedos = [lead] if lead else [path for path, role in found.files.items() if role == "albedo"]
+    if len(albedos) > 1:
+        raise ValueError(f"{albedos[0]} and {albedos[1].name} are both albedo maps: give the path of one")
+    if not albedos:
+        there = next(iter(found.files), picture / "brick_normal.png")
+        what = f" ({found.unknown[0]} is of unknown kind)" if found.unknown else ""
+        raise ValueError(
+            f"{picture} has no albedo{what}: give --map albedo=FILE, or instead of the folder the map that decides the "
+            f"arrangement, such as {there}"
+        )
+    if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
+        raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
+    for path in found.files:
+        check_input(Named(output, "folder"), Named(path, "read"))
+    return Folder(found, albedos[0], output), read_material(albedos[:1], how)
+
+
+def _written(path: Path, pixels: NDArray[Any]) -> str:
+    """Return the name of a map's file in the output: its own, if its format is written and keeps all pixels."""
+    from simdtex.io.image import suitable_suffix
+
+    return path.stem + suitable_suffix(pixels.dtype, channels(pixels), path.suffix)

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from simdtex.cli.command import WORDS, command
-from simdtex.cli.ending import RESUME, afterwards, note, settle
+from simdtex.cli.command import RESUME, WORDS, afterwards, command, note, settle
 from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, QUIET, SEED, job_options, together
 
 if TYPE_CHECKING:

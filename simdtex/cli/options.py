@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from typing import Any
@@ -13,8 +13,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import EITHER, ENTER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
-from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
+from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.inputs import SHARED, Input, inputs
+from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
 Command = Callable[..., Any]
@@ -87,7 +88,15 @@ DIRECTIONS = {"both": True, "x": "x", "y": "y"}
 DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 
 option = functools.partial(click.option, cls=Option)
-reads = functools.partial(option, type=READ, metavar="FILE", group=DATA)
+
+TYPES: dict[str, Any] = {
+    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float, "integer": int},
+    "new file": WRITE,
+    "direction": DIRECTION,
+    "columns": Parsed(pairs, "AXIS=NAME,..."),
+    "categories": Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
+}
+"""The types of the options of inputs, by what a declaration says that it takes."""
 
 
 def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -122,34 +131,45 @@ def paper_options(*names: str) -> Callable[[Command], Command]:
     return together(*(_option("", name, {"": replace(declared[name], default=paper[name])}) for name in names))
 
 
-def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Command], Command]:
+def input_options(job: str, *names: str) -> Callable[[Command], Command]:
+    """Return a decorator that adds to a command the options of the inputs of a job alone, or of those of ``names``."""
+    wanted = names or inputs(job).keys() - SHARED.keys()
+    found = {name: one for name, one in inputs(job).items() if one.help and name in wanted}
+    return together(*(_option(job, name, {"": one}) for name, one in found.items()))
+
+
+def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[Command], Command]:
     """Return the command line's option of a name; `methods` are its declarations, by method if there are several."""
     first = next(iter(methods.values()))
-    kind = first.kind
-    flag = f"--{name.replace('_', '-')}"
+    kind, flag = first.kind, f"--{name.replace('_', '-')}"
+    kinds: dict[Any, Any] = {Whole: int, Number: float, Numbers: NUMBERS}
     helps = {method: _help(job, one) for method, one in methods.items() if method}
-    how: dict[str, Any] = {"group": first.group, "help": _help(job, first), "methods": helps}
-    if is_flag(kind):
-        flag = f"{flag}/--no-{flag[2:]}" if first.default is None else flag
-        return option(flag, is_flag=True, default=None, **how)
-    if isinstance(kind, Numbers):
-        return option(flag, metavar="N,N,...", type=NUMBERS, **how)
-    if isinstance(kind, Number):
-        return option(flag, type=float, **how)
+    how: dict[str, Any] = {"group": first.group or JOB, "help": _help(job, first), "methods": helps}
+    how["metavar"] = "N,N,..." if isinstance(kind, Numbers) else None
+    flags = [f"{flag}/--no-{flag[2:]}" if is_flag(kind) and first.default is None else flag]
+    type_: Any = kinds.get(type(kind), str)
     words = [word for one in methods.values() if isinstance(one.kind, (Choice, Other)) for word in one.kind.valid]
-    return option(flag, type=int if isinstance(kind, Whole) else str, words=words, **how)
+    if isinstance(first, Input):
+        flags, type_ = first.named(name), TYPES.get(first.takes, type_)
+        how |= {"metavar": first.metavar or ("FILE" if first.takes == "file" else None), "method": first.method}
+        how |= {"multiple": first.multiple, "default": None if first.default is UNSET else first.default or None}
+        if type_ is DIRECTION:
+            words, how["is_flag"], how["flag_value"] = [*DIRECTIONS], False, "both"
+    if is_flag(kind):
+        return option(*flags, is_flag=True, **{**how, "default": None})
+    return option(*flags, type=type_, words=words, **how)
 
 
 def _help(job: str, one: Declared) -> str:
     """Return the help of an option, with its default in the job."""
     default = one.default_of(job)
-    if default is None:
+    if default is None or (isinstance(one, Input) and one.none):
         shown = one.none.replace("`", "")
-    elif isinstance(one.kind, (Switch, Other)) and default is False:
-        return f"{one.help}."
+    elif default is False or (isinstance(one, Input) and default in (0, UNSET)):
+        shown = ""
     else:
         shown = f"{default:g}" if isinstance(default, float) else str(default)
-    return f"{one.help}.  [{shown}]"
+    return f"{one.help}.  [{shown}]" if shown else f"{one.help}."
 
 
 def given(options: dict[str, Any], without: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -163,18 +183,7 @@ def output_option(help: str, type: Any = EITHER, **how: Any) -> Callable[[Comman
 
 
 OUTPUT = output_option("Write this picture, or a folder of maps.")
-SEED = option(
-    "--seed",
-    type=int,
-    help="Use this seed: the same seed gives the same output on every device.  [a random one, printed]",
-)
-DEVICE = option(
-    "--device",
-    metavar="TEXT",
-    group=DEVICE_GROUP,
-    help="Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`.  "
-    "[SIMDTEX_DEVICE, else a GPU, else a CPU]",
-)
+SEED, DEVICE, CHECKPOINT = (input_options("synth", name) for name in ("rng", "device", "checkpoint"))
 PROFILE = option(
     "--profile",
     is_flag=True,
@@ -194,121 +203,8 @@ PREVIEW = option(
     help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
-CHECKPOINT = option(
-    "--checkpoint",
-    type=WRITE,
-    metavar="FILE",
-    group=RUNS,
-    help="Keep the state of the run in this file; `simdtex resume FILE` continues it.",
-)
 
 
-data_options = together(
-    reads(
-        "--sample-mask",
-        multiple=True,
-        method="mrf",
-        help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
-    ),
-    reads(
-        "--known",
-        method="mrf",
-        help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
-        "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
-    ),
-    option(
-        "--columns",
-        metavar="x=NAME,...",
-        type=Parsed(pairs, "AXIS=NAME,..."),
-        group=DATA,
-        method="mrf",
-        help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
-        "number; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others are "
-        "values]",
-    ),
-    option(
-        "--categories",
-        metavar="NAME=NUMBER,...",
-        type=Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
-        group=DATA,
-        method="mrf",
-        help="Take these numbers for the texts in the table of --known, as sand=1,shale=0.",
-    ),
-    option(
-        "--missing",
-        metavar="VALUE",
-        multiple=True,
-        type=float,
-        group=DATA,
-        method="mrf",
-        help="Take this number in tables and grids as unknown, too; may be repeated.  [codes such as -999, outside of "
-        "the values of the sample]",
-    ),
-)
-"""``--sample-mask``, ``--known``, and the options that say how its table is read."""
-
-GUIDE = option(
-    "--guide",
-    group=DATA,
-    type=READ_PAIR,
-    metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    method="mrf",
-    help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of "
-    "labels or numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
-)
-training_options = together(
-    click.argument("training_image", nargs=-1, required=True, type=ENTER),
-    option(
-        "--channels",
-        is_flag=True,
-        group=DATA,
-        help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
-    ),
-    option(
-        "--origin",
-        metavar="X,Y[,Z]",
-        type=NUMBERS,
-        group=DATA,
-        help="Place the centre of the first cell here, in the units of the table of --known.  [that of a grid "
-        "TRAINING_IMAGE, else 0,0]",
-    ),
-    option(
-        "--cell",
-        metavar="DX,DY[,DZ]",
-        type=NUMBERS,
-        group=DATA,
-        help="Make cells of this size, in the same units.  [that of a grid TRAINING_IMAGE, else 1,1]",
-    ),
-    option(
-        "--several",
-        words=("refuse", "mean", "most"),
-        group=DATA,
-        help="Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most "
-        "frequent value (most).  [refuse]",
-    ),
-    option(
-        "--outside",
-        words=("refuse", "skip"),
-        group=DATA,
-        help="Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).  [refuse]",
-    ),
-    option(
-        "--variables",
-        metavar="NAME",
-        multiple=True,
-        group=DATA,
-        help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
-    ),
-    data_options,
-)
-"""The training image, its data, and where its cells and they lie."""
-
-BAND = option(
-    "--band",
-    type=int,
-    help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  "
-    "[an eighth of the shorter side, 8 to 64]",
-)
 material_options = together(
     option(
         "--map",

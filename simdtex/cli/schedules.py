@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.command import command
-from simdtex.cli.ending import afterwards
+from simdtex.cli.command import afterwards, command
 from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import DEVICE, QUIET, given, job_options, output_option

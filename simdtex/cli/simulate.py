@@ -1,19 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex simulate`` and ``estimate``: realisations of a training image."""
+"""``simdtex simulate``, ``estimate`` and ``classify``: realisations of a training image, and which texture is where."""
 
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
-from simdtex.cli.inputs import MAPS, Material, output_shape, read_data, read_map, read_material, take_reading
+from simdtex.cli.command import DATA, OUTPUTS
+from simdtex.cli.inputs import Material, output_shape, read_inputs, read_material, size_text, take_reading
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import GUIDE, given, option, output_option, reads, report_option, size_option, training_options
+from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option, size_option
+from simdtex.cli.places import ENTER, READ, WRITE
+
+TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
+MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
+"""The maps of a simulation, the first of which that is given has the size of the output."""
+
+FITS = (".tif", ".tiff", ".npy")
+
+UNLABELLED = 255
+"""Where the truth is not known."""
 
 
 @job(
@@ -22,49 +34,18 @@ from simdtex.cli.options import GUIDE, given, option, output_option, reads, repo
     ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
 )
-@training_options
+@TRAINING_IMAGE
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
-@click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
-@click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations", "TRAINING_IMAGE")
-@GUIDE
-@reads(
-    "--region",
-    help="Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation.",
-)
-@reads(
-    "--probabilities",
-    help="Follow these probabilities of the categories, in ascending order of category: a table of x, y and one "
-    "column for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN.",
-)
-@reads(
-    "--image-map",
-    help="Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
-    "their weights.",
-)
-@reads(
-    "--rotation",
-    help="Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn.",
-)
-@reads(
-    "--scale",
-    help="Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2.",
-)
-@option(
-    "--source",
-    is_flag=True,
-    group=OUTPUTS,
-    help="Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz.",
-)
-@option(
-    "--jobs",
-    group=DEVICE_GROUP,
-    type=int,
-    help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
-)
+@input_options("simulate")
 @report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
-    training_image: tuple[Path, ...], output: Path, number: int, size: str | None, source: bool, **options: Any
+    training_image: tuple[Path, ...],
+    output: Path,
+    number: int | None,
+    size: str | None,
+    source: bool | None,
+    **options: Any,
 ) -> Task:
     """Simulate realisations that look like TRAINING_IMAGE and honour data.
 
@@ -74,22 +55,20 @@ def simulate(
     from simdtex.io.volume import write_realisations
     from simdtex.run import Output
 
-    how = take_reading(options, deep=True)
+    how, number = take_reading(options, deep=True), 1 if number is None else number
     material = read_material(training_image, how)
-    lies = read_place(material, output, options, source)
-    data = read_data(material, options, how)
+    georeference = read_georeference(material, output, options, bool(source))
+    data = read_inputs("simulate", options, material, how)
     known, pixels = data["known"], material.pixels[0]
-    files = {name: options.pop(name) for name in MAPS}
-    how = how._replace(channels=not material.deep)
-    maps = {name: read_map(name, path, how) for name, path in files.items() if path}
-    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
+    maps = [one for one in (data[name] for name in MAPS) if isinstance(one, np.ndarray)]
+    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
-    place = lies | given({name: options.pop(name) for name in ("several", "outside")})
+    place = georeference | given({name: options.pop(name) for name in ("several", "outside")})
     if click.get_current_context().params["report"]:
-        if source or "region" in maps:
+        if source or data["region"] is not None:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(material, shape, getattr(known, "values", known))
-    inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
+    inputs = data | given(options) | {"shape": shape, "source": bool(source)} | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
         made = georeferenced(simulate(material.array, number, **inputs, **call), material.crs)
@@ -109,21 +88,10 @@ def simulate(
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
     of=None,
 )
-@training_options
+@TRAINING_IMAGE
 @output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")
 @size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
-@option("--categorical", is_flag=True, group=DATA, help="Treat values as categories.")
-@option("--nearest", default=8, show_default=True, type=int, help="Use this many data for each cell, the nearest.")
-@option(
-    "--reach", type=int, help="Use data up to this many cells away.  [an eighth of the smaller side of TRAINING_IMAGE]"
-)
-@option(
-    "--bandwidth",
-    default=1.0,
-    show_default=True,
-    type=float,
-    help="Set the width of the Parzen kernel, in units of h_opt.",
-)
+@input_options("estimate")
 def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
 
@@ -139,12 +107,12 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
         raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    lies = read_place(material, output, options)
-    data = read_data(material, options, how)
+    georeference = read_georeference(material, output, options)
+    data = read_inputs("estimate", options, material, how)
     height, width = output_shape(size, material.pixels[0], data["known"], material.pixels[0])
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
-    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | lies
+    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | georeference
 
     def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
         made = estimate(material.array, shape=(height, width), device=device, callback=callback, **inputs)
@@ -153,7 +121,9 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     return Task(make, f"maps of {width}x{height}", str(output), [lambda made, run: write_realisations(output, made)])
 
 
-def read_place(material: Material, output: Path, options: dict[str, Any], source: bool = False) -> dict[str, Any]:
+def read_georeference(
+    material: Material, output: Path, options: dict[str, Any], source: bool = False
+) -> dict[str, Any]:
     """Return the origin and the size of cells; raise if the output cannot be written.
 
     As given by options, which are taken out; else of a training image that is a grid; else None.
@@ -161,13 +131,13 @@ def read_place(material: Material, output: Path, options: dict[str, Any], source
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.volume import check_realisations_path
 
-    lies: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
-    if material.lies:  # whose z is left out if that of the other option is
-        axes = min((len(one) for one in lies.values() if one), default=3)
-        lies = {name: one or getattr(material.lies, name)[:axes] for name, one in lies.items()}
+    found: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
+    if material.georeference:  # whose z is left out if that of the other option is
+        axes = min((len(one) for one in found.values() if one), default=3)
+        found = {name: one or getattr(material.georeference, name)[:axes] for name, one in found.items()}
     if check_realisations_path(output, source=source) in SUFFIXES:
-        check_grid(output, material.pixels, **lies)
-    return lies
+        check_grid(output, material.pixels, **found)
+    return found
 
 
 def georeferenced(made: Any, crs: str) -> Any:
@@ -214,3 +184,87 @@ def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> Non
         raise ValueError(f"--report requires {least} or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
+
+
+@job(
+    ("classify a.png --texture brick=brick.png --texture grass=grass.png -o b.png", "Tell brick from grass."),
+    ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
+    usual="output textures strokes truth confidence report order seed dry_run device quiet",
+)
+@click.argument("picture", type=READ)
+@output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
+@input_options("classify")
+@option("--truth", type=READ, metavar="FILE", group=DATA, help="Compare with these labels; 255 is unknown.")
+@option(
+    "--confidence",
+    type=WRITE,
+    metavar="FILE",
+    group=OUTPUTS,
+    help="Write the fit of each class at each pixel, 0 to 1, one band for each class: .tif or .npy.",
+)
+@report_option("labels, fits and, with --truth, the confusion matrix")
+@PROFILE
+def classify(
+    picture: Path,
+    output: Path,
+    strokes: Path | None,
+    truth: Path | None,
+    confidence: Path | None,
+    **options: Any,
+) -> Task:
+    """Label each pixel of PICTURE with the texture around it, or as unknown.
+
+    Classes are numbered from 1 in the order of --texture; unknown pixels are 0.
+    """
+    from simdtex import classify
+    from simdtex.io import image
+    from simdtex.model.display import read_labels, write_labels
+
+    whole = read_material([picture])
+    true = None if truth is None else read_labels(truth, UNLABELLED)
+    if true is not None and true.shape != whole.sizes[0]:
+        sizes = f"{truth} is {size_text(true)} and {picture} {size_text(whole.array)}"
+        raise ValueError(f"{sizes}; give labels of its size")
+    data = read_inputs("classify", options, whole)
+    if bool(data["textures"]) == bool(strokes):
+        raise ValueError("give --texture once for each class, or --strokes")
+    if strokes and data["validation"]:
+        raise ValueError("--validation requires --texture; leave it out")
+    pixels: NDArray[Any] = whole.array
+    if strokes:
+        data["textures"] = labels = read_labels(strokes)
+        names = {int(label): str(label) for label in np.unique(labels[labels > 0])}
+    else:
+        names = dict(enumerate(data["textures"], 1))
+    image.check_writable(output, np.uint8, 1)
+    if confidence:
+        image.check_writable(confidence, suffixes=FITS)
+    if true is not None and (strange := np.setdiff1d(true, [0, *names, UNLABELLED])).size:
+        raise ValueError(
+            f"{truth} has the label {strange[0]}; give labels of the classes, 0 for unknown textures, and {UNLABELLED} "
+            "for pixels without a known label"
+        )
+    writers: list[Any] = [lambda made, run: write_labels(output, made)]
+    if confidence:
+        writers.append(lambda made, run: image.write(confidence, run.fit))
+
+    def report(folder: Path, made: Any, run: Any) -> None:
+        from simdtex.report.synthesis import write_classification
+
+        write_classification(folder, pixels, made, run, true, command_line())
+
+    run = partial(classify, pixels, **data, **given(options))
+    summary = f"{size_text(pixels)}, {len(names)} classes"
+    return Task(
+        run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)), report=report
+    )
+
+
+def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:
+    """Return the share of each class and, if the truth is known, how much of it was found."""
+    shares = ((name, (labels == label).mean()) for label, name in [(0, "unknown"), *names.items()])
+    text = ", ".join(f"{name} {share:.1%}" for name, share in shares)
+    if true is not None:
+        there = true != UNLABELLED
+        text += f"; {(labels == true)[there].mean():.1%} of the pixels agree with --truth"
+    return text

@@ -17,13 +17,13 @@ from simdtex import schedules as known
 from simdtex.driver import check_shape
 from simdtex.experiments.quality import COPIED_PATCH, as_planes, measure
 from simdtex.io.image import check_sample
+from simdtex.jobs.synthesis import synthesize
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import Options
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Relaxing
 from simdtex.schedules import Active, Info, Schedule, Setting, Watched
-from simdtex.synthesis import synthesize
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
 

@@ -24,7 +24,6 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import nrrd
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
@@ -87,6 +86,8 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             f"{target} ends in {target.suffix}: end its name in one of {', '.join(sorted(filter(None, _FORMATS)))}, "
             "or give a name without suffix for a folder of PNG slices"
         )
+    if suffix == ".nrrd":
+        require("volumes", "nrrd")
     if suffix:
         check_target(target)
     else:
@@ -213,12 +214,16 @@ def _beside(path: Path, name: str, most: int) -> bytes:
 
 
 def _nrrd(path: Path, most: int) -> _Read:
+    needs("nrrd", "volumes", "an NRRD file")
+    import nrrd
+
     with path.open("rb") as file:
         return _stored(path, dict(nrrd.read_header(file)), file.read(), most)
 
 
 def _metaimage(path: Path, most: int) -> _Read:
     """Read a MetaImage by the header of an NRRD that says the same."""
+    needs("nrrd", "volumes", "a MetaImage")
     said: dict[str, str] = {}
     with path.open("rb") as file:
         while "ElementDataFile" not in said:
@@ -253,6 +258,8 @@ def _metaimage(path: Path, most: int) -> _Read:
 
 def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read:
     """Return the volume that the header of an NRRD describes; ``data`` follows it in its file."""
+    import nrrd
+
     count = prod(int(side) for side in header["sizes"])
     check_size(count, 0, most)
     if count < 1:
@@ -376,6 +383,8 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         image.encode(path, suffix, values)
     elif suffix == ".nrrd":
         # without the fields of a space, after which VTK misreads the sizes of a vector volume
+        import nrrd
+
         header = {"encoding": "raw", "kinds": ["vector"] * (values.ndim - 3) + ["domain"] * 3}
         written = io.BytesIO()
         with warnings.catch_warnings():

@@ -3,80 +3,29 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from functools import partial
-from typing import Any, Literal, Self, Unpack, overload
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoint import Checkpoint
-from simdtex.driver import drive, execute
-from simdtex.jobs.inputs import check_mask, check_picture, is_several
+from simdtex.driver import drive
+from simdtex.jobs.inputs import Work, check_mask, check_picture, is_several, public
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, FEWEST_NEIGHBOURHOODS, Model, Region, learn
 from simdtex.methods.classifier.options import Options
-from simdtex.methods.typed_options import ClassifierOptions, ClassifyOptions
 from simdtex.model.pictures import Mask, check_alike, completed
-from simdtex.options import lists_options, real_array, resolve, table
+from simdtex.options import lists, option_parameters, real_array, resolve, table
 from simdtex.random import as_seed
-from simdtex.run import Callback, Output
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
-@overload
-def classify(
-    image: ArrayLike, textures: Textures | ArrayLike, *, full_output: Literal[True], **options: Unpack[ClassifyOptions]
-) -> tuple[NDArray[np.uint8], Output]: ...
-@overload
-def classify(
-    image: ArrayLike,
-    textures: Textures | ArrayLike,
-    *,
-    full_output: Literal[False] = ...,
-    **options: Unpack[ClassifyOptions],
-) -> NDArray[np.uint8]: ...
-@lists_options("classify", Options)
-def classify(
-    image: ArrayLike,
-    textures: Textures | ArrayLike,
-    *,
-    masks: Mapping[str, Any] | None = None,
-    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
-    channel_axis: int | None = None,
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    full_output: bool = False,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
-    **options: Any,
-) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+@public("classify", Options)
+def classify(call: Any) -> Work:
     """Return a label for each pixel of a picture: the texture around it, or unknown.
-
-    Parameters
-    ----------
-    image : (rows, cols) or, with `channel_axis`, (rows, cols, bands) array
-        The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.
-    textures : mapping of str to array or list of arrays, or (rows, cols) array of integers
-        The samples of each class, of the picture's type, by the name of the class. Or training regions of the picture
-        itself: 1, 2, ... where a pixel is of a class, and 0 elsewhere.
-    masks : mapping of str to (rows, cols) bool array or list of arrays, optional
-        True for pixels of the samples that may be used; a class without masks is used whole.
-    validation : mapping of str to array or list of arrays, optional
-        Further pictures of a class, from which no exemplars are drawn. They measure how much the class varies, which
-        decides when a pixel is unknown.
-    channel_axis : int, optional
-        The axis that holds bands; None for a grey picture.
-    rng, device, callback, checkpoint
-        As in `simdtex.synthesize`.
-    full_output : bool
-        Return fits, probabilities and statistics too.
-    **options
-        Of the method ``classifier``: see `simdtex.methods.classifier.Options`.
 
     Returns
     -------
@@ -84,11 +33,6 @@ def classify(
         0 for unknown textures, 1 for the first class, 2 for the second... With training regions, their numbers.
     output : simdtex.run.Output
         Only with ``full_output=True``; it has ``fit`` and ``probability``.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -110,25 +54,19 @@ def classify(
     >>> float((labels == np.repeat([1, 2], 64)).mean()) > 0.95
     True
     """
-    chosen = resolve(Options, "classify", options)
-    pixels, unknown = check_picture(image, channel_axis)
-    if isinstance(textures, Mapping):
-        classes = _sampled(textures, masks or {}, validation or {}, pixels, channel_axis)
-        names = dict(enumerate(textures, 1))
-    elif masks or validation:
+    chosen = resolve(Options, "classify", call.options)
+    pixels, unknown = call.image
+    if isinstance(call.textures, Mapping):
+        named = call.masks or {}, call.validation or {}
+        classes = _sampled(call.textures, *named, pixels, call.channel_axis)
+        names = dict(enumerate(call.textures, 1))
+    elif call.masks or call.validation:
         raise ValueError("masks and validation belong to samples by name; leave them out with training regions")
     else:
-        painted = _painted([(pixels, unknown, textures)])
+        painted = _painted([(pixels, unknown, call.textures)])
         names, classes = {label: str(label) for label in painted}, list(painted.values())
-    plan = Plan(completed(pixels, unknown), unknown, classes, names, chosen)
-
-    def inputs() -> dict[str, Any]:
-        return {
-            **{"image": (pixels, unknown), "options": chosen, "names": names},
-            "textures": [[(*one[:2], one.judged) for one in regions] for regions in classes],
-        }
-
-    return execute("classify", partial(drive, plan), inputs, None, rng, device, callback, full_output, checkpoint)
+    call.textures = names, [[(*one[:2], one.judged) for one in regions] for regions in classes]
+    return Work(Plan(completed(pixels, unknown), unknown, classes, names, chosen), chosen, None)
 
 
 def _sampled(
@@ -246,14 +184,14 @@ class TextureClassifier:
 
     _machine: Machine | None = None
 
-    @lists_options("classify", Options)
+    @lists(option_parameters("classify", Options))
     def __init__(
         self,
         *,
         channel_axis: int | None = None,
         rng: int | np.random.Generator | None = 0,
         device: str | Machine | None = None,
-        **options: Unpack[ClassifierOptions],
+        **options: Any,
     ) -> None:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
         self.set_params(**{**vars(resolve(Options, "classify", {})), **options})

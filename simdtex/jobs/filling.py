@@ -1,37 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Filling the holes of a picture from the rest of it, and extending a picture: `fill` and `extend`."""
+"""Filling the holes of a picture from the rest of it, and extending a picture: `fill`, `extend` and their replay."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log2, prod
-from typing import Any, Literal, NamedTuple, Unpack, overload
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import ndimage
 
-from simdtex.checkpoint import Checkpoint, Checkpointing
-from simdtex.driver import drive, execute
-from simdtex.io.image import check_sample
-from simdtex.jobs.inputs import check_mask, check_picture, check_samples
+from simdtex.checkpoint import Checkpointing
+from simdtex.driver import drive
+from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, few
-from simdtex.methods.typed_options import ExtendOptions, FillOptions
+from simdtex.methods.mrf.replay import Instant, Replay, Sweep
+from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Mask, Pictures, check_alike
-from simdtex.options import lists_options, resolve, whole, within_32_bits
+from simdtex.model.pictures import Mask, Pictures
+from simdtex.options import resolve, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource
 
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""
 
-LEAST = 16
+FEWEST_CANDIDATES = 16
 """The fewest candidates at the coarsest level of a hole, since its known surroundings determine the layout."""
 
 GIVEN = 100
@@ -79,57 +78,9 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     return [Window(r, c, wanted) for r, c in found]
 
 
-@overload
-def fill(
-    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillOptions]
-) -> tuple[NDArray[Any], OutputWithSource]: ...
-@overload
-def fill(
-    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillOptions]
-) -> NDArray[Any]: ...
-@lists_options("fill", Options)
-def fill(
-    image: ArrayLike,
-    mask: ArrayLike | None = None,
-    *,
-    sample: ArrayLike | None = None,
-    reach: int | None = None,
-    grow: int = 0,
-    feather: int = 0,
-    channel_axis: int | None = None,
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    full_output: bool = False,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
-    **options: Any,
-) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+@public("fill", Options)
+def fill(call: Any) -> Work:
     """Return a picture with its holes filled with the texture around them.
-
-    Parameters
-    ----------
-    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        The picture; any real type.
-    mask : (rows, cols) bool array, optional
-        True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.
-    sample : array of the image's type, optional
-        The texture to fill with, or a list of several. None: the rest of the picture.
-    reach : int, optional
-        Distance around a hole up to which the picture is its sample, pixels. None: 128, or twice the hole's longer side
-        if that is more. It has no effect with `sample`.
-    grow : int
-        Widen the holes by this distance, pixels.
-    feather : int
-        Blend the filled pixels with the picture up to this distance around the holes, pixels. Values without a mean
-        (categories, 16 different pixels or fewer) change half-way instead.
-    channel_axis : int, optional
-        The axis of the image that holds channels; None for a grey one.
-    rng, device, callback, checkpoint
-        As in `simdtex.synthesize`.
-    full_output : bool
-        Return the source map, temperatures and statistics too.
-    **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which lists the defaults that differ in ``fill``.
 
     Returns
     -------
@@ -138,11 +89,6 @@ def fill(
     output : simdtex.run.Output
         Only with ``full_output=True``. ``source`` has positions in the image, and known pixels have their own. With
         `sample` it has positions in the sample, and -1 at known pixels.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -165,53 +111,23 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    job = filling(image, mask, sample, reach, channel_axis, options, grow, feather)
-    return execute("fill", job.run, job.inputs, channel_axis, rng, device, callback, full_output, checkpoint)
+    pixels, gaps = call.image
+    hole = gaps if call.mask is None else gaps | call.mask
+    if not hole.any():
+        raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
+    share = widened(hole, call.grow, call.feather)
+    hole = share > 0
+    if hole.all():
+        raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
+    chosen = resolve(Options, "fill", call.options)
+    call.image, call.mask = np.where(hole[..., None], 0, pixels), hole
+    job = Filling(pixels, hole, call.sample, call.reach, chosen, share)
+    return Work(job, chosen, call.channel_axis)
 
 
-@overload
-def extend(
-    image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendOptions]
-) -> tuple[NDArray[Any], OutputWithSource]: ...
-@overload
-def extend(
-    image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendOptions]
-) -> NDArray[Any]: ...
-@lists_options("extend", Options, without="boundary")
-def extend(
-    image: ArrayLike,
-    *,
-    top: int = 0,
-    bottom: int = 0,
-    left: int = 0,
-    right: int = 0,
-    seamless: bool | Literal["x", "y"] = False,
-    band: int | None = None,
-    channel_axis: int | None = None,
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    full_output: bool = False,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
-    **options: Any,
-) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+@public("extend", Options, without="boundary")
+def extend(call: Any) -> Work:
     """Return a picture that is continued beyond its edges, or seamless.
-
-    Parameters
-    ----------
-    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        The picture, which is also the sample; any real type.
-    top, bottom, left, right : int
-        Pixels to add on each side.
-    seamless : bool or {"x", "y"}
-        Whether the result wraps around: in both directions, or only left and right (x) or top and bottom (y). If no
-        pixels are added in such a direction, a band along its edges is replaced.
-    band : int, optional
-        Width of that band on either side of the seam, pixels. None: an eighth of the shorter side, 8 to 64.
-    channel_axis : int, optional
-        The axis of the image that holds channels; None for a grey one.
-    rng, device, callback, full_output, checkpoint, **options
-        As in `fill`; but ``boundary`` follows from ``seamless``.
 
     Returns
     -------
@@ -219,11 +135,6 @@ def extend(
         ``top + rows + bottom`` by ``left + cols + right``; the image, except for the bands, is at (top, left).
     output : simdtex.run.Output
         Only with ``full_output=True``; ``source`` is in pixels of the image.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is invalid; the message names the remedy.
 
     Examples
     --------
@@ -233,34 +144,15 @@ def extend(
     >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
     (72, 80)
     """
-    sides = {"top": top, "bottom": bottom, "left": left, "right": right}
-    plan, inputs = extension(image, channel_axis, sides, seamless, band, options)
-    return execute(
-        "extend", partial(drive, plan), lambda: inputs, channel_axis, rng, device, callback, full_output, checkpoint
-    )
-
-
-def extension(
-    image: ArrayLike,
-    channel_axis: int | None,
-    sides: dict[str, int],
-    seamless: bool | str,
-    band: int | None,
-    options: dict[str, Any],
-) -> tuple[mrf.Plan, dict[str, Any]]:
-    """Return the plan of a run of `extend`, and its input by the parameters' names."""
-    pixels = check_sample(image, channel_axis)
+    pixels, seamless = call.image, call.seamless
+    top, bottom, left, right = call.top, call.bottom, call.left, call.right
     rows, cols = pixels.shape[:2]
-    for name, value in sides.items():
-        whole(name, value, 0)
-    top, bottom, left, right = sides.values()
     if seamless not in (True, False, "x", "y"):
         raise ValueError(f'seamless is {seamless!r}; give True, False, "x" or "y"')
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
-    if not (seamless or any(sides.values())):
+    if not (seamless or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
-    width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
-    whole("band", width, 1)
+    width = call.band = min(64, max(8, min(rows, cols) // 8)) if call.band is None else call.band
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
@@ -273,9 +165,9 @@ def extension(
             f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one"
         )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
-    if "boundary" in options:
+    if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
-    chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | options)
+    chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | call.options)
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
@@ -285,8 +177,7 @@ def extension(
     if not seamless and _has_tones(chosen, pictures):
         corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
-    inputs = {"options": chosen, "image": pixels, **sides, "seamless": seamless, "band": width}
-    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), inputs
+    return Work(mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), chosen, call.channel_axis)
 
 
 class Made(NamedTuple):
@@ -310,7 +201,7 @@ class Whole(NamedTuple):
     source: NDArray[np.int32]
 
 
-class Around(NamedTuple):
+class WindowSample(NamedTuple):
     """The sample of a window.
 
     ``corner`` is its first pixel in the picture; ``place`` is the position of the window's pixels in it, None for a
@@ -337,13 +228,7 @@ class Filling:
     options: Options
     share: NDArray[Any]
 
-    def inputs(self) -> dict[str, Any]:
-        """Return everything but the seed that determines the result, by the parameters' names."""
-        known = np.where(self.hole[..., None], 0, self.pixels)
-        sample = self.sample and (self.sample.pixels, self.sample.known)
-        return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
-
-    def run(
+    def __call__(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other, and return the result.
@@ -358,13 +243,13 @@ class Filling:
             at = (window.rows, window.cols)
             hole = self.hole[at]
             if number == len(finished):
-                around = self.around(window)
-                seen = callback and partial(self._show, callback, whole, window, around, number, len(parts))
+                sample = self.sample_of(window)
+                seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                made, output = drive(self.plan(window, around), machine, seed, seen, now)
+                made, output = drive(self.plan(window, sample), machine, seed, seen, now)
                 assert output.source is not None and output.temperature is not None
                 about = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
-                finished.append(Made(around.corner, made[hole], output.temperature[hole], output.source[hole], about))
+                finished.append(Made(sample.corner, made[hole], output.temperature[hole], output.source[hole], about))
                 inside = None
                 checkpointing.offer(None, lambda: (finished, None))
             found = finished[number]
@@ -379,7 +264,14 @@ class Filling:
         return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
-        self, callback: Callback, whole: Whole, window: Window, around: Around, number: int, count: int, progress: Any
+        self,
+        callback: Callback,
+        whole: Whole,
+        window: Window,
+        sample: WindowSample,
+        number: int,
+        count: int,
+        progress: Any,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
         at = (window.rows, window.cols)
@@ -387,7 +279,7 @@ class Filling:
         shown = {
             "image": lambda: pasted(whole.image, progress.image()),
             "temperature": lambda: pasted(whole.temperature, progress.temperature()),
-            "source": lambda: pasted(whole.source, shifted(progress.source(), around.corner)),
+            "source": lambda: pasted(whole.source, shifted(progress.source(), sample.corner)),
         }
         return callback(replace(progress, **shown, fraction=(number + progress.fraction) / count))
 
@@ -417,65 +309,35 @@ class Filling:
             whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
         return whole
 
-    def around(self, window: Window) -> Around:
+    def sample_of(self, window: Window) -> WindowSample:
         """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
-            return Around(self.sample, (0, 0), None)
+            return WindowSample(self.sample, (0, 0), None)
         at = (window.rows, window.cols)
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
         near = (slice(top, window.rows.stop + reach), slice(left, window.cols.stop + reach))
         place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
-        return Around(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
+        return WindowSample(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
-    def plan(self, window: Window, around: Around) -> mrf.Plan:
+    def plan(self, window: Window, sample: WindowSample) -> mrf.Plan:
         """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
         at, options, guide = (window.rows, window.cols), self.options, None
-        pictures, hole, least = around.pictures, self.hole[at], window.levels and options.levels is None
+        pictures, hole, least = sample.pictures, self.hole[at], window.levels and options.levels is None
         known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
         values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
-        if around.place is not None and pictures.known and _has_tones(options, pictures):
-            row, col = around.place[0, 0].tolist()
+        if sample.place is not None and pictures.known and _has_tones(options, pictures):
+            row, col = sample.place[0, 0].tolist()
             guide = Surroundings(pictures.pixels[0], pictures.known[0], values, ~hole, (row, col))
         return mrf.plan(
             pictures,
             hole.shape,
-            replace(options, overview=LEAST) if least else options,
-            Given(values, known, around.place, suggests=False),
+            replace(options, overview=FEWEST_CANDIDATES) if least else options,
+            Given(values, known, sample.place, suggests=False),
             guide,
             most=max(window.levels, _fewest_levels(pictures)) if window.levels else None,
         )
-
-
-def filling(
-    image: ArrayLike,
-    mask: ArrayLike | None,
-    sample: ArrayLike | None,
-    reach: int | None,
-    channel_axis: int | None,
-    options: dict[str, Any],
-    grow: int = 0,
-    feather: int = 0,
-) -> Filling:
-    """Return the job of `fill` for the same parameters; raise ValueError or TypeError if one is invalid."""
-    pixels, hole = check_picture(image, channel_axis)
-    hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
-    whole("grow", grow, 0)
-    whole("feather", feather, 0)
-    if not hole.any():
-        raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
-    share = widened(hole, grow, feather)
-    hole = share > 0
-    if hole.all():
-        raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
-    if reach is not None:
-        whole("reach", reach, 1)
-    given = None if sample is None else check_samples(sample, channel_axis)
-    if given:
-        check_alike("the sample", given.pixels[0], "the picture", pixels)
-    chosen = resolve(Options, "fill", options)
-    return Filling(pixels, hole, given, reach, chosen, share)
 
 
 def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
@@ -509,3 +371,55 @@ def paste(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], ho
     fine = values.repeat(2**level, 0).repeat(2**level, 1)[: hole.shape[0], : hole.shape[1]]
     above[at][hole] = fine[hole]
     return above
+
+
+class HoleReplay:
+    """The replay of a run that fills one hole, with the methods of `simdtex.methods.mrf.replay.Replay`.
+
+    The arrays of `at` are those of the whole picture, with the sites of a coarse level repeated; sites are pixels of
+    the window around the hole, and sources and candidates are pixels of the picture or of the sample. Raises ValueError
+    if the job has several windows.
+    """
+
+    def __init__(self, job: Filling, machine: Machine, seed: int) -> None:
+        parts = job.windows()
+        if len(parts) > 1:
+            raise ValueError(f"{len(parts)} holes are filled by runs of their own; fill one hole to look into its run")
+        (window,) = parts
+        sample = job.sample_of(window)
+        self._replay = Replay(job.plan(window, sample), machine, seed)
+        self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, sample.corner
+        self._whole = job.begin()
+        self.origin = window.rows.start, window.cols.start
+
+    @property
+    def sweeps(self) -> list[Sweep]:
+        """All sweeps of the run, in order."""
+        return self._replay.sweeps
+
+    def at(self, sweep: int, sets: int | None = None) -> Instant:
+        """Return the picture after the first ``sets`` sets of a sweep; None: all."""
+        now = self._replay.at(sweep, sets)
+        pasted = partial(paste, at=self._at, hole=self._hole[self._at], level=now.level)
+        return Instant(
+            now.level,
+            pasted(self._whole.image, now.image),
+            pasted(self._whole.source, shifted(now.source, self._corner)),
+            pasted(self._whole.temperature, now.temperature),
+            pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),
+        )
+
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
+        """Return an explanation of a pixel's value after the first ``sets`` sets of a sweep, None: all.
+
+        Raises ValueError if the pixel has not relaxed.
+        """
+        if not self._hole[row, col]:
+            raise ValueError("this pixel is not in the hole: its value is given")
+        why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets)
+        near, found = why.neighbours, why.candidates
+        return replace(
+            why,
+            neighbours=replace(near, source=shifted(near.source, self._corner)),
+            candidates=replace(found, place=shifted(found.place, self._corner)),
+        )

@@ -1,24 +1,134 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arrays of a job, each checked once, where it enters the Python API: samples, masks, known values, guides."""
+"""The inputs of a job, each checked once, where it enters the Python API; and what all public functions share."""
 
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial, wraps
+from inspect import Parameter, Signature, cleandoc
 from math import prod
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.checkpoint import Checkpointing, digest
+from simdtex.driver import Plan, check_shape, check_sides, drive, execute
+from simdtex.inputs import Input, inputs, parameter_types
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
-from simdtex.machine import memory
+from simdtex.machine import Machine, memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
-from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
-from simdtex.options import DataWarning, check_real, unmasked
+from simdtex.model.pictures import HALVES, Mask, Pictures, Turned, check_alike, turned, unknown_in
+from simdtex.options import UNSET, DataWarning, check_real, entries, lists, option_parameters, unmasked
+from simdtex.run import Callback, Output
+
+SUMS = 1e-3
+"""The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
+
+RAISES = """\
+Raises
+------
+ValueError, TypeError
+    An argument is invalid; the message names the remedy.
+"""
+
+OUTPUT = """\
+output : simdtex.run.Output
+    Only with ``full_output=True``.
+"""
+
+SHARED = SimpleNamespace(channel_axis=None, rng=None, full_output=False, checkpoint=None, mask=None, known_source=None)
+"""The values of inputs that a job does not have."""
+
+
+class Work(NamedTuple):
+    """What the function of a job does, once its inputs are checked.
+
+    ``run`` is a plan, or a function that drives several in turn; ``options`` are those of the method; ``axis`` is the
+    channel axis of the returned picture; and ``finish(picture, output)`` returns what the function returns instead.
+    """
+
+    run: Plan | Callable[[Machine, int, Callback | None, Checkpointing], tuple[NDArray[Any], Output]]
+    options: Any
+    axis: int | None
+    finish: Callable[[Any, Output], Any] | None = None
+
+
+def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[Any], Work]], Any]:
+    """Return a decorator that makes the public function of a job from a function that plans it.
+
+    ``plan(call)`` gets all inputs of `simdtex.inputs` by name, as their checks return them, and ``options``, those of
+    the ``methods``, but for the one `without`, as they were given. The public function has these parameters, and its
+    docstring describes them; it opens the device and the checkpoint, runs the `Work` and returns the result. Its
+    attribute ``prepare``, with the same parameters, returns the call and the work.
+    """
+    own = {name: one for name, one in inputs(job).items() if not one.command_only}
+    written = Signature(
+        [
+            *(_parameter(name, own[name], type_) for name, type_ in parameter_types(job).items()),
+            *[Parameter("options", Parameter.VAR_KEYWORD, annotation="Any")] * bool(methods),
+        ]
+    )
+
+    def decorate(plan: Callable[[Any], Work]) -> Any:
+        def prepare(*args: Any, **given: Any) -> tuple[Any, Work]:
+            bound = written.bind(*args, **given)
+            bound.apply_defaults()
+            call = SimpleNamespace(**{**vars(SHARED), **bound.arguments})
+            for name, one in own.items():
+                value = getattr(call, name)
+                one.check(name, value)
+                if one.checker and value is not None:
+                    setattr(call, name, CHECKS[one.checker](name, value, call))
+            return call, plan(call)
+
+        @wraps(plan)
+        def function(*args: Any, **given: Any) -> Any:
+            call, work = prepare(*args, **given)
+
+            def identity() -> dict[str, Any]:
+                found = {name: IDENTITIES[one.identity](call, name) for name, one in own.items() if one.identity}
+                return found | {"options": work.options}
+
+            run: Any = work.run if callable(work.run) else partial(drive, work.run)
+            shared = (work.axis, call.rng, call.device, call.callback, bool(work.finish or call.full_output))
+            made: Any = execute(plan.__name__, run, identity, *shared, call.checkpoint)
+            return work.finish(*made) if work.finish else made
+
+        if plan.__doc__:
+            function.__doc__ = _described(plan.__doc__, own, methods)
+        vars(function).update(__signature__=written, prepare=prepare)
+        return lists(option_parameters(job, *methods, without=without))(function)
+
+    return decorate
+
+
+def _described(doc: str, own: dict[str, Input], methods: tuple[Any, ...]) -> str:
+    """Return the docstring of a public function from one without the sections Parameters and Raises."""
+    about, returns, *notes = re.split(r"^(?=\w+\n---)", cleandoc(doc), flags=re.MULTILINE)
+    alone = {name for name, one in own.items() if one.method and len(methods) > 1}  # of one of several methods
+    told = {name: replace(one, doc=f"``{one.method}``: {one.doc}") for name, one in own.items() if name in alone}
+    tables = ", ".join(f"`{one.__module__.removesuffix('.options')}.{one.__qualname__}`" for one in methods)
+    options = f"**options\n    Those of the method, see {tables}.\n" if methods else ""
+    output = OUTPUT if "full_output" in own and "\noutput :" not in returns else ""
+    return about + "\n".join(
+        [f"{entries(own | told)}\n{options}", f"{returns.rstrip()}\n{output}", RAISES, "".join(notes)]
+    )
+
+
+def _parameter(name: str, one: Input, type_: str) -> Parameter:
+    kind = Parameter.POSITIONAL_OR_KEYWORD if one.positional else Parameter.KEYWORD_ONLY
+    return Parameter(name, kind, default=Parameter.empty if one.default is UNSET else one.default, annotation=type_)
+
+
+# The arrays of a job
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
@@ -268,3 +378,188 @@ def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int
     if shape != wanted:
         sizes = ["x".join(map(str, sides)) for sides in (shape, wanted)]
         raise ValueError(f"{name} is {sizes[0]} and {other} {sizes[1]} (rows x columns); give one size")
+
+
+# The maps of a simulation
+
+
+class Maps(NamedTuple):
+    """The maps of a simulation as arrays or tables, see `simdtex.simulate`; None if not given."""
+
+    region: NDArray[Any] | HardData | None = None
+    probabilities: NDArray[Any] | HardData | None = None
+    image_map: NDArray[Any] | HardData | None = None
+    rotation: NDArray[Any] | HardData | None = None
+    scale: NDArray[Any] | HardData | None = None
+
+    def shape(self, axes: int) -> tuple[int, ...] | None:
+        """Return the sides of the first map that is an array: rows and columns and, with 3 ``axes``, layers."""
+        shapes = (np.shape(one)[-axes:] for one in self if one is not None and not isinstance(one, HardData))
+        return next((shape for shape in shapes if len(shape) == axes), None)
+
+    def digests(self) -> dict[str, str]:
+        """Return the SHA-256 digest of each map, by name."""
+        arrays = {
+            name: (one.points, one.values)
+            if isinstance(one, HardData)
+            else (np.ma.getdata(one), np.ma.getmaskarray(one))
+            for name, one in self._asdict().items()
+            if one is not None
+        }
+        return {name: digest(*those) for name, those in arrays.items()}
+
+    def of_images(self, pictures: Pictures, shape: tuple[int, int]) -> Turned | None:
+        """Return the copies of training images that the maps require; None without such maps."""
+        if self.image_map is self.rotation is self.scale is None:
+            return None
+        rotation = None if self.rotation is None else _numbers("rotation", self.rotation, shape)
+        scale = None if self.scale is None else _numbers("scale", self.scale, shape)
+        most = 2.0 ** (HALVES / 2)
+        if scale is not None and ((scale < 1 / most) | (scale > most)).any():
+            raise ValueError(f"scale has {scale.min():g} to {scale.max():g}; give factors of {1 / most:g} to {most:g}")
+        return turned(pictures, self._images(pictures, shape), rotation, scale)
+
+    def _images(self, pictures: Pictures, shape: tuple[int, int]) -> NDArray[np.float64]:
+        """Return the probability of each training image, (training images, H, W)."""
+        areas, count = [float(prod(one.shape[:2])) for one in pictures.pixels], len(pictures.pixels)
+        if self.image_map is None:
+            return np.broadcast_to(np.array(areas)[:, None, None] / sum(areas), (count, *shape))
+        given = as_array("image_map", self.image_map)
+        if given.ndim == 3:
+            each = _numbers("image_map", given, (count, *shape))
+            if (each < 0).any() or (each.sum(0) == 0).any():
+                raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
+            return np.asarray(each / each.sum(0))
+        number = _numbers("image_map", given, shape)
+        told = number[~np.isnan(number)]
+        if not (np.isin(told, np.arange(count))).all():
+            wrong = told[~np.isin(told, np.arange(count))][0]
+            raise ValueError(
+                f"image_map has {wrong:g} and there {'is 1' if count == 1 else f'are {count}'} training "
+                f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, rows, cols)"
+            )
+        weights: NDArray[np.float64] = (number == np.arange(count)[:, None, None]).astype(np.float64)
+        weights[:, np.isnan(number)] = np.nan
+        return weights
+
+    def of_categories(
+        self, categories: NDArray[Any] | None, shape: tuple[int, ...], place: Placing
+    ) -> NDArray[np.float64] | None:
+        """Return the probability of each category, (categories, *shape), NaN where not given; None without a map."""
+        if self.probabilities is None:
+            return None
+        if categories is None:
+            raise ValueError("probabilities are of categories; give categorical=True, or leave them out")
+        given, names = self.probabilities, ", ".join(map(str, categories[:10]))
+        if isinstance(given, HardData):
+            if len(given.names) != len(categories):
+                raise ValueError(
+                    f"the table of probabilities has {len(given.names)} values in a row and the training image the "
+                    f"{len(categories)} categories {names}; give x, y and one for each, in this order"
+                )
+            placed = place(given, shape, np.float64).reshape(*shape, len(categories))
+            given = np.moveaxis(placed.filled(np.nan), -1, 0)
+        found = as_array("probabilities", given)
+        if found.ndim != 1 + len(shape) or len(found) != len(categories):
+            raise ValueError(
+                f"probabilities are {'x'.join(map(str, found.shape))} and the training image has the {len(categories)} "
+                f"categories {names}; give (categories, {AXES[len(shape)][1:]}, in this order"
+            )
+        found = _numbers("probabilities", found, (len(categories), *shape))
+        unknown = np.isnan(found).any(0)
+        total = found.sum(0)
+        off = ~unknown & ((found < 0).any(0) | (abs(total - 1) > SUMS))
+        if off.any():
+            at = np.argwhere(off)[0]
+            told = ", ".join(f"{p:g}" for p in found[(slice(None), *at)])
+            raise ValueError(
+                f"the probabilities of {_cell(at)} are {told}; give numbers of 0 or more that add up to 1, or NaN"
+            )
+        found[:, unknown] = np.nan
+        return np.asarray(found / total)
+
+
+def _cell(at: NDArray[np.integer]) -> str:
+    """Return the position of a cell, in words."""
+    names = ("layer", "row", "column")[-len(at) :]
+    return ", ".join(f"{name} {n}" for name, n in zip(names, at, strict=True))
+
+
+def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
+    """Return the inputs of a simulation without the cells where the region is False, which take no part."""
+    inside = check_mask(region, shape, "region", "the output")
+    if not inside.any():
+        raise ValueError("region is False everywhere; set it True where cells are to be simulated")
+    pixels = inputs.pictures.pixels[0]
+    sides = (*shape, pixels.shape[-1])
+    given = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
+    if (given.known & ~inside[..., None]).any():
+        at = np.argwhere(given.known.any(-1) & ~inside)[0]
+        raise ValueError(f"known has a value at {_cell(at)}, outside region; leave it out, or widen region")
+    return inputs._replace(given=replace(given, known=given.known | ~inside[..., None], outside=~inside))
+
+
+def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
+    """Return the number that marks a missing value in arrays of the training images' type.
+
+    It is NaN for floats; for integers the largest number of the type or, if the images have that, the smallest.
+    """
+    dtype = pixels[0].dtype
+    if dtype.kind == "f":
+        return dtype.type(np.nan)
+    if dtype.kind in "iu":
+        for number in (np.iinfo(dtype).max, np.iinfo(dtype).min):
+            if not any((one == number).any() for one in pixels):
+                return dtype.type(number)
+    raise ValueError(f"{dtype} has no number that says that a cell is outside region; give the training image as int16")
+
+
+def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return a map as floats, NaN where it is masked."""
+    array = as_array(name, values)
+    check_real(name, array)
+    if array.shape != shape:
+        sides = ["x".join(map(str, one)) for one in (array.shape, shape)]
+        raise ValueError(f"{name} is {sides[0]} and has to be {sides[1]}, as the output; give one size")
+    found = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
+    if np.isinf(found).any():
+        raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
+    return found
+
+
+# The checks and identities that declarations name
+
+
+def _training(name: str, value: Any, call: Any) -> Pictures:
+    """Return training images; one of three axes, without that of the variables, is a volume."""
+    call.axes = 3 if getattr(value, "ndim", 2) - (call.channel_axis is not None) == 3 else 2
+    call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))
+    return found
+
+
+def _texture(name: str, value: Any, call: Any) -> Pictures:
+    """Return samples that are like the picture and not from it."""
+    found = check_samples(value, call.channel_axis)
+    check_alike("the sample", found.pixels[0], "the picture", call.image[0])
+    return found
+
+
+CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
+    "samples": lambda name, value, call: check_samples(value, call.channel_axis, call.mask),
+    "training": _training,
+    "texture": _texture,
+    "picture": lambda name, value, call: check_sample(value, call.channel_axis),
+    "picture with gaps": lambda name, value, call: check_picture(value, call.channel_axis),
+    "hole": lambda name, value, call: check_mask(value, call.image[0].shape[:2]),
+    "rows and columns": lambda name, value, call: check_shape(value),
+    "block": lambda name, value, call: check_sides(value, ("depth", "rows", "columns")),
+    "data": lambda name, value, call: as_known(value, name, call.sample if name == "known" else None),
+}
+"""The checks that declarations name; see `simdtex.inputs.Input`."""
+
+IDENTITIES: dict[bool | str, Callable[[Any, str], Any]] = {
+    True: getattr,
+    "arrays": lambda call, name: call.inputs.identity()["sample" if name == "training" else name],
+    "maps": lambda call, name: call.maps.digests().get(name),
+}
+"""What identifies a run, of inputs that the plan has placed in ``call.inputs`` and ``call.maps``."""

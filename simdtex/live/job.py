@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The job of a page: the call of a public function, and the command line that repeats it."""
+"""The job of a page: its controls, the call of a public function, and the command line that repeats it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import shlex
 from collections.abc import Callable
 from contextlib import suppress
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,27 +16,44 @@ import PIL.ImageDraw
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing
+from simdtex.inputs import inputs
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import classify
-from simdtex.jobs.filling import extend, extension, fill, filling
-from simdtex.jobs.hole_replay import HoleReplay
+from simdtex.jobs.filling import HoleReplay, extend, fill
+from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
-from simdtex.live.words import controls
 from simdtex.machine import Machine
+from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS
 from simdtex.methods.mrf.replay import Replay
 from simdtex.model.display import label_colours
-from simdtex.options import one_of, real, shown, whole
+from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, one_of, real, shown, table, whole
 from simdtex.run import Output
-from simdtex.synthesis import METHODS, replay, synthesize
 
 Array = NDArray[Any]
 Maps = dict[str, Array]
 Message = dict[str, Any]
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
+FUNCTIONS: dict[str, Any] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
 """The functions of the page's jobs, by command: a larger texture, a seamless picture, a filled hole, labels."""
+
+METHODS = {
+    "mrf": "Markov random field: any texture",
+    "multires": "Multiresolution sampling: very quick, loose order",
+    "pyramid": "Pyramid matching: stone, bark, cloth",
+}
+"""The names of the methods on the page."""
+
+TABLES: dict[str, tuple[Any, str]] = {
+    "mrf": (mrf.Options, "synth"),
+    "multires": (multires.Options, "synth"),
+    "pyramid": (pyramid.Options, "synth"),
+    "fill": (mrf.Options, "fill"),
+    "extend": (mrf.Options, "extend"),
+    "classify": (classifier.Options, "classify"),
+}
+"""The options and the command of each set of controls: for the methods, and for the jobs with a single method."""
 
 MAX_SIDE = 2**14
 """The most rows or columns of an output."""
@@ -52,7 +70,9 @@ MAX_LABEL = 8
 LABELS = label_colours(MAX_LABEL + 1)
 """The colours of labels, for the brush and over a picture."""
 
-WHOLE = (slice(None), slice(None))
+Part = tuple[slice, slice]
+
+WHOLE: Part = (slice(None), slice(None))
 """All rows and columns."""
 
 RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture", "labels", "strokes")
@@ -114,14 +134,9 @@ class Job:
             before = result(number)
             self._read(f"result-{number}", before.image, before.maps)
         self.shape: tuple[int, int] = self.sample.shape[:2]
-        if self.kind == "synth":
-            self._synthesize(message, picture, part)
-        elif self.kind == "extend":
-            self._add("seamless", True, "--seamless")
-        elif self.kind == "fill":
-            self._fill(message.get("hole", []))
-        else:
-            self._classify(message)
+        for name, one in inputs(self.kind).items():
+            if one.painter:
+                getattr(self, one.painter)(name, one.flag(name), message, picture.pixels.shape, part)
         self._add("rng", seed, "--seed", str(seed))
         self._add("channel_axis", picture.channel_axis)
         self.options = _options(message.get("options", {}), self.method if self.kind == "synth" else self.kind)
@@ -140,15 +155,8 @@ class Job:
         """Return the replay of the run; raise ValueError if it is not one run of ``mrf``."""
         if self.method != "mrf":
             raise ValueError("only runs of the method mrf can be looked into")
-        keywords = {name: value for name, value in self._keywords.items() if name != "method"}
-        if self.kind == "synth":
-            return replay(self.sample, device=machine, **keywords)
-        seed, axis = keywords.pop("rng"), keywords.pop("channel_axis")
-        if self.kind == "fill":
-            job = filling(self.sample, keywords.pop("mask"), None, None, axis, keywords)
-            return HoleReplay(job, machine, seed)
-        sides = dict.fromkeys(("top", "bottom", "left", "right"), 0)
-        return Replay(extension(self.sample, axis, sides, keywords.pop("seamless"), None, keywords)[0], machine, seed)
+        call, work = FUNCTIONS[self.kind].prepare(self.sample, **self._keywords)
+        return (HoleReplay if self.kind == "fill" else Replay)(work.run, machine, call.rng)
 
     def layers(
         self,
@@ -189,14 +197,20 @@ class Job:
         self._keywords[name] = value
         self._flags += flags
 
-    def _synthesize(self, message: Message, picture: Picture, part: tuple[slice, slice]) -> None:
-        for name in ("width", "height"):
-            whole(name, message.get(name), 1, MAX_SIDE)
+    # The painters that declarations name: they add an input from the message about a picture of a shape, and its part
+
+    def _size(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        for side in ("width", "height"):
+            whole(side, message.get(side), 1, MAX_SIDE)
         rows, cols = self.shape = (message["height"], message["width"])
-        self._add("shape", self.shape, "--size", f"{cols}x{rows}")
-        self._add("method", self.method, "--method", self.method)
-        guide = _guide(message)
-        own = paint(guide.get("sample", []), picture.pixels.shape)[part]
+        self._add(name, self.shape, flag, f"{cols}x{rows}")
+
+    def _method(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        self._add(name, self.method, flag, self.method)
+
+    def _guide(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        guide = _painted(message)
+        own = paint(guide.get("sample", []), shape)[part]
         wanted = paint(guide.get("output", []), self.shape)
         if not wanted.any():
             return
@@ -204,12 +218,11 @@ class Job:
             raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
         transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
         self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
-        given = own, np.where(wanted == 0, np.nan, wanted)
-        self._add("guide", given, "--guide", "guide-sample.png=guide-texture.png")
+        self._add(name, (own, np.where(wanted == 0, np.nan, wanted)), flag, "guide-sample.png=guide-texture.png")
         self._add("labels", True)
 
-    def _classify(self, message: Message) -> None:
-        strokes = paint(_guide(message).get("sample", []), self.shape)
+    def _classes(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        strokes = paint(_painted(message).get("sample", []), self.shape)
         counts = np.bincount(strokes.ravel())
         self.classes = [label for label in np.flatnonzero(counts).tolist() if label]
         if len(self.classes) < 2:
@@ -221,19 +234,22 @@ class Job:
         self.output = "labels.png"
         self.files["strokes.png"] = strokes
         self.labelled = (self.output, "strokes.png")
-        self._add("textures", strokes, "--strokes", "strokes.png")
+        self._add(name, strokes, "--strokes", "strokes.png")
 
-    def _fill(self, strokes: Any) -> None:
-        hole = paint(strokes, self.shape) > 0
+    def _hole(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        hole = paint(message.get("hole", []), self.shape) > 0
         if not hole.any():
             raise ValueError("there is no hole to fill; paint over what is to be replaced")
         if hole.all():
             raise ValueError("the hole covers the whole picture; leave some of it")
         self.files["hole.png"] = hole * np.uint8(255)
-        self._add("mask", hole, "--mask", "hole.png")
+        self._add(name, hole, flag, "hole.png")
+
+    def _seam(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+        self._add(name, True, flag)
 
 
-def _guide(message: Message) -> dict[str, Any]:
+def _painted(message: Message) -> dict[str, Any]:
     guide = message.get("guide") or {}
     if not isinstance(guide, dict):
         raise TypeError("a guide is painted on the sample and on the output; paint both")
@@ -287,7 +303,7 @@ def _options(given: Any, table: str) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None and value != defaults[name]}
 
 
-def _part(given: Any, shape: tuple[int, ...]) -> tuple[slice, slice]:
+def _part(given: Any, shape: tuple[int, ...]) -> Part:
     """Return the rows and columns of a region, `WHOLE` if it is the whole picture."""
     if given is None:
         return WHOLE
@@ -310,3 +326,35 @@ def file_stem(name: str, otherwise: str) -> str:
 
 def _suffix(pixels: Array) -> str:
     return suitable_suffix(pixels.dtype, 1 if pixels.ndim == 2 else pixels.shape[2])
+
+
+def controls(name: str) -> list[dict[str, Any]]:
+    """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider.
+
+    A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
+    ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
+    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
+    ``empty``, the text of an empty field; and ``usual``, its number, None if that is not fixed.
+    """
+    options, job = TABLES[name]
+    made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
+    return [control for control in made if "kind" in control]
+
+
+def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
+    """Return the control of an option; without ``kind`` if it has none."""
+    hint = f"{one.help}. Empty: {one.none}." if one.none else f"{one.help}."
+    label = one.label or name.replace("_", " ").capitalize()
+    control = {"name": name, "group": one.group, "label": label, "hint": hint, "default": default}
+    kind = one.kind
+    if isinstance(kind, Choice) or (isinstance(kind, Other) and default in kind.valid):
+        return control | {"kind": "words", "valid": [[word, word] for word in kind.valid]}
+    if is_flag(kind) and default is not None:
+        return control | {"kind": "switch"}
+    if isinstance(kind, (Whole, Number)) and one.slider:
+        control |= {"least": kind.least if isfinite(kind.least) else None, "span": one.slider}
+        found = re.match(r"[\d.]+(?=;|$)", one.none)
+        control["usual"] = float(found[0]) if found else default
+        control["empty"] = "" if default is not None else f"automatic: {found[0]}" if found else "automatic"
+        return control | {"kind": "whole" if isinstance(kind, Whole) else "number"}
+    return control

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from functools import cache, partial
 from importlib.metadata import version
 from math import inf
@@ -22,20 +23,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.checkpoint import Checkpointing, pack
 from simdtex.io.image import EXAMPLES, example, read_bytes
+from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
-from simdtex.live.inside import Inside
-from simdtex.live.job import LABELS, MIN_REGION, Hint, Job, Message, Picture, file_stem
-from simdtex.live.levels import Levels
-from simdtex.live.results import THUMBNAIL, Result, Results
-from simdtex.live.words import METHODS, TABLES, controls
+from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem
+from simdtex.live.results import THUMBNAIL, Inside, Result, Results
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.display import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
 from simdtex.options import one_of, resolve
-from simdtex.synthesis import synthesize
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 
@@ -46,6 +45,9 @@ MAX_BYTES = 2**27
 
 MAX_PIXELS = 2**25
 """The most pixels of a picture from the page."""
+
+MAX_STATE = 2**27
+"""The most bytes of the state of a run at the end of a level, which is kept."""
 
 MAX_MAPS = 16
 """The most further maps of a material."""
@@ -82,6 +84,40 @@ log = logging.getLogger(__name__)
 
 class Cancelled(Exception):
     """The run is cancelled."""
+
+
+class Levels:
+    """The states of a run of ``mrf`` at the end of each level.
+
+    ``key`` is the job without its options; None keeps no state. If an earlier run, ``before``, has the same key, this
+    run starts after the last level that is the same in both.
+    """
+
+    def __init__(self, key: Any, options: mrf.Options, before: Levels | None = None) -> None:
+        self._key, self._options = key, options
+        self._states: dict[int, Any] = {}
+        if before is not None and key is not None and before._key == key and before._states:
+            first = mrf.begins(before._options, options, 1 + max(before._states))
+            self._states = {level: state for level, state in before._states.items() if level > first}
+
+    @property
+    def level(self) -> int | None:
+        """The level after which the run starts; None if it starts from the beginning."""
+        return min(self._states, default=None)
+
+    @property
+    def checkpointing(self) -> Checkpointing:
+        """The state that the run starts from, and the function that receives its states."""
+        found = None if self.level is None else deepcopy(self._states[self.level])
+        return Checkpointing(found, self._offer)
+
+    def _offer(self, info: Any, tree: Callable[[], Any]) -> None:
+        """Keep the state at the end of a level."""
+        if self._key is None or not getattr(info, "ended", False):
+            return
+        state = tree()
+        if sum(array.nbytes for array in pack(state)[1]) <= MAX_STATE:
+            self._states[info.level] = deepcopy(state)  # the run changes parts of it
 
 
 class Session:

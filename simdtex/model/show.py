@@ -12,13 +12,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from matplotlib.backend_bases import FigureManagerBase
-from matplotlib.colorbar import Colorbar
-from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from xarray.core.utils import UncachedAccessor
 from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
@@ -26,7 +21,17 @@ from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 from simdtex.io.image import as_array, pixels_of, to_display
 from simdtex.io.rasters import axis_place
 from simdtex.model.display import category_colours
-from simdtex.options import whole
+from simdtex.options import require, whole
+
+try:
+    import matplotlib.pyplot as plt
+    from matplotlib.backend_bases import FigureManagerBase
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+except ModuleNotFoundError:
+    require("reports", "matplotlib")
+    raise
 
 ACROSS, MAP_INCHES = 4, 2.6
 """The most maps in a row, and the longer side of a map, inches."""

@@ -3,18 +3,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from numbers import Integral
-from typing import Any, Literal, Unpack, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoint import Checkpoint
-from simdtex.driver import check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -22,115 +18,29 @@ from simdtex.methods.pyramid.matcher import Histograms, Sorted, averaged, histog
 from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
-from simdtex.methods.typed_options import MixOptions
 from simdtex.model.stretched import Stretched
-from simdtex.options import lists_options, real, resolve, whole
-from simdtex.run import Callback, Output
+from simdtex.options import real, whole
 
 
-@overload
-def mix(
-    samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixOptions]
-) -> tuple[NDArray[Any], Output]: ...
-@overload
-def mix(
+def mixture(
     samples: Sequence[ArrayLike],
     shape: tuple[int, int],
-    *,
-    full_output: Literal[False] = ...,
-    **options: Unpack[MixOptions],
-) -> NDArray[Any]: ...
-@lists_options("mix", Options)
-def mix(
-    samples: Sequence[ArrayLike],
-    shape: tuple[int, int],
-    *,
-    palette: int | None = None,
-    pattern: int | None = None,
-    average: Sequence[float] | None = None,
-    low: int | None = None,
-    high: int | None = None,
-    split: int | None = None,
-    channel_axis: int | None = None,
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    full_output: bool = False,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
-    **options: Any,
-) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Return a mixture of several textures, by pyramid matching.
-
-    Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
-    frequencies of one sample with the high frequencies of another (`low`, `high`). Its colours are those of its
-    pattern, or of another sample (`palette`).
-
-    Parameters
-    ----------
-    samples : sequence of (rows, cols) or, with `channel_axis`, three-dimensional arrays
-        One or more, of one type and any sizes. With `channel_axis`, grey ones may have two axes.
-    shape : (int, int)
-        Rows and columns of the output.
-    palette : int, optional
-        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.
-    pattern : int, optional
-        The sample whose subband histograms are matched.
-    average : sequence of float, optional
-        A weight for every sample, 0 or more. By default all weights are equal.
-    low, high : int, optional
-        The samples of the low and of the high frequencies.
-    split : int, optional
-        Number of levels, from the finest on, that are high frequencies; by default half of them.
-    channel_axis : int, optional
-        The axis that holds channels; None for grey samples.
-    rng, device, callback, full_output, checkpoint
-        As in `simdtex.synthesize`.
-    **options
-        See `simdtex.methods.pyramid.Options`; ``start`` is a picture to start from instead of noise.
-
-    Returns
-    -------
-    image : array of the samples' type
-        `shape` plus the channel axis, if the samples have one.
-    output : simdtex.run.Output
-        Only with ``full_output=True``.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is invalid; the message names the remedy.
-
-    Notes
-    -----
-    Cost: that of `simdtex.synthesize` with ``method="pyramid"``, and an analysis of every sample.
-
-    Examples
-    --------
-    >>> from skimage import data
-    >>> import simdtex
-    >>> brick, gravel = data.brick()[:64, :64], data.gravel()[:64, :64]
-    >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
-    (96, 96)
-    """
-    size = check_shape(shape)
+    channel_axis: int | None,
+    options: Options,
+    palette: int | None,
+    pattern: int | None,
+    average: Sequence[float] | None,
+    low: int | None,
+    high: int | None,
+    split: int | None,
+) -> Mixture:
+    """Return the plan of `simdtex.mix` for its parameters; raise ValueError or TypeError if one is invalid."""
     pictures = _checked(samples, channel_axis)
     weights = _weights(len(pictures), pattern, average, low, high, split)
     if palette is not None:
         _check_number("palette", palette, len(pictures))
-    chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
-    plan = Mixture(pictures, size, chosen, weights, sides, palette)
-    return execute(
-        "mix",
-        partial(drive, plan),
-        lambda: dict(vars(plan)),
-        channel_axis,
-        rng,
-        device,
-        callback,
-        full_output,
-        checkpoint,
-    )
+    return Mixture(pictures, shape, options, weights, sides, palette)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex synth``, ``extend``, ``tile``, ``fill``, ``mix`` and ``solid``: textures."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.cli.command import OUTPUTS
+from simdtex.cli.inputs import (
+    Folder,
+    Reading,
+    arranged,
+    channels,
+    check_profiles,
+    last_iteration,
+    output_shape,
+    planes,
+    read_also,
+    read_inputs,
+    read_lead,
+    read_material,
+    size_text,
+    take_reading,
+)
+from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.options import (
+    DIRECTION,
+    DIRECTIONS,
+    OUTPUT,
+    PREVIEW,
+    PROFILE,
+    given,
+    input_options,
+    material_options,
+    option,
+    output_option,
+    report_option,
+    size_option,
+    stages_option,
+)
+from simdtex.cli.places import EITHER, ENTER, READ, WRITE
+from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
+from simdtex.model.pictures import unknown_in
+
+SIDES = ("top", "bottom", "left", "right")
+REPORTED = "its pictures, and how evenly it uses the picture"
+"""What the page of a run shows."""
+
+
+@job(
+    ("synth gravel.png -o more.png", "Make a texture of twice the size that tiles."),
+    ("synth brick -o more --size 2x", "Make more of a material: all maps in the folder brick, arranged alike."),
+    ("synth gravel.png -o more.png --size 1024x512 --preview", "Set the size, and see 3x3 copies in more-3x3.png."),
+    ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
+    usual="output size seed method order also guide preview report dry_run device quiet",
+)
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
+@output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
+@size_option("that of --known or of the output guide, else twice the first sample")
+@input_options("synth")
+@material_options
+@PREVIEW
+@tiles_options
+@stages_option("every level, sweep or iteration")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
+@PROFILE
+def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
+    """Synthesise a picture of any size with the texture of SAMPLE.
+
+    The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
+    """
+    from simdtex.jobs.synthesis import synthesize
+
+    context = click.get_current_context()
+    check_tiles(context)
+    how = take_reading(options)
+    target, material = read_lead(samples, output, options, how)
+    if method == "pyramid" and (options["source_map"] or options["also"] or isinstance(target, Folder)):
+        remedy = "give one picture, and leave --source-map and --also out"
+        raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
+    pixels = material.pixels[0]
+    data = read_inputs("synth", options, material, how)
+    known, guide = data["known"], data["guide"]
+    shape = output_shape(size, pixels, known, guide and guide[1])
+    if context.params["report"] and (material.several or known is not None or not material.known):
+        raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
+    if options["tiles"] is not None:
+        others = read_also(options["also"], material, files=False)
+        left_out = ("tiles", "workers", "also", "source_map", "preview")
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
+        return None
+    like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
+    foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
+    writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
+
+    def more(made: Any, output: Any) -> None:
+        statistics = output.statistics
+        if method == "multires":
+            counts = " ".join(f"{level['candidates']:.3g}" for level in statistics["levels"][1:])
+            click.echo(f"candidates per level, coarse to fine: {counts}")
+        elif method == "pyramid":
+            click.echo(last_iteration(statistics))
+        else:
+            from simdtex.model.regularity import lattice_sentence
+
+            if note := lattice_sentence(statistics["lattice"]):
+                click.echo(note)
+        if options["array"]:
+            from simdtex.report.tables import print_accounting
+
+            print_accounting(statistics["accounting"])
+
+    height, width = material.sizes[0]
+    by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
+    return Task(
+        partial(synthesize, material.array, shape, method=method, **data | given(options)),
+        f"{shape[1]}x{shape[0]} from {by}",
+        str(target),
+        writers,
+        material.limits,
+        more,
+        partial(write_page, pixels),
+    )
+
+
+@job(
+    ("extend photo.png -o wide.png --left 200 --right 200", "Add pixels on two sides."),
+    ("extend photo.png -o larger.png --size 150% --seamless", "Add pixels at the right and below, and make it tile."),
+    ("extend brick -o larger --right 512", "Extend all maps in the folder brick: albedo, normal, roughness..."),
+    usual="output left right top bottom size seamless seed also preview dry_run device quiet",
+)
+@click.argument("picture", type=ENTER)
+@OUTPUT
+@input_options("extend", *SIDES)
+@size_option("that with the pixels of --left, --right, --top and --bottom", base="PICTURE")
+@input_options("extend", "seamless", "band")
+@material_options
+@PREVIEW
+@stages_option("every level and sweep")
+@report_option(REPORTED)
+def extend(size: str | None, seamless: Any, **options: Any) -> Task:
+    """Continue PICTURE beyond its edges, or make it seamless.
+
+    PICTURE may be a folder with the maps of a material, as in `simdtex tile`.
+    """
+    if seamless is None and options["band"] is not None:
+        raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
+    sides = {name: options.pop(name) or 0 for name in SIDES}
+    return continued(seamless or False, sides, size, **options)
+
+
+@job(
+    ("tile photo.png -o tile.png", "Make a photo tile."),
+    ("tile brick -o tiled --preview", "Make all maps of a material tile; tiled-3x3.png shows copies."),
+    ("tile panorama.png -o round.png --direction x", "Join left and right only."),
+    usual="output direction band seed also roles preview report dry_run device quiet",
+    of="extend",
+)
+@click.argument("picture", type=ENTER)
+@OUTPUT
+@option(
+    "--direction",
+    type=DIRECTION,
+    words=DIRECTIONS,
+    default="both",
+    show_default=True,
+    help="Join left and right (x), top and bottom (y), or both.",
+)
+@input_options("extend", "band")
+@material_options
+@PREVIEW
+@stages_option("every level and sweep")
+@report_option(REPORTED)
+def tile(direction: Any, **options: Any) -> Task:
+    """Make PICTURE tile, or all maps of a material.
+
+    A band along the edges is replaced; the rest does not change. PICTURE may be a folder with the maps of a material,
+    whose names end in their kind, such as brick_albedo.png and brick_normal.png; the output is then a folder too. The
+    albedo decides the arrangement. To let another map decide, give its path instead of the folder's.
+    """
+    return continued(direction, dict.fromkeys(SIDES, 0), None, **options)
+
+
+def continued(
+    seamless: Any, sides: dict[str, int], size: str | None, *, picture: Path, output: Path, **options: Any
+) -> Task:
+    """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
+    from simdtex import extend
+
+    target, whole = read_lead([picture], output, options, Reading(palette=bool(options["categorical"])))
+    pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
+    if size is not None:
+        sides = _sides(size, sides, (rows, cols))
+    metadata = whole.metadata
+    if metadata and metadata.geo:
+        metadata = metadata._replace(geo=metadata.geo.moved(sides["left"], sides["top"]))
+    writers = arranged(target, whole, metadata, options)
+    width, height = cols + sides["left"] + sides["right"], rows + sides["top"] + sides["bottom"]
+    return Task(
+        partial(extend, pixels, seamless=seamless, channel_axis=whole.channel_axis, **sides, **given(options)),
+        f"{width}x{height} from {cols}x{rows}",
+        str(target),
+        writers,
+        whole.limits,
+        report=partial(write_page, pixels, continued=True),
+    )
+
+
+def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
+    """Return what is to be added on each side for an output of this size."""
+    from simdtex.io.image import parse_sides
+
+    if any(sides.values()):
+        raise ValueError("--size cannot be used with --left, --right, --top or --bottom; leave them out")
+    size = parse_sides(text, "WIDTHxHEIGHT", shape[::-1])[::-1]
+    more = [new - old for new, old in zip(size, shape, strict=True)]
+    if min(more) < 0:
+        raise ValueError(
+            f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
+        )
+    return {"top": 0, "bottom": more[0], "left": 0, "right": more[1]}
+
+
+@job(
+    ("fill photo.png -o whole.png --mask hole.png", "Fill the white parts of a mask."),
+    ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
+    ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
+    ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
+    usual="output mask invert grow feather samples reach seed also dry_run device quiet",
+)
+@click.argument("picture", type=ENTER)
+@OUTPUT
+@input_options("fill")
+@material_options
+def fill(
+    picture: Path, output: Path, mask: Path | None, invert: bool | None, samples: tuple[Path, ...], **options: Any
+) -> Task:
+    """Fill the holes of PICTURE with the texture around them.
+
+    Pixels outside the holes do not change, except with --grow and --feather. PICTURE may be a folder with the maps of a
+    material, as in `simdtex tile`; the holes are those of the albedo, or of --mask.
+    """
+    from simdtex import fill
+    from simdtex.jobs.filling import widened
+
+    how = Reading(palette=bool(options["categorical"]))
+    target, whole = read_lead([picture], output, options, how)
+    pixels, hole = _hole(whole.pixels[0], mask, invert)
+    whole = whole._replace(pixels=[pixels])
+    texture = read_material(samples, how) if samples else None
+    if texture:
+        check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
+    foreign = "maps cannot be filled with --sample, since no pixel comes from the picture" if texture else ""
+    writers = arranged(target, whole, whole.metadata, options, foreign=foreign)
+    sample = texture and texture.array
+    filled = np.count_nonzero(widened(hole, options["grow"] or 0, options["feather"] or 0))
+    axis = None if pixels.ndim == 2 else -1
+    return Task(
+        partial(fill, pixels, hole, sample=sample, channel_axis=axis, **given(options)),
+        f"{filled} of {hole.size} pixels filled",
+        str(target),
+        writers,
+    )
+
+
+def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
+    from simdtex.io.image import read_mask, split_alpha
+
+    pixels, gone = np.ma.getdata(pixels), planes(np.ma.getmaskarray(pixels)).any(-1)
+    if mask:
+        hole = read_mask(mask, pixels.shape) != bool(invert)
+    elif invert:
+        raise ValueError("--invert requires --mask; leave it out")
+    else:
+        pixels, hole = split_alpha(pixels, opaque=True)
+    return pixels, hole | gone | unknown_in(planes(pixels))
+
+
+@job(
+    ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
+    ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
+    usual="output size palette pattern average low high seed dry_run device quiet",
+)
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
+@output_option("Write this picture.", WRITE)
+@size_option("twice the first sample", base="the first sample")
+@input_options("mix")
+@stages_option("every iteration")
+@PROFILE
+def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
+    """Mix the textures SAMPLE... into one picture.
+
+    Options name a sample by its path as in the command, or by its number from 1. The method is Heeger and Bergen's
+    (1995).
+    """
+    from simdtex.io import image
+    from simdtex.jobs.synthesis import mix
+
+    material = read_material(samples)
+    chosen = read_inputs("mix", options, material)
+    pixels, metadata = material.pixels, material.metadata and material.metadata._replace(exif=None)
+    shape = output_shape(size, pixels[0])
+    chosen["channel_axis"] = -1 if any(one.ndim > 2 for one in pixels) else None
+    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)))
+    return Task(
+        partial(mix, pixels, shape, **given(options | chosen)),
+        f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
+        str(output),
+        [lambda made, run: image.write(output, made, metadata)],
+        material.limits,
+        lambda made, output: click.echo(last_iteration(output.statistics)),
+    )
+
+
+@job(
+    ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
+    ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
+    usual="outputs size picture seed iterations pyramid dry_run device quiet",
+)
+@click.argument("sample", type=READ)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    type=EITHER,
+    help="Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.",
+)
+@click.option(
+    "--size",
+    default="128",
+    show_default=True,
+    metavar="DEPTHxHEIGHTxWIDTH",
+    help="Make a block of this many slices, rows and columns; one number makes a cube.",
+)
+@option(
+    "--view",
+    "picture",
+    group=OUTPUTS,
+    type=WRITE,
+    metavar="PNG",
+    help="Write a picture of the block: a cube, a sphere and three slices.",
+)
+@stages_option("the middle slice of every iteration")
+@PROFILE
+def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
+    """Make a solid block whose slices have the texture of SAMPLE.
+
+    The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
+    """
+    from simdtex.io import image, volume
+    from simdtex.jobs.synthesis import synthesize_solid
+    from simdtex.report.sheet import view
+
+    shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")
+    material = read_material([sample])
+    pixels = material.pixels[0]
+    writers: list[Any] = []
+    for output in outputs:
+        volume.check_writable(output, pixels.dtype, channels(pixels))
+        writers.append(lambda block, run, output=output: volume.write(output, block))
+    if picture:
+        image.check_writable(picture, suffixes=(".png",))
+        writers.append(lambda block, run: view(np.asarray(block), picture))
+    return Task(
+        partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
+        f"{'x'.join(map(str, shape))} from {size_text(pixels)}",
+        ", ".join(str(path) for path in (*outputs, picture) if path),
+        writers,
+        material.limits,
+        lambda made, output: click.echo(last_iteration(output.statistics)),
+    )

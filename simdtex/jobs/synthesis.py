@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The functions that most users need: `synthesize`, `synthesize_solid`, `mix`, `explain`, `replay`, `lcpdf`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import import_module
+from math import isqrt
+from operator import index
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.driver import with_channels_last
+from simdtex.jobs.inputs import Work, check_inputs, public
+from simdtex.machine import Machine, open_machine
+from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods.mrf.replay import Replay
+from simdtex.methods.pyramid import solid
+from simdtex.methods.pyramid.mixtures import mixture
+from simdtex.model.explanation import Explanation
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.sample import Sample
+from simdtex.options import SMALLER, lists, one_of, option_parameters, real, resolve, unmasked, whole
+from simdtex.random import as_seed
+
+TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
+"""The remedy if an output of the method ``mrf`` is too large for this machine."""
+
+NOT_REPLAYED = ("method", "callback", "full_output", "checkpoint", "options")
+
+
+@public("synth", mrf.Options, multires.Options, pyramid.Options)
+def synthesize(call: Any) -> Work:
+    """Synthesise a picture of any size with the texture of a sample.
+
+    Returns
+    -------
+    image : array of the sample's type
+        `shape` plus the channel axis, if the sample has one.
+
+    Notes
+    -----
+    Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the sample's size,
+    since a site evaluates about six candidates; the structure channel is one more channel. With ``search="exact"`` it
+    is about 14 fma for every output pixel, sample pixel, neighbour and channel, less those that bounds skip; nearly all
+    of it at the finest level, since each coarser one has a quarter of the sites and of the candidates. ``multires``:
+    some hundred comparisons for every output pixel, growing slowly with the sample and quickly with alpha. ``pyramid``:
+    some 1700 multiply-adds and 8 sorted values for every output pixel, channel and iteration, whatever the sample's
+    size. Memory grows with output pixels plus sample pixels, never with their product.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> brick = data.brick()[:64, :64]
+    >>> more = simdtex.synthesize(brick, (80, 96), order=2, rng=1)
+    >>> more.shape
+    (80, 96)
+    """
+    call.inputs = check_inputs(
+        call.sample, call.shape, call.channel_axis, None, call.known, call.known_source, call.guide
+    )
+    if call.method != "mrf" and not call.inputs.plain:
+        raise ValueError(
+            f"the method {call.method} takes one sample that is known everywhere, no mask, no known values and no "
+            'guide; give method="mrf"'
+        )
+    table = import_module(f"simdtex.methods.{call.method}").Options
+    chosen: Any = resolve(table, "synth", with_channels_last(call.options, call.channel_axis))
+    if call.method == "mrf":
+        plan = mrf.plan(call.sample, call.shape, chosen, call.inputs.given, call.inputs.guide)
+        return Work(replace(plan, remedy=TILED), chosen, call.channel_axis)
+    algorithm = import_module(f"simdtex.methods.{call.method}.algorithm")
+    return Work(algorithm.Plan(call.sample.pixels[0], call.shape, chosen), chosen, call.channel_axis)
+
+
+@public("solid", solid.Options)
+def synthesize_solid(call: Any) -> Work:
+    """Make a solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
+
+    Returns
+    -------
+    volume : (depth, rows, cols) array of the sample's type
+        With `channel_axis`, the channels are last.
+
+    Notes
+    -----
+    Cost: some 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration. Memory: see
+    ``docs/concepts/pyramid.rst``.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> block = simdtex.synthesize_solid(data.gravel()[:64, :64], (16, 24, 32), rng=1)
+    >>> block.shape
+    (16, 24, 32)
+    """
+    chosen = resolve(solid.Options, "solid", call.options)
+    return Work(solid.Plan(call.sample, call.shape, chosen), chosen, None if call.channel_axis is None else -1)
+
+
+@public("mix", pyramid.Options)
+def mix(call: Any) -> Work:
+    """Return a mixture of several textures, by pyramid matching.
+
+    Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
+    frequencies of one sample with the high frequencies of another (`low`, `high`). Its colours are those of its
+    pattern, or of another sample (`palette`).
+
+    Returns
+    -------
+    image : array of the samples' type
+        `shape` plus the channel axis, if the samples have one.
+
+    Notes
+    -----
+    Cost: that of `simdtex.synthesize` with ``method="pyramid"``, and an analysis of every sample.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> brick, gravel = data.brick()[:64, :64], data.gravel()[:64, :64]
+    >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
+    (96, 96)
+    """
+    chosen = resolve(pyramid.Options, "mix", with_channels_last(call.options, call.channel_axis))
+    pattern = (call.pattern, call.average, call.low, call.high, call.split)
+    plan = mixture(call.samples, call.shape, call.channel_axis, chosen, call.palette, *pattern)
+    call.samples = plan.pictures
+    return Work(plan, chosen, call.channel_axis)
+
+
+REPLAYED = [
+    *(one for name, one in synthesize.written.parameters.items() if name not in NOT_REPLAYED),
+    *option_parameters("synth", mrf.Options),
+]
+"""The parameters of `synthesize` that a replay has."""
+
+
+@lists(REPLAYED)
+def explain(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    site: tuple[int, int],
+    *,
+    level: int = 0,
+    sweep: int | None = None,
+    **options: Any,
+) -> Explanation:
+    """Return an explanation of why a site takes its candidate, in a synthesis by the method ``mrf``.
+
+    The run is that of `synthesize` with the same arguments, up to the step of the sweep in which the site relaxes. The
+    explanation describes that relaxation, with the field just before it.
+
+    Parameters
+    ----------
+    sample, shape
+        As in `synthesize`.
+    site : (int, int)
+        (row, column) on the level's lattice: pixel (2**level row, 2**level column) of the output.
+    level : int
+        0 is the finest.
+    sweep : int, optional
+        A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
+    **options
+        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``device`` and ``rng``,
+        the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
+
+    Returns
+    -------
+    simdtex.model.explanation.Explanation
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid, or the site does not relax there, because its value is known or is that of the level
+        above.
+
+    Notes
+    -----
+    Cost: the run up to the end of the level, with a copy to the host after each of its sweeps; with `sweep`, the run up
+    to that sweep.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> why = simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=2, rng=1)
+    >>> why.drawn, int(why.candidates.rank[why.taken])
+    (False, 0)
+    """
+    whole("level", level, 0)
+    if sweep is not None:
+        whole("sweep", sweep, 1)
+    try:
+        row, col = map(index, site)
+    except (TypeError, ValueError):
+        raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
+    return replay(sample, shape, **options).explain((row, col), level, sweep)
+
+
+@lists(REPLAYED)
+def replay(sample: ArrayLike, shape: tuple[int, int], **options: Any) -> Replay:
+    """Return a replay of a synthesis by the method ``mrf``, with its field after any set of sites that relax together.
+
+    Parameters
+    ----------
+    sample, shape, **options
+        As in `explain`.
+
+    Returns
+    -------
+    simdtex.methods.mrf.replay.Replay
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
+
+    Notes
+    -----
+    Cost: the run, and memory of the host, see `simdtex.methods.mrf.replay.Replay`.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> replay = simdtex.replay(data.brick()[:32, :32], (32, 32), order=2, schedule="checkerboard", rng=1)
+    >>> last = replay.sweeps[-1]
+    >>> last.level, last.sets
+    (0, 2)
+    >>> replay.at(-1, sets=1).image.shape
+    (32, 32, 1)
+    """
+    call, work = synthesize.prepare(sample, shape, **options)
+    if call.method != "mrf":
+        raise ValueError("only runs of the method mrf can be looked into")
+    return Replay(work.run, open_machine(call.device), as_seed(call.rng))
+
+
+def lcpdf(
+    image: ArrayLike,
+    sample: ArrayLike,
+    sites: ArrayLike,
+    *,
+    order: int = mrf.Options.order,
+    bandwidth: float = 1.0,
+    temperature: ArrayLike | None = None,
+    greys: int = 256,
+    estimator: Literal["parzen", "histogram"] = "parzen",
+    boundary: Literal["torus", "open"] = "torus",
+    device: str | Machine | None = None,
+) -> NDArray[np.float64]:
+    """Return the local conditional probability density function of a nonparametric MRF.
+
+    Parameters
+    ----------
+    image : (rows, cols) array of integers, 0 .. greys - 1
+        x, the image whose neighbourhoods are compared.
+    sample : (rows, cols) array of integers, 0 .. greys - 1
+        y, the sample from which the density is estimated.
+    sites : (S, 2) array of integers
+        (row, column) of the sites s.
+    order : int
+        The order o of the neighbourhood, equation (3); by default that of `synthesize`.
+    bandwidth : float
+        h in units of h_opt, equation (8). 1.0 is the paper's.
+    temperature : (rows, cols) array, 0 to 1, optional
+        t of equation (12), rounded to multiples of 1/1024; None is 0 everywhere.
+    greys : int
+        Number of grey levels, 2 to 4096.
+    estimator : {"parzen", "histogram"}
+        Equations (6) to (8), or counts of exact matches, (4) and (5); the latter disregards `bandwidth`, and
+        neighbours with a temperature of 1 need not match.
+    boundary : {"torus", "open"}
+        Boundary of the image. Neighbours outside an open boundary have no weight.
+    device : str, optional
+        As in `synthesize`.
+
+    Returns
+    -------
+    (S, greys) float64 array
+        P(x_s = x | x_r, r in N_s); every row adds up to 1. Computed in float32: the same bits on every
+        device, within 1e-5 of the formula in exact arithmetic.
+
+    Raises
+    ------
+    ValueError
+        The neighbourhood does not fit the sample, a grey level is out of range, or a site has no exact match.
+
+    Notes
+    -----
+    Cost: S x sample pixels x neighbours x 2 fma, and 12 x greys bytes for each of the sites computed together, 4096 at
+    most.
+    """
+    from simdtex.methods.mrf.density import lcpdf_at
+    from simdtex.ops.neighbourhood import Field
+
+    whole("greys", greys, 2)
+    if greys > 4096:
+        raise ValueError(f"greys is {greys}; give 4096 or fewer")
+    real("bandwidth", bandwidth, 0, above=True)
+    one_of("estimator", estimator, ("parzen", "histogram"))
+    one_of("boundary", boundary, ("torus", "open"))
+    x = _check_grey("image", image, greys)
+    y = _check_grey("sample", sample, greys)
+    where = _check_sites(sites, x.shape)
+    offsets = neighbourhood_offsets(order)
+    if len(offsets) * (greys - 1) ** 2 > 2**33:  # beyond which (12) is not exact: see Sample
+        most = 1 + isqrt(2**33 // len(offsets))
+        raise ValueError(f"greys is {greys}; give at most {most} for order {order}")
+    grey = Sample.of_levels(y, greys)
+    mrf.check_fit(y.shape, int(offsets.max()), order)
+
+    machine, grid = open_machine(device), Grid(x.shape[0], x.shape[1], 1, boundary == "torus")
+    planes = x[None].astype(np.uint16), np.zeros(x.shape, np.int32), _check_temperature(temperature, x.shape)
+    field = Field(*map(machine.put, planes))
+    return lcpdf_at(machine, field, grey, where, offsets, grid, bandwidth, estimator)
+
+
+def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:
+    unmasked(name, array)
+    a = np.asarray(array)
+    if a.ndim != 2 or not a.size:
+        raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
+    if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
+        raise TypeError(f"{name} must hold integers 0 to {greys - 1}, not {a.dtype}")
+    if a.min() < 0 or a.max() >= greys:
+        raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {greys - 1}; give more greys or rescale it")
+    return a.astype(np.int64)
+
+
+def _check_sites(sites: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.int32]:
+    unmasked("sites", sites)
+    a = np.asarray(sites)
+    if a.size == 0:
+        return np.zeros(0, np.int32)
+    if a.ndim != 2 or a.shape[1] != 2 or not np.issubdtype(a.dtype, np.integer):
+        raise ValueError(f"sites must be an (S, 2) array of whole (row, column), not {a.dtype} {a.shape}")
+    if (a < 0).any() or (a >= np.array(shape)).any():
+        raise ValueError(f"a site lies outside the image of {shape[0]} rows x {shape[1]} columns")
+    flat: NDArray[np.int32] = (a[:, 0] * shape[1] + a[:, 1]).astype(np.int32)
+    return flat
+
+
+def _check_temperature(temperature: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.uint16]:
+    unmasked("temperature", temperature)
+    t = np.zeros(shape) if temperature is None else np.asarray(temperature, np.float64)
+    if t.shape != shape:
+        raise ValueError(f"temperature has shape {t.shape}; give the image's, {shape}")
+    if not ((t >= 0) & (t <= 1)).all():
+        raise ValueError("temperatures must lie between 0 and 1")
+    return np.rint(t * 1024).astype(np.uint16)
