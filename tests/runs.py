@@ -258,14 +258,14 @@ RUNS = {
     "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
     "overview-whole": textures({"order": 1, "edges": "whole", "phases": "all"}, samples=((20, 19),), shape=(9, 8)),
     "paper": textures({"preset": "paper", "order": 2}),
-    "exact": textures(EXACT, tiles=5),
+    "exact": textures(EXACT),
     "exact-order-8": textures(EXACT | {"order": 8, "xi": -4.0}, samples=((14, 12),)),
     "exact-three-levels": textures(EXACT | {"levels": 3, "phases": "all"}, samples=((13, 14),), shape=(11, 10)),
-    "exact-colour": textures(EXACT | OPEN, channels=3, tiles=5),
+    "exact-colour": textures(EXACT | OPEN, channels=3),
     "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16),
     "exact-reflect": textures(EXACT | {"order": 1, "edges": "reflect", "coherence": 0}, samples=((20, 20),)),
     "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(6, 5)),
-    "gibbs": textures(EXACT | {"relaxation": "gibbs", "bandwidth": 0.6}, dtype=np.uint16, tiles=5),
+    "gibbs": textures(EXACT | {"relaxation": "gibbs", "bandwidth": 0.6, "xi": -4.0}, dtype=np.uint16, tiles=5),
     "density": textures(DENSITY | {"levels": 2, "bandwidth": 0.3}, samples=((9, 10),), shape=(6, 7), tiles=4),
     "density-colour": textures(DENSITY | OPEN, channels=3, samples=((9, 8),), shape=(1, 17), dtype=np.float64),
     "density-16-bit": textures(DENSITY | {"levels": 2}, channels=2, dtype=np.uint16, samples=((9, 10),), shape=(7, 6)),
@@ -273,12 +273,12 @@ RUNS = {
     "mode-colour": textures(
         MORE | OPEN | {"pixel": "density", "order": 1, "xi": -9.0, "free_sweeps": 1}, channels=2, shape=(4, 5)
     ),
-    "few": textures(FEW, tiles=5),
+    "few": textures(FEW),
     "few-colour": textures(FEW | OPEN | {"order": 5}, channels=3, samples=((10, 11),), shape=(8, 7)),
     "few-order-18": textures(FEW | {"order": 18, "xi": -16.0}, shape=(6, 7)),
     "few-16-bit": textures(FEW | {"order": 8, "xi": -4.0, "coherence": 1.5, "chance": 1}, dtype=np.uint16),
     "few-chance": textures(FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
-    "few-levels": textures(FEW | {"levels": 3, "edges": "reflect"}, samples=((13, 14),), shape=(11, 10), tiles=6),
+    "few-levels": textures(FEW | {"levels": 3, "edges": "reflect"}, samples=((13, 14),), shape=(11, 10)),
     "few-coarse-chance": textures(
         FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
     ),
@@ -289,11 +289,11 @@ RUNS = {
     "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(5, 6), **F4),
     # schedules
     **{
-        name: textures(FEW | {"schedule": name}, samples=((9, 10),), tiles=4 * (name in TOGETHER[:3]))
+        name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),), tiles=4 * (name == "coloring-fixed"))
         for name in TOGETHER
     },
     "synchronous-exact": textures(
-        EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),), tiles=4
+        EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),)
     ),
     "block-exact": textures(EXACT | OPEN | {"levels": 1, "xi": -2.0, "schedule": "block:3x4"}, shape=(7, 5)),
     "raster": textures(EXACT | {"levels": 1, "xi": -4.0, "schedule": "raster"}, samples=((9, 8),), shape=(6, 5)),
@@ -304,39 +304,39 @@ RUNS = {
     "balance": textures(FEW | {"balance": 0.1, "order": 1}, samples=((12, 13),), shape=(11, 10), tiles=6),
     "balance-order-9": textures(FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}, samples=((13, 14),)),
     "balance-all-phases": textures(EXACT | {"balance": 1.0, "phases": "all"}, samples=((14, 13),)),
-    "structure-colour": textures(FEW | OPEN | {"structure": 0.7}, channels=3, shape=(8, 7), tiles=5),
+    "structure-colour": textures(FEW | OPEN | {"structure": 0.7}, channels=3, shape=(8, 7)),
     "structure-beyond": textures(FEW | {"structure": 50.0}, **F4),
     "novelty-exact": textures(EXACT | OPEN | {"novelty": 0.05, "levels": 1}, channels=3),
     "finish-colour": textures(EXACT | OPEN | {"finish": 0.8}, channels=3, shape=(8, 7), tiles=5),
     "finish-16-bit": textures(FEW | {"finish": 2.2}, channels=2, dtype=np.uint16, shape=(8, 7)),
-    "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10), tiles=5),
+    "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10)),
     "lattice-colour": textures(FEW | OPEN | {"lattice": "3,0,1,4"}, channels=3, shape=(8, 7)),
-    "more": textures(MORE, samples=((14, 13),), shape=(9, 10), tiles=6),
+    "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
     "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
     "more-whole": textures(MORE | {"edges": "whole", "phases": "all", "balance": 2.0}, samples=((16, 15),)),
     "more-gibbs": textures(MORE_FEW | {"relaxation": "gibbs"}, channels=2, **F4),
     "more-density": textures(MORE | DRAWN | {"novelty": 0.4, "finish": 1.5}, channels=2, samples=((10, 9),)),
     # what is given besides
     "known": textures(MORE_FEW | {"levels": 3, "schedule": "luby"}, known=0.06, shape=(11, 13)),
-    "known-open": textures(MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0}, known=0.08, tiles=5, **F4),
+    "known-open": textures(MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0, "xi": -4.0}, known=0.08, tiles=5, **F4),
     "known-gibbs": textures(MORE_EXACT | GIBBS | {"order": 4, "data_weight": 1.7}, known=0.1, dtype=np.uint16),
     "known-blocks": textures(MORE_FEW | {"schedule": "block:3x4", "structure": 0.0}, known=0.9, channels=2),
     "known-lattice": textures(
-        MORE | {"lattice": "4.8,0.3,-0.2,5.8"}, known=0.2, channels=3, shape=(10, 12), tiles=6
+        MORE | {"lattice": "4.8,0.3,-0.2,5.8", "xi": -4.0}, known=0.2, channels=3, shape=(10, 12), tiles=6
     ),
-    "placed": textures(MORE_EXACT | {"schedule": "checkerboard"}, known=0.3, placed=0.5, tiles=5),
-    "partly": textures(MORE_FEW, known=0.3, partly=True, channels=2, tiles=5),
-    "labels": textures(MORE_EXACT | {"guide_weight": 0.4, "schedule": "synchronous"}, labels=2, tiles=5),
+    "placed": textures(MORE_EXACT | {"schedule": "checkerboard", "xi": -4.0}, known=0.3, placed=0.5, tiles=5),
+    "partly": textures(MORE_FEW | {"xi": -4.0}, known=0.3, partly=True, channels=2, tiles=5),
+    "labels": textures(MORE_EXACT | {"guide_weight": 0.4, "xi": -4.0, "schedule": "synchronous"}, labels=2, tiles=5),
     "labels-silent": textures(MORE_FEW | OPEN | {"levels": 3, "order": 1}, labels=3, silent=0.6),
     "grey-guide": textures(MORE_FEW | GIBBS | {"guide_weight": 2.5}, labels=0, silent=0.4, dtype=np.uint16),
-    "several": textures(MORE_EXACT | {"shares": (3.0, 1.0), "balance": 2.0}, **TWO, tiles=5),
+    "several": textures(MORE_EXACT | {"shares": (3.0, 1.0), "balance": 2.0, "xi": -4.0}, **TWO, tiles=5),
     "several-gaps": textures(MORE_FEW | OPEN | {"lattice": "4,0,1,5"}, gaps=0.1, known=0.1, **F4, **TWO),
     "three-colour": textures(MORE_FEW | OPEN | GIBBS, samples=((9, 8), (7, 9), (8, 8)), channels=2),
-    "masked": textures(MORE_FEW, masked=0.4, tiles=5),
+    "masked": textures(MORE_FEW | {"xi": -4.0}, masked=0.4, tiles=5),
     "masked-many": textures(MORE_FEW, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
     "gaps": textures(MORE_EXACT | {"edges": "reflect"}, gaps=0.1, dtype=np.float64),
     "categories": textures(
-        MORE_EXACT | {"categorical": True, "proportions": (1.0, 2.0, 0.0)}, kinds=3, known=0.15, masked=0.2, tiles=5
+        MORE_EXACT | {"categorical": True, "xi": -4.0, "proportions": (1.0, 2.0, 0.0)}, kinds=3, known=0.15, masked=0.2, tiles=5
     ),
     "categories-mixed": textures(
         MORE_FEW | {"categorical": (0,), "weights": (1.0, 2.0)},
@@ -348,6 +348,15 @@ RUNS = {
         **TWO | {"known": 0.15, "placed": 0.4, "labels": 0, "silent": 0.2, "masked": 0.2, "gaps": 0.05},
         **F4 | {"channels": 2, "partly": True},
     ),
+    # windows that are smaller than the whole
+    **{
+        f"tiles-{name}": textures(given | {"order": 1, "xi": -8.0}, 18, samples=((22, 25),), shape=(37, 30), **more)
+        for name, given, more in (
+            ("known", {"levels": 3}, {"known": 0.02}),
+            ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),
+            ("synchronous", {"schedule": "synchronous", "levels": 2}, {"channels": 3, "dtype": np.bool_}),
+        )
+    },
     # simulations
     "region": realisations(MORE_EXACT | {"finish": 1.0}, outside=0.3, known=0.2, **F4),
     "soft": realisations(MORE_EXACT | {"categorical": True, "soft_weight": 0.5}, kinds=3, soft=("categories",)),

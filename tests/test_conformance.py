@@ -75,21 +75,33 @@ class Stopping(Checkpoint):
         return super().offer(info, tree, now=now)
 
 
-@pytest.mark.parametrize(
-    "name", [n for n, run in RUNS.items() if "checkpoint" in inspect.signature(run.function).parameters]
-)
-def test_a_run_that_is_stopped_again_and_again_has_the_same_end(reference, tmp_path, name):
-    """After 1, 2, 4, 8 ... more steps; of a simulation after each realisation."""
-    expected, stops = reference(name), 0
+KEPT = [name for name, run in RUNS.items() if "checkpoint" in inspect.signature(run.function).parameters]
+
+
+def stopped_and_resumed(name, path, device):
+    """What a run gives that is stopped after 1, 2, 4, 8 ... more steps, and how often it was stopped."""
+    stops = 0
     while True:
         try:
-            found = outcome(name, checkpoint=Stopping(tmp_path / "run", 2**stops))
-            break
+            return outcome(name, device, checkpoint=Stopping(path, 2**stops)), stops
         except KeyboardInterrupt:
             stops += 1
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_a_run_that_is_stopped_has_the_same_end(reference, tmp_path, name):
+    expected = reference(name)
+    found, stops = stopped_and_resumed(name, tmp_path / "run", REFERENCE)
     assert stops >= (1 if RUNS[name].function in (simdtex.simulate, simdtex.classify) else 2)
     assert_same_bits(found[0], expected[0])
     assert json.loads(found[1]) == json.loads(expected[1])
+
+
+@pytest.mark.parametrize("name", ["more", "luby", "multires", "pyramid-colour", "classify"])
+def test_a_run_that_is_stopped_on_a_device_has_the_same_end(machine, reference, tmp_path, name):
+    found, stops = stopped_and_resumed(name, tmp_path / "run", machine)
+    assert stops
+    assert_same_bits(found[0], reference(name)[0])
 
 
 @pytest.mark.parametrize("name", [name for name, run in RUNS.items() if run.tiles])
