@@ -292,9 +292,7 @@ RUNS = {
         name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),), tiles=4 * (name == "coloring-fixed"))
         for name in TOGETHER
     },
-    "synchronous-exact": textures(
-        EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),)
-    ),
+    "synchronous-exact": textures(EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),)),
     "block-exact": textures(EXACT | OPEN | {"levels": 1, "xi": -2.0, "schedule": "block:3x4"}, shape=(7, 5)),
     "raster": textures(EXACT | {"levels": 1, "xi": -4.0, "schedule": "raster"}, samples=((9, 8),), shape=(6, 5)),
     "random-scan": textures(MORE_EXACT | {"schedule": "random-scan", "xi": -8.0}, shape=(9, 8)),
@@ -318,7 +316,9 @@ RUNS = {
     "more-density": textures(MORE | DRAWN | {"novelty": 0.4, "finish": 1.5}, channels=2, samples=((10, 9),)),
     # what is given besides
     "known": textures(MORE_FEW | {"levels": 3, "schedule": "luby"}, known=0.06, shape=(11, 13)),
-    "known-open": textures(MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0, "xi": -4.0}, known=0.08, tiles=5, **F4),
+    "known-open": textures(
+        MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0, "xi": -4.0}, known=0.08, tiles=5, **F4
+    ),
     "known-gibbs": textures(MORE_EXACT | GIBBS | {"order": 4, "data_weight": 1.7}, known=0.1, dtype=np.uint16),
     "known-blocks": textures(MORE_FEW | {"schedule": "block:3x4", "structure": 0.0}, known=0.9, channels=2),
     "known-lattice": textures(
@@ -336,7 +336,11 @@ RUNS = {
     "masked-many": textures(MORE_FEW, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
     "gaps": textures(MORE_EXACT | {"edges": "reflect"}, gaps=0.1, dtype=np.float64),
     "categories": textures(
-        MORE_EXACT | {"categorical": True, "xi": -4.0, "proportions": (1.0, 2.0, 0.0)}, kinds=3, known=0.15, masked=0.2, tiles=5
+        MORE_EXACT | {"categorical": True, "xi": -4.0, "proportions": (1.0, 2.0, 0.0)},
+        kinds=3,
+        known=0.15,
+        masked=0.2,
+        tiles=5,
     ),
     "categories-mixed": textures(
         MORE_FEW | {"categorical": (0,), "weights": (1.0, 2.0)},
@@ -429,8 +433,10 @@ RUNS = {
     "classify": Run(
         simdtex.classify,
         lambda: (
-            (np.hstack([texture((20, 15)), texture((20, 14), seed=3)[::-1]]),
-             {"a": texture((20, 18)), "b": texture((16, 17), seed=3)[::-1]}),
+            (
+                np.hstack([texture((20, 15)), texture((20, 14), seed=3)[::-1]]),
+                {"a": texture((20, 18)), "b": texture((16, 17), seed=3)[::-1]},
+            ),
             {"exemplars": 40, "levels": 2},
         ),
     ),
@@ -438,7 +444,7 @@ RUNS = {
         simdtex.estimate,
         lambda: ((facies()[0],), {"known": wells((1, 9, 11), 0.12)[0].astype(float), "categorical": True}),
     ),
-}  # fmt: skip
+}
 
 
 def outcome(name, device=REFERENCE, **how):

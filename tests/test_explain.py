@@ -27,7 +27,7 @@ def replayed(name, device=REFERENCE):
 
 @pytest.mark.parametrize("name", EXPLAINED)
 def test_what_is_taken_is_what_the_run_takes(reference, name):
-    """As in the last sweep of the run itself, and as in the replay's fields, which test_replay.py compares."""
+    """As in the last sweep of the run itself, and as in the fields of the replay."""
     replay, options = replayed(name)
     (_, source, temperature, *_), _ = reference(name)
     rng, compared = np.random.default_rng(5), 0
