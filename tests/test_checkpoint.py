@@ -383,7 +383,7 @@ def test_identities_tell_inputs_apart():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
 def test_a_few_kills_change_nothing():
     environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
-    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "mrf", "simulate", "tiles"]
+    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "more", "soft", "tiles"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
