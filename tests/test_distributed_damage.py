@@ -165,8 +165,8 @@ def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
         ("sweep", "work/turn", "work/run", "and nothing makes it again"),
         ("begin", "work/given/held0/known/c/0/0", "work/given/held0/known/c/1/1", "and nothing makes it again"),
         ("show", "image/c/0/0", "image/c/0/1", None),
-        ("show", "source/c/0/1/0", "source/c/1/1/0", None),
-        ("show", "checksums/c/0/0/1", "checksums/c/0/1/1", None),
+        ("show", "source/c/0/1/0", "source/c/1/0/0", None),
+        ("show", "checksums/c/0/0/1", "checksums/c/0/1/0", None),
     ],
     ids=lambda one: one and one.replace("/", "."),
 )
