@@ -4,13 +4,16 @@ import functools
 import os
 
 import hypothesis
+import kept
 import pytest
 
-from simdtex.machine import devices as device_module
-from simdtex.machine.devices import DeviceInfo
+SOURCE = kept.key()  # before the package is imported
+
+from simdtex.machine import devices as device_module  # noqa: E402
+from simdtex.machine.devices import DeviceInfo  # noqa: E402
 
 REQUIRE = "SIMDTEX_REQUIRE_OPENCL"
-WHOLE_RUNS = ("test_bits",)
+WHOLE_RUNS = ("test_conformance",)
 """Tests on every device; others take one of each platform, whose devices share a compiler, and compiling takes long."""
 RAN = pytest.StashKey[dict[str, int]]()
 
@@ -77,6 +80,21 @@ def machine(cl_device):
 def any_device() -> DeviceInfo:
     """The usable OpenCL device that is preferred here."""
     return _take(next(iter(usable_devices()), None))
+
+
+@pytest.fixture(scope="session")
+def results(request) -> kept.Kept:
+    """Results of whole runs, each computed once; pytest's cache keeps them until the source changes."""
+    cache = getattr(request.config, "cache", None)  # none where the plugin is off, as for mutants of one source
+    return kept.Kept(cache and cache.mkdir("runs"), SOURCE, kept.key)
+
+
+@pytest.fixture(scope="session")
+def reference(results):
+    """``reference(name)``: what a run of the table gives on the reference, its arrays and counts."""
+    from runs import outcome
+
+    return lambda name: results(name, lambda: outcome(name))
 
 
 @pytest.hookimpl(wrapper=True)

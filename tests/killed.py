@@ -4,7 +4,6 @@ A process that has nothing but NumPy forks children, each of which goes on with 
 result and ends; the parent kills them with SIGKILL at random moments, and starts the next until the job is done.
 """
 
-import hashlib
 import json
 import os
 import signal
@@ -15,72 +14,36 @@ import traceback
 from pathlib import Path
 
 import numpy as np
+from cases import REFERENCE
+from runs import RUNS, SEED, digest, outcome
 
-import simdtex
 from simdtex import distributed
 from simdtex.checkpoint import Checkpoint
 
-
-def texture(*shape):
-    row, col = np.indices(shape[:2])
-    grey = 128 + 60 * np.sin(row / 3) + 50 * np.sin(col / 2 + row / 5)
-    grey = grey if len(shape) == 2 else grey[..., None] + np.arange(shape[2]) * 9 * np.cos(col / 4)[..., None]
-    return np.clip(grey, 0, 255).astype(np.uint8)
-
-
-GREY, COLOUR = texture(20, 22), texture(20, 22, 3)
-HOLE = np.zeros((20, 22), bool)
-HOLE[3:6, 4:7] = HOLE[14:18, 13:17] = True
-
-
-def in_tiles(rng, device, checkpoint, **_):
-    """The picture by tiles in a store beside the checkpoint's file; without one at once."""
-    if checkpoint is None:
-        return simdtex.synthesize(GREY, (20, 18), order=2, rng=rng, device=device), None
-    store = checkpoint.path.with_name("o.zarr")
-    if store.exists():
-        return distributed.resume(store, device=device).compute(), None
-    return distributed.synthesize(GREY, (20, 18), store, tiles=8, order=2, rng=rng, device=device).compute(), None
-
-
+JOBS = ("more", "known", "multires", "pyramid", "solid", "fill", "extend", "mix", "classify", "soft", "volume", "tiles")
+"""Runs of the table, and tiles in a store beside the checkpoint's file."""
 SLOWER = {"tiles": 10}
 """How many times as long a job takes with a checkpoint, if much longer."""
 
-JOBS = {
-    "tiles": in_tiles,
-    "mrf": lambda **how: simdtex.synthesize(GREY, (20, 18), order=2, **how),
-    "multires": lambda **how: simdtex.synthesize(COLOUR, (96, 80), method="multires", channel_axis=-1, **how),
-    "pyramid": lambda **how: simdtex.synthesize(COLOUR, (64, 64), method="pyramid", channel_axis=-1, **how),
-    "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
-    "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),
-    "extend": lambda **how: simdtex.extend(GREY, right=5, seamless="y", band=3, order=2, **how),
-    "mix": lambda **how: simdtex.mix([GREY, GREY[::-1]], (48, 48), iterations=3, **how),
-    "classify": lambda **how: simdtex.classify(GREY, {"a": GREY[:12], "b": GREY[8:]}, exemplars=40, **how),
-    "simulate": lambda **how: (
-        simdtex.simulate(
-            GREY, 4, shape=(12, 14), order=2, jobs=2, **{k: how[k] for k in how if k != "full_output"}
-        ).values,
-        None,
-    ),
-}
 
-
-def digest(job, checkpoint=None):
-    image, output = job(rng=5, device="reference", full_output=True, checkpoint=checkpoint)
-    found = hashlib.sha256(image.tobytes())
-    if output is not None:
-        if output.source is not None:
-            found.update(output.source.tobytes())
-        for stage in output.stages:
-            found.update(stage.image.tobytes())
-    return found.hexdigest()
+def made(job, checkpoint=None):
+    """The digest of a job."""
+    if job != "tiles":
+        return digest(outcome(job, REFERENCE, checkpoint=checkpoint)[0])
+    if checkpoint is None:
+        return digest(outcome("more", REFERENCE)[0][:1])
+    given, options = RUNS["more"].inputs()
+    store = checkpoint.path.with_name("o.zarr")
+    if store.exists():
+        return digest([distributed.resume(store, device=REFERENCE).compute()])
+    return digest([distributed.synthesize(*given, store, tiles=6, rng=SEED, device=REFERENCE, **options).compute()])
 
 
 def child(job, folder, result):
     """What a forked child does; it never comes back."""
     code = 1
     try:
-        found = digest(job, Checkpoint(folder / "state", every=0))
+        found = made(job, Checkpoint(folder / "state", every=0))
         result.with_suffix(".new").write_text(found)
         os.replace(result.with_suffix(".new"), result)
         code = 0
@@ -123,10 +86,10 @@ def main(wanted, seed, names):
         name = names[counts["runs"] % len(names)]
         if name not in expected:
             began = time.perf_counter()
-            expected[name] = digest(JOBS[name])
+            expected[name] = made(name)
             took[name] = (time.perf_counter() - began) * SLOWER.get(name, 1)
         share = max(1, -(-wanted // len(names)))
-        found, kills = finished(JOBS[name], took[name] * 0.8, rng, min(share, wanted - counts["kills"]))
+        found, kills = finished(name, took[name] * 0.8, rng, min(share, wanted - counts["kills"]))
         counts["kills"] += kills
         counts["runs"] += 1
         if found != expected[name]:
@@ -135,4 +98,4 @@ def main(wanted, seed, names):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:] or list(JOBS))
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:] or JOBS)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import assert_same_bits, texture
+from runs import hole
 
 import simdtex
 from simdtex import checkpoint as checkpoints
@@ -18,145 +19,41 @@ from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
 from simdtex.io.files import exclusive, write_checked
 from simdtex.methods.mrf import Options
 
-GREY, COLOUR = texture((14, 15)), texture((16, 18), 3)
-HOLE = np.zeros((14, 15), bool)
-HOLE[2:4, 3:6] = HOLE[10:12, 9:12] = True
-KNOWN = np.ma.masked_array(np.full((12, 13), GREY[5, 5]), np.ones((12, 13), bool))
-KNOWN.mask[3:5, 4] = KNOWN.mask[8, 9] = False
-MRF = {"order": 2, "finish": 1.0}
+GREY = texture((14, 15))
+SMALL = {"order": 1, "levels": 1}
 
 
 class Stop(Exception):
     """Stops a run."""
 
 
+def quick(**how):
+    return simdtex.synthesize(GREY, (6, 7), **SMALL, **how)
+
+
+def fill(**how):
+    return simdtex.fill(GREY, hole(), **SMALL, **how)
+
+
 def simulated(**how):
     how.pop("full_output")
-    found = simdtex.simulate(GREY, 3, shape=(8, 9), order=2, jobs=1, **how)
+    found = simdtex.simulate(GREY, 3, shape=(6, 7), jobs=1, **SMALL, **how)
     return found.values, simdtex.Output(None)
-
-
-JOBS = {
-    "mrf": lambda **how: simdtex.synthesize(GREY, (12, 13), **MRF, **how),
-    "mrf-exact-colour": lambda **how: simdtex.synthesize(
-        COLOUR, (10, 8), order=1, search="exact", relaxation="gibbs", array="4x4", channel_axis=-1, **how
-    ),
-    "mrf-known-guide": lambda **how: simdtex.synthesize(
-        GREY, (12, 13), known=KNOWN, guide=(GREY // 90, texture((12, 13), seed=4) // 90), **MRF, **how
-    ),
-    "multires": lambda **how: simdtex.synthesize(COLOUR, (12, 21), method="multires", channel_axis=-1, **how),
-    "pyramid": lambda **how: simdtex.synthesize(
-        COLOUR, (17, 16), method="pyramid", iterations=2, channel_axis=-1, **how
-    ),
-    "solid": lambda **how: simdtex.synthesize_solid(COLOUR, (8, 9, 8), iterations=2, channel_axis=-1, **how),
-    "mix": lambda **how: simdtex.mix([GREY, GREY[::-1]], (16, 16), iterations=2, **how),
-    "fill": lambda **how: simdtex.fill(GREY, HOLE, order=1, levels=1, **how),
-    "extend": lambda **how: simdtex.extend(GREY, right=3, seamless="y", band=2, order=2, **how),
-    "simulate": simulated,
-}
-QUICK = JOBS["mrf"]
 
 
 def run(job, **how):
     return job(**({"rng": 5, "device": "reference", "full_output": True} | how))
 
 
-def plainly(found):
-    """Statistics without what depends on the clock and on how often the run was begun."""
-    if isinstance(found, dict):
-        clock = ("seconds", "device_seconds", "launches")
-        return {name: plainly(value) for name, value in found.items() if name not in clock}
-    return [plainly(value) for value in found] if isinstance(found, list) else found
-
-
-def assert_same_run(one, other):
-    (image, output), (image2, output2) = one, other
-    assert_same_bits(image, image2)
-    for name in ("source", "temperature"):
-        assert_same_bits(getattr(output, name), getattr(output2, name)) if getattr(output, name) is not None else None
-    assert len(output.stages) == len(output2.stages)
-    for stage, stage2 in zip(output.stages, output2.stages, strict=True):
-        assert stage.level == stage2.level
-        assert_same_bits(stage.image, stage2.image)
-        assert (stage.source is None) == (stage2.source is None)
-        if stage.source is not None:
-            assert_same_bits(stage.source, stage2.source)
-            assert_same_bits(stage.candidates, stage2.candidates)
-    assert plainly(output.statistics) == plainly(output2.statistics)
-
-
 @pytest.fixture(scope="module")
 def whole():
-    """Every job as it is without a stop, made once."""
-    made = {}
-
-    def of(name, device="reference"):
-        if (name, device) not in made:
-            made[name, device] = run(JOBS[name], device=device)
-        return made[name, device]
-
-    return of
+    """The picture of the run without a stop."""
+    return run(quick)[0]
 
 
 @pytest.fixture
 def file(tmp_path):
     return tmp_path / "run.checkpoint"
-
-
-def stopping_after(monkeypatch, writes):
-    """Raise Stop after every so many written states."""
-    left, write = [writes], Checkpoint._save
-
-    def stopped(self, tree):
-        wrote = write(self, tree)
-        left[0] -= 1
-        if not left[0]:
-            left[0] = writes
-            raise Stop
-        return wrote
-
-    monkeypatch.setattr(Checkpoint, "_save", stopped)
-
-
-def resumed(job, file, every=0, **how):
-    """Call again until the run is done: the result, and how often it was stopped."""
-    stops = 0
-    while True:
-        try:
-            return run(job, checkpoint=Checkpoint(file, every=every), **how), stops
-        except Stop:
-            stops += 1
-
-
-@pytest.mark.parametrize("name", JOBS)
-def test_stopped_after_every_checkpoint(name, whole, file, monkeypatch):
-    stopping_after(monkeypatch, 1)
-    found, stops = resumed(JOBS[name], file)
-    assert stops >= (2 if name in ("mix", "extend", "simulate") else 3)
-    assert_same_run(found, whole(name))
-
-
-@pytest.mark.parametrize("name", ["mrf", "multires", "pyramid"])
-def test_stopped_on_a_device(name, whole, any_device, file, monkeypatch):
-    stopping_after(monkeypatch, 2)
-    device = str(any_device.index)
-    found, stops = resumed(JOBS[name], file, device=device)
-    assert stops
-    assert_same_bits(found[0], whole(name)[0])
-    statistics = [plainly(one[1].statistics) for one in (found, whole(name, device))]
-    assert statistics[0] == statistics[1]
-
-
-@pytest.mark.parametrize("schedule", ["luby", "random-scan", "block:4x4", "synchronous", "random-subset:0.5"])
-def test_what_a_schedule_keeps(schedule, file, monkeypatch):
-    def job(**how):
-        return simdtex.synthesize(GREY, (6, 7), order=1, schedule=schedule, **how)
-
-    expected = run(job)
-    stopping_after(monkeypatch, 3)
-    found, stops = resumed(job, file)
-    assert stops
-    assert_same_run(found, expected)
 
 
 def test_the_fraction_goes_on(file):
@@ -167,25 +64,24 @@ def test_the_fraction_goes_on(file):
         if len(seen) == 5:
             raise Stop
 
-    resumed(QUICK, file, callback=callback)
+    with pytest.raises(Stop):
+        run(quick, checkpoint=Checkpoint(file, every=0), callback=callback)
+    run(quick, checkpoint=file, callback=callback)
     assert seen[5] == seen[4] > seen[3]  # the interrupted sweep begins anew
     assert seen[5:] == sorted(seen[5:])
 
 
-def test_a_drawn_seed_is_kept(file, monkeypatch):
-    stopping_after(monkeypatch, 3)
-    (image, output), stops = resumed(QUICK, file, rng=None)
-    assert stops
-    monkeypatch.undo()
-    assert_same_bits(run(QUICK, rng=output.statistics["seed"])[0], image)
+def test_a_drawn_seed_is_kept(file):
+    image, output = run(quick, checkpoint=stopped(file, rng=None), rng=None)
+    assert_same_bits(run(quick, rng=output.statistics["seed"])[0], image)
 
 
 def test_stop_writes_the_state_and_interrupts(whole, file):
     checkpoint = Checkpoint(file, every=1e6)
     with pytest.raises(KeyboardInterrupt):
-        run(QUICK, callback=lambda progress: checkpoint.stop(), checkpoint=checkpoint)
+        run(quick, callback=lambda progress: checkpoint.stop(), checkpoint=checkpoint)
     assert read(file)[1] is not None
-    assert_same_run(run(QUICK, checkpoint=file), whole("mrf"))
+    assert_same_bits(run(quick, checkpoint=file)[0], whole)
     assert not list(file.parent.iterdir())  # a path is removed by the function
 
 
@@ -213,7 +109,7 @@ def test_finished_realisations_are_kept(file):
         file.write_bytes(kept)
 
 
-def stopped(file, job=QUICK, **how):
+def stopped(file, job=quick, **how):
     """The checkpoint of a run that was stopped."""
     checkpoint = Checkpoint(file, every=0)
     with pytest.raises(KeyboardInterrupt):
@@ -221,7 +117,7 @@ def stopped(file, job=QUICK, **how):
     return file
 
 
-def refused(file, words, job=QUICK, **how):
+def refused(file, words, job=quick, **how):
     before = file.read_bytes() if file.is_file() else None
     with pytest.raises(ValueError, match=words) as caught:
         run(job, checkpoint=file, **how)
@@ -245,18 +141,22 @@ def test_another_run_is_refused(file):
     refused(file, rf"another seed \(5, not 6\); {again}", rng=6)
     other = GREY.copy()
     other[0, 0] ^= 1
-    refused(file, f"another sample; {again}", lambda **how: simdtex.synthesize(other, (12, 13), **MRF, **how))
-    refused(file, "another sample", lambda **how: simdtex.synthesize(GREY.astype("f4"), (12, 13), **MRF, **how))
-    refused(file, r"shape of the output \(12x13, not 12x14\)", lambda **how: simdtex.synthesize(GREY, (12, 14), **how))
-    refused(file, r"option order \(2, not 3\)", lambda **how: simdtex.synthesize(GREY, (12, 13), order=3, **how))
-    refused(file, r"another call \(synthesize, not fill\)", JOBS["fill"])
+    refused(file, f"another sample; {again}", lambda **how: simdtex.synthesize(other, (6, 7), **SMALL, **how))
+    refused(file, "another sample", lambda **how: simdtex.synthesize(GREY.astype("f4"), (6, 7), **SMALL, **how))
+    refused(
+        file, r"shape of the output \(6x7, not 6x8\)", lambda **how: simdtex.synthesize(GREY, (6, 8), **SMALL, **how)
+    )
+    refused(
+        file, r"option order \(1, not 3\)", lambda **how: simdtex.synthesize(GREY, (6, 7), order=3, levels=1, **how)
+    )
+    refused(file, r"another call \(synthesize, not fill\)", fill)
     pyramid = {"method": "pyramid"}
     refused(
-        file, r"another method \(mrf, not pyramid\)", lambda **how: simdtex.synthesize(GREY, (12, 13), **pyramid, **how)
+        file, r"another method \(mrf, not pyramid\)", lambda **how: simdtex.synthesize(GREY, (6, 7), **pyramid, **how)
     )
     mask = np.ones(GREY.shape, bool)
-    refused(file, "another mask", lambda **how: simdtex.synthesize(GREY, (12, 13), mask=mask, **MRF, **how))
-    run(QUICK, checkpoint=file)
+    refused(file, "another mask", lambda **how: simdtex.synthesize(GREY, (6, 7), mask=mask, **SMALL, **how))
+    run(quick, checkpoint=file)
 
 
 @pytest.mark.parametrize(
@@ -278,8 +178,8 @@ def test_another_version_or_format_is_refused(changes, words, file):
 def test_another_device_is_noted(whole, file):
     edited(stopped(file), format=checkpoints.FORMAT, device="Abacus")
     with pytest.warns(UserWarning, match=r"begun on Abacus and goes on on reference \(NumPy\); the bytes are the same"):
-        found = run(QUICK, checkpoint=file)
-    assert_same_run(found, whole("mrf"))
+        found = run(quick, checkpoint=file)
+    assert_same_bits(found[0], whole)
 
 
 def test_other_paths_are_refused(tmp_path):
@@ -295,10 +195,10 @@ def test_other_paths_are_refused(tmp_path):
 
 def test_one_run_to_a_checkpoint(file):
     checkpoint = Checkpoint(file)
-    run(QUICK, checkpoint=checkpoint)
+    run(quick, checkpoint=checkpoint)
     assert file.is_file()  # its owner removes it, once the result is written
     with pytest.raises(ValueError, match="a checkpoint keeps one run; give each call a checkpoint of its own"):
-        run(QUICK, checkpoint=checkpoint)
+        run(quick, checkpoint=checkpoint)
     checkpoint.remove()
     assert not list(file.parent.iterdir())
 
@@ -306,15 +206,20 @@ def test_one_run_to_a_checkpoint(file):
 def test_one_process_at_a_time(file):
     pytest.importorskip("fcntl")
     with exclusive(file), pytest.raises(ValueError, match=r"another run is at work in .*; wait for it"):
-        run(QUICK, checkpoint=file)
+        run(quick, checkpoint=file)
 
 
-@pytest.mark.parametrize("job", [QUICK, JOBS["fill"]], ids=["synthesize", "fill"])
+@pytest.mark.parametrize(
+    "job",
+    [
+        lambda **how: simdtex.synthesize(GREY, (6, 7), levels=9, **how),
+        lambda **how: simdtex.fill(GREY, hole(), order=300, **how),
+    ],
+    ids=["synthesize", "fill"],
+)
 def test_bad_input_leaves_nothing(job, file):
     with pytest.raises(ValueError):
-        run(lambda **how: job(**how, levels=9), checkpoint=file) if job is QUICK else run(
-            lambda **how: simdtex.fill(GREY, HOLE, order=300, **how), checkpoint=file
-        )
+        run(job, checkpoint=file)
     assert not list(file.parent.iterdir())
 
 
@@ -367,10 +272,10 @@ def test_a_fault_in_a_write_loses_nothing(module, name, at, error, whole, file, 
     monkeypatch.setattr(module, name, faulty)
     first = Checkpoint(file, every=0, note=lambda sentence: None)
     with pytest.raises((KeyboardInterrupt, Stop, ValueError)):
-        run(QUICK, callback=callback, checkpoint=first)
+        run(quick, callback=callback, checkpoint=first)
     monkeypatch.undo()
     assert len(list(file.parent.iterdir())) == file.is_file()  # nothing is half written
-    assert_same_run(run(QUICK, checkpoint=file), whole("mrf"))
+    assert_same_bits(run(quick, checkpoint=file)[0], whole)
 
 
 def test_a_run_whose_checkpoint_cannot_be_written_ends_all_the_same(whole, file, monkeypatch):
@@ -383,7 +288,7 @@ def test_a_run_whose_checkpoint_cannot_be_written_ends_all_the_same(whole, file,
 
     monkeypatch.setattr(Checkpoint, "_write", full)
     with pytest.warns(UserWarning, match="could not be written .*; the run goes on, and will try again") as noted:
-        assert_same_run(run(QUICK, checkpoint=Checkpoint(file, every=0)), whole("mrf"))
+        assert_same_bits(run(quick, checkpoint=Checkpoint(file, every=0))[0], whole)
     assert len(noted) == 1  # once, and not at every sweep
 
 
@@ -393,7 +298,7 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_work(file, monkeypa
 
     monkeypatch.setattr(os, "replace", full)
     with pytest.raises(ValueError, match=r"could not be written \(No space left on device\)"):
-        run(QUICK, callback=lambda progress: pytest.fail("the work has begun"), checkpoint=file)
+        run(quick, callback=lambda progress: pytest.fail("the work has begun"), checkpoint=file)
 
 
 def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
@@ -424,7 +329,7 @@ def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
 def test_a_short_run_writes_no_state(file, monkeypatch):
     monkeypatch.setattr(checkpoints, "FIRST", 1e6)
     checkpoint = Checkpoint(file)
-    run(QUICK, checkpoint=checkpoint)
+    run(quick, checkpoint=checkpoint)
     assert read(file)[1] is None
 
 
@@ -474,10 +379,11 @@ def test_identities_tell_inputs_apart():
     assert identity(Options(xi=-2))["xi"] == -2 and json.dumps(identity(Options()))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
 def test_a_few_kills_change_nothing():
     environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
-    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "mrf", "simulate", "tiles"]
+    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "more", "soft", "tiles"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

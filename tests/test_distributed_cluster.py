@@ -26,6 +26,7 @@ def whole():
     return simdtex.synthesize(SAMPLE, (90, 101), device="reference", **OPTIONS)
 
 
+@pytest.mark.slow
 def test_workers_of_this_machine_open_their_own_devices(tmp_path, whole, any_device):
     path = tmp_path / "out.zarr"
     ours = distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, workers=2, device=any_device.index, **OPTIONS)
@@ -60,6 +61,7 @@ def test_a_worker_is_killed_and_another_joins_late(tmp_path, whole):
     assert_same_bits(ours.compute(), whole)
 
 
+@pytest.mark.slow
 def test_a_client_that_ends_leaves_a_store_to_go_on_with(tmp_path, whole):
     class Stop(Exception):
         pass

@@ -4,88 +4,58 @@ import re
 
 import numpy as np
 import pytest
-from cases import texture
+from cases import REFERENCE, texture
+from runs import RUNS, SEED
 from skimage import data
 
 import simdtex
 from simdtex.model.guide import UNKNOWN
 
 BRICK = data.brick()[:24, :24]
-SHAPE = (18, 21)
-HALF = np.full(SHAPE, np.nan, np.float32)
-HALF[::5, ::4] = 100
-GUIDE = (BRICK // 128, data.brick()[40:58, :21] // 128)
-GAPS = np.where(np.arange(24) % 11 == 5, np.nan, texture((24, 24), dtype=np.float32))
-RUNS = {
-    "coherent": {},
-    "exact": {"search": "exact"},
-    "gibbs": {"relaxation": "gibbs"},
-    "gibbs of a list": {"relaxation": "gibbs", "search": "coherent", "phases": "all"},
-    "paper": {"preset": "paper"},
-    "paper in colour": {"preset": "paper", "sample": texture((24, 24), 3), "channel_axis": -1},
-    "open, block": {"boundary": "open", "schedule": "block:6x7"},
-    "random": {"schedule": "random-scan", "search": "exact", "xi": -8.0, "free_sweeps": 1},
-    "synchronous": {"schedule": "synchronous"},
-    "guide": {"guide": GUIDE},
-    "guide, exact": {"guide": GUIDE, "search": "exact", "coherence": 0},
-    "data": {"known": HALF, "sample": BRICK.astype(np.float32)},
-    "data, open, gibbs": {"known": HALF, "sample": BRICK.astype(np.float32), "relaxation": "gibbs", "boundary": "open"},
-    "gaps": {"sample": GAPS, "search": "exact"},
-    "several": {"sample": [BRICK, texture((20, 15))]},
-    "lattice": {"lattice": "6,0,0,8", "search": "exact"},
-}
+EXPLAINED = (
+    *("more", "more-levels", "more-whole", "more-gibbs", "paper", "density-colour", "random-scan", "block-exact"),
+    *("synchronous-exact", "labels", "grey-guide", "known-open", "gaps", "several", "lattice-exact", "novelty-exact"),
+)
+"""Runs of the table: with every search and relaxation, several schedules, and every cost."""
 
 
-def arguments(name):
-    options = {"order": 5, "levels": 2, "free_sweeps": 2, "rng": 3} | RUNS[name]
-    return (options.pop("sample", BRICK), SHAPE), options
+def replayed(name, device=REFERENCE):
+    """The replay of a run of the table, and its options."""
+    given, options = RUNS[name].inputs()
+    return simdtex.replay(*given, **options, rng=SEED, device=device), options
 
 
-def sweeps_of(name, device):
-    """The run, and of every sweep of every level what it has left."""
-    seen = {}
-
-    def watch(progress):
-        if progress.end_of_sweep:
-            seen[progress.level, progress.sweep] = progress.source(), progress.temperature(), progress.image()
-
-    given, options = arguments(name)
-    made, output = simdtex.synthesize(*given, **options, device=device, callback=watch, full_output=True)
-    return made, output, seen
-
-
-@pytest.mark.parametrize("name", RUNS)
-def test_what_is_taken_is_what_the_run_takes(name):
-    _, output, seen = sweeps_of(name, "reference")
-    given, options = arguments(name)
-    rng = np.random.default_rng(5)
-    for level in (1, 0):
-        last = max(sweep for number, sweep in seen if number == level)
-        for sweep in (1, last - 1, None):
-            source, t, picture = seen[level, sweep or last]
-            site = tuple(int(rng.integers(side) // 2 * 2 + 1) % side for side in t.shape)
-            if (site[0] << level) % 5 == 0 and (site[1] << level) % 4 == 0:
-                site = (site[0], site[1] - 1)  # which is no datum
+@pytest.mark.parametrize("name", EXPLAINED)
+def test_what_is_taken_is_what_the_run_takes(reference, name):
+    """As in the last sweep of the run itself, and as in the fields of the replay."""
+    replay, options = replayed(name)
+    (_, source, temperature, *_), _ = reference(name)
+    rng, compared = np.random.default_rng(5), 0
+    last = {one.level: (n, one.sweep) for n, one in enumerate(replay.sweeps)}
+    for level, (n, final) in last.items():
+        for back, sweep in ((final - 1, 1), (1, final - 1), (0, None)):
+            state = replay.at(n - max(0, back))
+            site = tuple(int(rng.integers(side)) // 2 * 2 + 1 for side in state.temperature.shape)
+            site = tuple(min(at, side - 1) for at, side in zip(site, state.temperature.shape, strict=True))
             try:
-                why = simdtex.explain(*given, site, level=level, sweep=sweep, **options, device="reference")
+                why = replay.explain(site, level, sweep)
             except ValueError as error:
-                assert "does not relax" in str(error) and sweep is not None
-                assert sweep == 1 or t[site] == 0
+                assert "does not relax" in str(error)
                 continue
-            assert (why.level, why.sweep) == (level, sweep or why.sweep)
-            source, t, picture = seen[level, why.sweep]
-            np.testing.assert_array_equal(why.candidates.place[why.taken], source[site])
-            assert why.cooled == t[site]
+            state = replay.at(n - final + why.sweep)
+            np.testing.assert_array_equal(why.candidates.place[why.taken], state.source[site])
+            assert (why.level, why.sweep, why.cooled) == (level, sweep or why.sweep, state.temperature[site])
             if options.get("preset") == "paper":
-                np.testing.assert_array_equal(why.values, np.ravel(picture[site]))
-            consistent(why)
+                np.testing.assert_array_equal(why.values, np.ravel(state.image[site]))
+            consistent(why, options.get("coherence", 0.0 if "preset" in options else 0.5))
             if level == 0 and sweep is None:
-                assert why.sweep == last or name == "random"  # which leaves some sites out of a sweep
-                np.testing.assert_array_equal(why.candidates.place[why.taken], output.source[site])
-                assert why.cooled == output.temperature[site]
+                np.testing.assert_array_equal(why.candidates.place[why.taken], source[site])
+                assert why.cooled == temperature[site]
+            compared += 1
+    assert compared >= 2
 
 
-def consistent(why):
+def consistent(why, coherence=0.5):
     """The terms are those of the equations, by the neighbourhoods of the explanation."""
     near, found = why.neighbours, why.candidates
     guides = "guide" in found.costs
@@ -103,7 +73,7 @@ def consistent(why):
     assert why.drawn or found.rank[why.taken] == 0
     if "coherence" in found.costs:
         whole = found.distance + found.costs.get("guide", 0)
-        discounted = np.where(found.continues > 0, -whole / 3, 0)
+        discounted = np.where(found.continues > 0, -whole * coherence / (1 + coherence), 0)
         np.testing.assert_allclose(found.costs["coherence"], discounted, rtol=1e-4, atol=0.02)
     if len(found.rank) == why.weighed:
         assert found.probability.sum() == pytest.approx(1)
@@ -115,10 +85,9 @@ def consistent(why):
         np.testing.assert_allclose(why.density.sum(1), 1)
 
 
-@pytest.mark.parametrize("name", ["coherent", "exact", "gibbs", "paper", "guide"])
+@pytest.mark.parametrize("name", ["more", "more-gibbs", "paper", "labels", "exact-of-many"])
 def test_a_device_is_explained_alike(machine, name):
-    given, options = arguments(name)
-    first, second = (simdtex.explain(*given, (5, 7), **options, device=device) for device in ("reference", machine))
+    first, second = (replayed(name, device)[0].explain((3, 2)) for device in (REFERENCE, machine))
     assert first.table() == second.table()
     np.testing.assert_array_equal(first.neighbours.values, second.neighbours.values)
     np.testing.assert_array_equal(first.candidates.total, second.candidates.total)
@@ -169,24 +138,23 @@ def test_a_density_is_the_lcpdf(relaxation):
 
 def test_a_list_continues_the_nearest_neighbours_alone():
     """Here candidates are in the list that continue the source of a neighbour farther away."""
-    consistent(simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=8, rng=1, device="reference"))
-
-
-def test_novelty_is_a_term():
-    why = simdtex.explain(BRICK, SHAPE, (3, 3), level=1, levels=2, order=4, rng=1, novelty=2, device="reference")
-    assert why.drawn and "novelty" in why.candidates.costs
-    consistent(why)
+    consistent(simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=8, rng=1, levels=2, device="reference"))
 
 
 def test_what_cannot_be_explained():
-    given = BRICK, SHAPE
-    rules = {"order": 4, "levels": 2, "rng": 1, "device": "reference"}
+    given, rules = (BRICK, (10, 11)), {"order": 2, "levels": 2, "rng": 1, "device": "reference"}
+    with pytest.raises(ValueError, match="does not relax at level 0: it keeps its value"):
+        simdtex.explain(*given, (0, 0), **rules, free_sweeps=0)
+    replay = simdtex.replay(*given, **rules)
     for site, told, words in [
-        ((18, 0), {}, "not of the 18 x 21 sites of level 0"),
-        ((9, 0), {"level": 1}, "not of the 9 x 11 sites of level 1"),
+        ((10, 0), {}, "not of the 10 x 11 sites of level 0"),
+        ((5, 0), {"level": 1}, "not of the 5 x 6 sites of level 1"),
         ((0, 0), {"level": 2}, "levels of this run are 0 to 1"),
-        ((0, 0), {"free_sweeps": 0}, "does not relax at level 0: it keeps its value"),
         ((0, 0), {"sweep": 1}, "does not relax at level 0, sweep 1"),
+    ]:
+        with pytest.raises(ValueError, match=re.escape(words)):
+            replay.explain(site, **told)
+    for site, told, words in [
         ((0,), {}, "site must be"),
         (3, {}, "site must be two integers"),
         ((0, 0), {"sweep": 0}, "sweep is 0"),
@@ -197,8 +165,9 @@ def test_what_cannot_be_explained():
 
 
 def test_what_a_notebook_shows():
-    given, options = arguments("paper")
-    why = simdtex.explain(*given, (5, 7), **options, device="reference")
+    given, options = RUNS["paper"].inputs()
+    why = simdtex.explain(*given, (5, 7), **options, rng=SEED, device="reference")
+    assert why.table() == replayed("paper")[0].explain((5, 7)).table()
     lines = why.table().splitlines()
     assert repr(why) == f"<{lines[0]}>"
     assert lines[0].startswith(f"Site (5, 7) of level 0, sweep {why.sweep}, draws from the LCPDF")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import simdtex
 from simdtex.methods import mrf
 
-QUICK = {"order": 2, "levels": 1, "device": REFERENCE}
+QUICK = {"order": 2, "levels": 1, "xi": -8.0, "device": REFERENCE}
 TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int32, np.int64, np.float16, np.float32, np.float64]
 
 
@@ -88,7 +88,7 @@ def test_any_size(shape, boundary):
     st.sampled_from(["torus", "open"]),
     st.sampled_from(["icm", "gibbs"]),
 )
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_any_sample_that_fits_any_size_and_any_order(sample_shape, shape, order, channels, boundary, relaxation):
     if min(sample_shape) <= 2 * math.isqrt(order):
         return
@@ -153,8 +153,7 @@ def test_adding_a_constant_to_the_levels_changes_no_arrangement():
         assert np.array_equal(plain.astype(int) + 100, bright)
 
 
-@pytest.mark.parametrize("edges", ["whole", "reflect"])
-@pytest.mark.parametrize("axis", [None, -1, 0])
+@pytest.mark.parametrize(("axis", "edges"), [(None, "whole"), (0, "reflect")])
 def test_the_source_map_names_where_every_pixel_was_taken_from(axis, edges):
     sample = texture((13, 12), None if axis is None else 3)
     given = sample if axis is None else np.moveaxis(sample, -1, axis)
@@ -168,13 +167,6 @@ def test_the_source_map_names_where_every_pixel_was_taken_from(axis, edges):
     taken = sample[row, col]
     assert np.array_equal(image, taken if axis is None else np.moveaxis(taken, -1, axis))
     assert output.source.min() >= 0 and row.max() < 13 and col.max() < 12
-
-
-@pytest.mark.parametrize("options", [{}, {"relaxation": "gibbs"}, {"boundary": "open"}, {"xi": -30.0}], ids=str)
-def test_nothing_is_hot_in_the_end(options):
-    _, output = quick(texture((10, 10)), (9, 11), full_output=True, **options)
-    assert output.temperature.shape == (9, 11)
-    assert not output.temperature.any()
 
 
 @pytest.mark.parametrize("axis", [None, 0])
@@ -234,15 +226,6 @@ def test_a_torus_has_no_seam_and_an_open_lattice_has_one():
     assert step["open"] > 1.5 * step["open", "inside"]
 
 
-def test_held_sites_are_kept_from_level_to_level_without_free_sweeps():
-    _, output = simdtex.synthesize(
-        texture((17, 18)), (13, 10), order=1, levels=3, free_sweeps=0, rng=2, device=REFERENCE, full_output=True
-    )
-    coarse, middle, fine = (stage.image for stage in output.stages)
-    assert np.array_equal(middle[::2, ::2], coarse)
-    assert np.array_equal(fine[::2, ::2], middle)
-
-
 def record(sample, shape, **options):
     seen = []
     image = simdtex.synthesize(sample, shape, callback=seen.append, rng=1, device=REFERENCE, **options)
@@ -297,12 +280,6 @@ def test_progress_shows_the_picture_and_its_temperature(axis):
         assert 0 <= temperature.min() <= temperature.max() <= 1
     assert_same_bits(pictures[-1][1], image)
     assert not pictures[-1][2].any()
-
-
-def test_a_callback_changes_nothing():
-    sample = texture((12, 12))
-    image, _ = record(sample, (7, 10), **{k: v for k, v in QUICK.items() if k != "device"})
-    assert_same_bits(quick(sample, (7, 10)), image)
 
 
 def test_an_interrupt_gets_through_and_the_next_run_works(any_device):

@@ -1,0 +1,531 @@
+"""Small whole runs over the public functions: one table, what a run gives, and where its result is kept.
+
+``python tests/runs.py`` computes the digests of the code as it is, and writes them to tests/digests.json.
+"""
+
+import functools
+import hashlib
+import inspect
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import plain_mrf
+from cases import REFERENCE, texture
+from scipy.ndimage import gaussian_filter
+from skimage import data
+
+import simdtex
+from simdtex import maspar
+from simdtex.jobs.simulation import realisation_seed
+
+PINNED = Path(__file__).with_name("digests.json")
+SEED = 2**40 + 3
+
+
+class Run(NamedTuple):
+    """A whole run: a public function, its arguments, and the checks that apply to it besides those of every run.
+
+    ``inputs()`` makes positional and keyword arguments; ``plain()`` is the same run of the plain loops; ``tiles`` is
+    the side of tiles that give the same bytes, 0 for none.
+    """
+
+    function: Callable[..., Any]
+    inputs: Callable[[], tuple[tuple[Any, ...], dict[str, Any]]]
+    plain: Callable[[], list[np.ndarray]] | None = None
+    tiles: int = 0
+
+
+class Given(NamedTuple):
+    """What a run of ``mrf`` is given: sizes of its samples, and how everything else is made of random numbers.
+
+    ``known`` share of the sites; ``placed`` share of those that are from somewhere in the sample; ``partly`` whether
+    variables are known on their own; ``labels`` of the guide, 0 for grey levels and None for no guide; ``silent`` share
+    of the sites where it says nothing; ``masked`` and ``gaps`` shares of the samples' pixels; ``kinds`` how many
+    categories, of the first variable where there are several; ``outside`` share of the sites that take no part;
+    ``soft`` what there are probabilities of.
+    """
+
+    options: dict[str, Any]
+    samples: tuple = ((12, 11),)
+    channels: int | None = None
+    dtype: type = np.uint8
+    shape: tuple = (8, 9)
+    known: float = 0.0
+    placed: float = 0.0
+    partly: bool = False
+    labels: int | None = None
+    silent: float = 0.0
+    masked: float = 0.0
+    gaps: float = 0.0
+    kinds: int = 0
+    outside: float = 0.0
+    soft: tuple = ()
+
+    @property
+    def maps(self):
+        """Of probabilities, a fifth of them 0 and a fifth of the sites unknown, and of the sites that take part."""
+        rng, found = np.random.default_rng(11), {}
+        for name in self.soft:
+            kinds = {"categories": self.kinds, "images": len(self.samples)}[name]
+            p = rng.random((kinds, *self.shape)) * (rng.random((kinds, *self.shape)) > 0.2) + 1e-9 * (kinds < 2)
+            p[0, p.sum(0) == 0] = 1
+            found[name] = np.where(rng.random(self.shape) < 0.2, np.nan, p / p.sum(0))
+        if self.outside:
+            found["region"] = rng.random(self.shape) >= self.outside
+        return found
+
+    def arrays(self):
+        """Samples, masks, known values and their source, and the guide, all with channels."""
+        rng = np.random.default_rng(7)
+        samples = [texture(size, self.channels or 1, self.dtype, 5 + n) for n, size in enumerate(self.samples)]
+        for one in samples if self.kinds else []:
+            one[..., 0] = rng.integers(0, self.kinds, one.shape[:2]) ** 2 + 3
+            one[: self.kinds, 0, 0] = np.arange(self.kinds) ** 2 + 3  # all of them
+        masks = [rng.random(size) >= self.masked for size in self.samples] if self.masked else None
+        for one in samples if self.gaps else []:
+            one[rng.random(one.shape) < self.gaps / one.shape[2]] = np.nan
+        number = rng.integers(0, len(samples), self.shape)
+        place = np.stack(
+            [rng.integers(0, [one.shape[axis] for one in samples], (*self.shape, len(samples))) for axis in (0, 1)]
+        )
+        row, col = (np.take_along_axis(one, number[..., None], -1)[..., 0] for one in place)
+        values = np.empty((*self.shape, samples[0].shape[2]), self.dtype)
+        for s in np.ndindex(*self.shape):
+            one = samples[number[s]]
+            here = one[row[s], col[s]]
+            values[s] = np.where(np.isnan(here), np.nanmin(one), here) if self.gaps else here
+        there = np.repeat(rng.random(self.shape)[..., None] < self.known, values.shape[-1], -1)
+        if self.partly:
+            there &= rng.random(there.shape) < 0.6
+        if self.outside:
+            there &= self.maps["region"][..., None]
+        known = np.ma.masked_array(values, ~there) if self.known else None
+        source = np.stack([row, col, number][: 2 + (len(samples) > 1)], -1)
+        source[rng.random(self.shape) >= self.placed] = -1
+        guide = None
+        if self.labels is not None:
+            guide = ([self.guiding(rng, size) for size in self.samples], self.guiding(rng, self.shape))
+            guide[1][rng.random(self.shape) < self.silent] = np.nan
+            guide = guide if self.silent else (guide[0], guide[1].astype(guide[0][0].dtype))
+        return samples, masks, known, source.astype(np.int64) if self.placed else None, guide
+
+    def guiding(self, rng, size):
+        """A picture of a guide: floats for the output's sake."""
+        if self.labels:
+            found = rng.integers(0, self.labels, size)[..., None] * 3.0
+            found[: self.labels, 0, 0] = np.arange(self.labels) * 3
+            return found
+        row, col = np.indices(size)
+        return np.stack([np.sin(row / 3) + rng.random(size), row * col / 7], -1)
+
+    @property
+    def labelled(self):
+        return {"labels": True} if self.labels and "labels" not in self.options else {}
+
+    def textures(self):
+        """Arguments of `simdtex.synthesize`."""
+        samples, masks, known, source, guide = self.arrays()
+        several = len(samples) > 1
+
+        def bare(array):
+            return array if self.channels or array is None else array[..., 0]
+
+        how = {"known": bare(known), "known_source": source}
+        how["mask"] = masks if several or masks is None else masks[0]
+        how["guide"] = guide if several or guide is None else (guide[0][0], guide[1])
+        how = {name: value for name, value in how.items() if value is not None} | self.options | self.labelled
+        how["channel_axis"] = None if self.channels is None else -1
+        return ([bare(one) for one in samples] if several else bare(samples[0]), self.shape), how
+
+    def realisations(self):
+        """Arguments of `simdtex.simulate`."""
+        (training, shape), how = self.textures()
+        names = {"categories": "probabilities", "images": "image_map"}
+        how |= {names.get(name, name): one for name, one in self.maps.items()}
+        return (training, 1), how | {"shape": shape, "jobs": 1, "source": True}
+
+    def plainly(self, simulated):
+        """Image, source and temperature by the plain loops; of a simulation without the temperature."""
+        samples, masks, known, source, guide = self.arrays()
+        own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64} if simulated else {}
+        given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": self.maps}
+        pictures = samples if len(samples) > 1 else samples[0]
+        seed = realisation_seed(SEED, 0) if simulated else SEED
+        image, *more = plain_mrf.synthesize(pictures, self.shape, seed, **given, **own | self.options | self.labelled)
+        image = image if self.channels else image[..., 0]
+        if not simulated:
+            return [image, *more]
+        known = np.zeros(self.shape, bool) if known is None else ~np.ma.getmaskarray(known).any(-1)
+        inside = self.maps.get("region", np.full(self.shape, True))
+        missing = np.nan if image.dtype.kind == "f" else 255
+        image[~inside], more[0][~inside | known] = missing, -1
+        return [image[None], *np.moveaxis(more[0], -1, 0)[:, None]]
+
+
+def textures(options=None, tiles=0, **given):
+    """A run of the method ``mrf`` that the plain loops know too."""
+    case = Given(options or {}, **given)
+    return Run(simdtex.synthesize, case.textures, functools.partial(case.plainly, False), tiles)
+
+
+def realisations(options=None, **given):
+    """The same with maps, which `simdtex.simulate` takes."""
+    case = Given(options or {}, **given)
+    return Run(simdtex.simulate, case.realisations, functools.partial(case.plainly, True))
+
+
+def call(function, *shapes, channels=None, dtype=np.uint8, **options):
+    """A run of any function on textures of these shapes, the last of which is that of the output."""
+
+    def inputs():
+        *samples, shape = shapes
+        samples = [texture(size, channels, dtype, 5 + n) for n, size in enumerate(samples)]
+        axis = None if channels is None else -1
+        return (samples if function is simdtex.mix else samples[0], shape), {"channel_axis": axis, **options}
+
+    return Run(function, inputs)
+
+
+def multires(sample, shape, **options):
+    return call(simdtex.synthesize, sample, shape, method="multires", **options)
+
+
+def pyramid(sample, shape, iterations=2, **options):
+    return call(simdtex.synthesize, sample, shape, method="pyramid", iterations=iterations, **options)
+
+
+def facies(shape=(9, 20, 22), kinds=2, seed=0):
+    """Blobs of so many categories, flat ones, in a volume."""
+    field = gaussian_filter(np.random.default_rng(seed).standard_normal(shape), (1, 2.5, 2.5), mode="wrap")
+    return np.digitize(field, np.quantile(field, np.arange(1, kinds) / kinds)).astype(np.uint8)
+
+
+def rising(shape):
+    """From 0 in the first layer of a volume to 1 in the last."""
+    return np.broadcast_to(np.linspace(0, 1, shape[0])[:, None, None], shape)
+
+
+def wells(shape, share=0.03):
+    """Known cells of a volume."""
+    truth = facies(seed=5)[tuple(map(slice, shape))]
+    return np.ma.MaskedArray(truth, np.random.default_rng(4).random(shape) >= share)
+
+
+def volume(shape=(6, 12, 11), training=None, given=dict, **options):
+    """A simulation of a volume; ``given()`` makes what else it is given."""
+
+    def inputs():
+        own = {"categorical": True, "order": 2, "shape": shape, "jobs": 1}
+        return (facies() if training is None else training(), 1), own | given() | options
+
+    return Run(simdtex.simulate, inputs)
+
+
+def arguments(function, *make, **options):
+    """A run of any function; ``make()`` returns an argument."""
+    return Run(function, lambda: (tuple(one() for one in make), options))
+
+
+def hole(shape=(14, 15)):
+    """Where two spots of a picture are."""
+    found = np.zeros(shape, bool)
+    found[2:4, 3:6] = found[10:12, 9:12] = True
+    return found
+
+
+GREY = functools.partial(texture, (14, 15))
+BARE = {"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "overview": 64}
+"""Nothing but the equations of the paper in distances and pictures."""
+EXACT = BARE | {"search": "exact", "order": 2, "levels": 2, "coherence": 1.0}
+FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "coherence": 0.2}
+"""Coherent search that weighs a few candidates at every level but the coarsest."""
+MORE = {"order": 2, "levels": 2}
+"""The penalties, the structure channel and the finish of the defaults, all together."""
+MORE_EXACT, MORE_FEW = MORE | {"search": "exact"}, MORE | {"search": "coherent"}
+GIBBS, OPEN = {"relaxation": "gibbs", "bandwidth": 0.4}, {"boundary": "open"}
+DRAWN = {"relaxation": "gibbs", "pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1}
+DENSITY = BARE | DRAWN | {"coherence": 1.0}
+TWO = {"samples": ((9, 11), (8, 7))}
+TOGETHER = ("coloring-fixed", "synchronous", "checkerboard", "block:3x4", "luby", "random-subset:0.3")
+F4 = {"dtype": np.float32}
+
+RUNS = {
+    # levels, orders, types, borders
+    "defaults": textures(samples=((9, 10),), shape=(3, 4)),
+    "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
+    "overview-whole": textures({"order": 1, "edges": "whole", "phases": "all"}, samples=((20, 19),), shape=(9, 8)),
+    "paper": textures({"preset": "paper", "order": 2}),
+    "exact": textures(EXACT),
+    "exact-order-8": textures(EXACT | {"order": 8, "xi": -4.0}, samples=((14, 12),)),
+    "exact-three-levels": textures(EXACT | {"levels": 3, "phases": "all"}, samples=((13, 14),), shape=(11, 10)),
+    "exact-colour": textures(EXACT | OPEN, channels=3),
+    "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16),
+    "exact-reflect": textures(EXACT | {"order": 1, "edges": "reflect", "coherence": 0}, samples=((20, 20),)),
+    "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(6, 5)),
+    "gibbs": textures(EXACT | {"relaxation": "gibbs", "bandwidth": 0.6, "xi": -4.0}, dtype=np.uint16, tiles=5),
+    "density": textures(DENSITY | {"levels": 2, "bandwidth": 0.3}, samples=((9, 10),), shape=(6, 7), tiles=4),
+    "density-colour": textures(DENSITY | OPEN, channels=3, samples=((9, 8),), shape=(1, 17), dtype=np.float64),
+    "density-16-bit": textures(DENSITY | {"levels": 2}, channels=2, dtype=np.uint16, samples=((9, 10),), shape=(7, 6)),
+    "paper-icm": textures({"preset": "paper", "order": 1, "relaxation": "icm"}, shape=(5, 6)),
+    "mode-colour": textures(
+        MORE | OPEN | {"pixel": "density", "order": 1, "xi": -9.0, "free_sweeps": 1}, channels=2, shape=(4, 5)
+    ),
+    "few": textures(FEW),
+    "few-colour": textures(FEW | OPEN | {"order": 5}, channels=3, samples=((10, 11),), shape=(8, 7)),
+    "few-order-18": textures(FEW | {"order": 18, "xi": -16.0}, shape=(6, 7)),
+    "few-16-bit": textures(FEW | {"order": 8, "xi": -4.0, "coherence": 1.5, "chance": 1}, dtype=np.uint16),
+    "few-chance": textures(FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
+    "few-levels": textures(FEW | {"levels": 3, "edges": "reflect"}, samples=((13, 14),), shape=(11, 10)),
+    "few-coarse-chance": textures(
+        FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
+    ),
+    "few-gibbs": textures(FEW | {"relaxation": "gibbs", "bandwidth": 0.5}, dtype=np.uint16),
+    "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
+    "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),
+    "few-whole": textures(FEW | {"order": 5, "edges": "whole", "phases": "all", "xi": -2.5}, masked=0.2, **F4),
+    "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(5, 6), **F4),
+    # schedules
+    **{
+        name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),), tiles=4 * (name == "coloring-fixed"))
+        for name in TOGETHER
+    },
+    "synchronous-exact": textures(EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),)),
+    "block-exact": textures(EXACT | OPEN | {"levels": 1, "xi": -2.0, "schedule": "block:3x4"}, shape=(7, 5)),
+    "raster": textures(EXACT | {"levels": 1, "xi": -4.0, "schedule": "raster"}, samples=((9, 8),), shape=(6, 5)),
+    "random-scan": textures(MORE_EXACT | {"schedule": "random-scan", "xi": -8.0}, shape=(9, 8)),
+    "block": textures(BARE | {"schedule": "block", "order": 1, "levels": 1}, samples=((9, 8),), shape=(3, 17)),
+    "array": textures(FEW | {"array": "4x4", "schedule": "luby"}),
+    # penalties, structure, finish, a lattice
+    "balance": textures(FEW | {"balance": 0.1, "order": 1}, samples=((12, 13),), shape=(11, 10), tiles=6),
+    "balance-order-9": textures(FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}, samples=((13, 14),)),
+    "balance-all-phases": textures(EXACT | {"balance": 1.0, "phases": "all"}, samples=((14, 13),)),
+    "structure-colour": textures(FEW | OPEN | {"structure": 0.7}, channels=3, shape=(8, 7)),
+    "structure-beyond": textures(FEW | {"structure": 50.0}, **F4),
+    "novelty-exact": textures(EXACT | OPEN | {"novelty": 0.05, "levels": 1}, channels=3),
+    "finish-colour": textures(EXACT | OPEN | {"finish": 0.8}, channels=3, shape=(8, 7), tiles=5),
+    "finish-16-bit": textures(FEW | {"finish": 2.2}, channels=2, dtype=np.uint16, shape=(8, 7)),
+    "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10)),
+    "lattice-colour": textures(FEW | OPEN | {"lattice": "3,0,1,4"}, channels=3, shape=(8, 7)),
+    "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
+    "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
+    "more-whole": textures(MORE | {"edges": "whole", "phases": "all", "balance": 2.0}, samples=((16, 15),)),
+    "more-gibbs": textures(MORE_FEW | {"relaxation": "gibbs"}, channels=2, **F4),
+    "more-density": textures(MORE | DRAWN | {"novelty": 0.4, "finish": 1.5}, channels=2, samples=((10, 9),)),
+    # what is given besides
+    "known": textures(MORE_FEW | {"levels": 3, "schedule": "luby"}, known=0.06, shape=(11, 13)),
+    "known-open": textures(
+        MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0, "xi": -4.0}, known=0.08, tiles=5, **F4
+    ),
+    "known-gibbs": textures(MORE_EXACT | GIBBS | {"order": 4, "data_weight": 1.7}, known=0.1, dtype=np.uint16),
+    "known-blocks": textures(MORE_FEW | {"schedule": "block:3x4", "structure": 0.0}, known=0.9, channels=2),
+    "known-lattice": textures(
+        MORE | {"lattice": "4.8,0.3,-0.2,5.8", "xi": -4.0}, known=0.2, channels=3, shape=(10, 12), tiles=6
+    ),
+    "placed": textures(MORE_EXACT | {"schedule": "checkerboard", "xi": -4.0}, known=0.3, placed=0.5, tiles=5),
+    "partly": textures(MORE_FEW | {"xi": -4.0}, known=0.3, partly=True, channels=2, tiles=5),
+    "labels": textures(MORE_EXACT | {"guide_weight": 0.4, "xi": -4.0, "schedule": "synchronous"}, labels=2, tiles=5),
+    "labels-silent": textures(MORE_FEW | OPEN | {"levels": 3, "order": 1}, labels=3, silent=0.6),
+    "grey-guide": textures(MORE_FEW | GIBBS | {"guide_weight": 2.5}, labels=0, silent=0.4, dtype=np.uint16),
+    "several": textures(MORE_EXACT | {"shares": (3.0, 1.0), "balance": 2.0, "xi": -4.0}, **TWO, tiles=5),
+    "several-gaps": textures(MORE_FEW | OPEN | {"lattice": "4,0,1,5"}, gaps=0.1, known=0.1, **F4, **TWO),
+    "three-colour": textures(MORE_FEW | OPEN | GIBBS, samples=((9, 8), (7, 9), (8, 8)), channels=2),
+    "masked": textures(MORE_FEW | {"xi": -4.0}, masked=0.4, tiles=5),
+    "masked-many": textures(MORE_FEW, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
+    "gaps": textures(MORE_EXACT | {"edges": "reflect"}, gaps=0.1, dtype=np.float64),
+    "categories": textures(
+        MORE_EXACT | {"categorical": True, "xi": -4.0, "proportions": (1.0, 2.0, 0.0)},
+        kinds=3,
+        known=0.15,
+        masked=0.2,
+        tiles=5,
+    ),
+    "categories-mixed": textures(
+        MORE_FEW | {"categorical": (0,), "weights": (1.0, 2.0)},
+        **{"kinds": 3, "known": 0.3, "partly": True, "channels": 2, "labels": 2, **F4},
+    ),
+    "weights": textures(MORE_FEW | {"weights": (0.0, 1.0), "finish": 0.8}, channels=2, dtype=np.float64),
+    "everything": textures(
+        MORE_FEW | {"shares": (1.0, 2.0), "schedule": "luby"},
+        **TWO | {"known": 0.15, "placed": 0.4, "labels": 0, "silent": 0.2, "masked": 0.2, "gaps": 0.05},
+        **F4 | {"channels": 2, "partly": True},
+    ),
+    # windows that are smaller than the whole
+    **{
+        f"tiles-{name}": textures(given | {"order": 1, "xi": -8.0}, 18, samples=((22, 25),), shape=(37, 30), **more)
+        for name, given, more in (
+            ("known", {"levels": 3}, {"known": 0.02}),
+            ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),
+            ("synchronous", {"schedule": "synchronous", "levels": 2}, {"channels": 3, "dtype": np.bool_}),
+        )
+    },
+    # simulations
+    "region": realisations(MORE_EXACT | {"finish": 1.0}, outside=0.3, known=0.2, **F4),
+    "soft": realisations(MORE_EXACT | {"categorical": True, "soft_weight": 0.5}, kinds=3, soft=("categories",)),
+    "soft-gibbs": realisations(
+        MORE_FEW | GIBBS | {"categorical": True, "proportions": (2.0, 1.0)},
+        **{"kinds": 2, "known": 0.1, "soft": ("categories",), "masked": 0.2},
+    ),
+    "soft-all": realisations(
+        MORE_FEW | {"categorical": (0,), "levels": 3},
+        **TWO | {"kinds": 3, "soft": ("categories", "images"), "channels": 2, "outside": 0.2, "labels": 2},
+    ),
+    "volume": volume((6, 12, 13), order=3, levels=2),
+    "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
+    "volume-exact": volume((4, 7, 8), search="exact", relaxation="gibbs", edges="whole", order=1),
+    "volume-grey": volume(
+        training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=5, phases="all"
+    ),
+    "volume-data": volume((8, 14, 15), given=lambda: {"known": wells((8, 14, 15))}, levels=3),
+    "volume-data-exact": volume((6, 8, 9), given=lambda: {"known": wells((6, 8, 9))}, search="exact"),
+    "volume-guide": volume(
+        given=lambda: {"guide": ((rising((9, 20, 22)) > 0.5) * 1, (rising((6, 12, 11)) > 0.6) * 1)},
+    ),
+    "volume-maps": volume(
+        given=lambda: {
+            "probabilities": np.stack([1 - rising((6, 12, 11)), rising((6, 12, 11))]),
+            "region": np.indices((6, 12, 11)).sum(0) > 9,
+        },
+        training=lambda: np.ma.MaskedArray(facies(), np.indices((9, 20, 22))[2] < 3),
+    ),
+    # holes, sides and seams
+    "fill": arguments(simdtex.fill, GREY, hole, order=1, levels=1),
+    "fill-colour": arguments(
+        simdtex.fill, lambda: texture((14, 15), 3, np.float64), hole, channel_axis=-1, order=2, grow=1, feather=1
+    ),
+    "extend": arguments(simdtex.extend, GREY, right=3, seamless="y", band=2, order=2),
+    # the other methods
+    "multires": multires((13, 11), (15, 18)),
+    "multires-luminance": multires((9, 10), (13, 8), channels=3, alpha=3, beta=1, levels=4),
+    "multires-open": multires((12, 9), (10, 13), dtype=np.uint16, boundary="open", parity="free", alpha=0.5),
+    "multires-float": multires((10, 13), (14, 7), channels=2, dtype=np.float64, parity="free", beta=0.5),
+    "multires-mended": multires((17, 20), (21, 23), channels=3, alpha=0.4),
+    "multires-keep-cut": multires((17, 20), (21, 23), channels=3, edges="keep", seams="cut"),
+    "multires-larger": multires((7, 6), (33, 29), dtype=np.bool_, alpha=1.5),
+    "multires-smaller": multires((23, 26), (5, 4), orientations=0),
+    "multires-row": multires((1, 17), (3, 40), alpha=1, boundary="open"),
+    "multires-all": multires((8, 9), (10, 13), dtype=np.float32, alpha=np.inf),
+    "pyramid": pyramid((34, 36), (32, 40), iterations=5),
+    "pyramid-colour": pyramid((20, 17), (19, 23), channels=3),
+    "pyramid-six": pyramid((17, 20), (18, 16), dtype=np.float64, orientations=6, edges="wrap", levels=2),
+    "pyramid-laplacian": pyramid(
+        (20, 17), (19, 23), channels=2, dtype=np.float32, pyramid="laplacian", color="channels", match="lookup"
+    ),
+    "pyramid-row": pyramid((9, 8), (1, 17), orientations=2, start=np.arange(17.0)[None]),
+    "solid": call(simdtex.synthesize_solid, (17, 20), (10, 8, 9), iterations=2, levels=1, orientations=2),
+    "solid-average": call(
+        simdtex.synthesize_solid,
+        *((17, 20), (8, 9, 7)),
+        **{"channels": 3, "iterations": 1, "levels": 1, "solids": "average", "slices": "each", "orientations": 2},
+    ),
+    "solid-laplacian": call(
+        simdtex.synthesize_solid, (13, 12), (12, 10, 9), iterations=1, pyramid="laplacian", match="lookup"
+    ),
+    "mix": call(simdtex.mix, (17, 20), (20, 17), (16, 18), channels=3, palette=0, average=[1, 2], iterations=1),
+    "mix-bands": call(simdtex.mix, (17, 20), (20, 17), (16, 18), low=0, high=1, levels=2, iterations=1),
+    # the array of 1998, classes, estimates
+    "maspar": call(maspar.synthesize, (14, 13), (11, 9), array="4x5", order=2, levels=2),
+    "maspar-mode": call(
+        maspar.synthesize, (14, 13), (8, 8), channels=3, array="8x8", order=1, levels=2, relaxation="icm", bandwidth=0.3
+    ),
+    "classify": Run(
+        simdtex.classify,
+        lambda: (
+            (
+                np.hstack([texture((20, 15)), texture((20, 14), seed=3)[::-1]]),
+                {"a": texture((20, 18)), "b": texture((16, 17), seed=3)[::-1]},
+            ),
+            {"exemplars": 40, "levels": 2},
+        ),
+    ),
+    "estimate": Run(
+        simdtex.estimate,
+        lambda: ((facies()[0],), {"known": wells((1, 9, 11), 0.12)[0].astype(float), "categorical": True}),
+    ),
+}
+
+
+def outcome(name, device=REFERENCE, **how):
+    """All arrays that a run gives, and everything that it counts, as JSON."""
+    run = RUNS[name]
+    (given, options), known = run.inputs(), inspect.signature(run.function).parameters
+    how |= {name: value for name, value in (("rng", SEED), ("full_output", True)) if name in known}
+    if run.function in (simdtex.simulate, simdtex.estimate):  # which take no open machine
+        device = "reference" if device is REFERENCE else str(device.info.index)
+    made = run.function(*given, device=device, **options | how)
+    if "full_output" not in known:
+        arrays = [made[one].values for one in made.data_vars] if hasattr(made, "data_vars") else [made.values]
+        told = {name: value for name, value in made.attrs.items() if name not in ("device", "version")}
+        return arrays, json.dumps(told, default=str, sort_keys=True)
+    image, output = made
+    arrays = [image, output.source, output.temperature]
+    for stage in output.stages:
+        arrays += [stage.image, stage.source, stage.candidates]
+    arrays = [one for one in arrays if one is not None]
+    return arrays, json.dumps(counted(getattr(output, "statistics", {})), default=str, sort_keys=True)
+
+
+def counted(told):
+    """Statistics without the machine's name and clock, and without what its searches leave out."""
+    if isinstance(told, dict):
+        own = ("device", "seconds", "device_seconds", "launches", "skipped", "kernels")
+        return {name: counted(value) for name, value in told.items() if name not in own}
+    return [counted(value) for value in told] if isinstance(told, list) else told
+
+
+def digest(arrays):
+    """SHA-256 of some arrays: their types, shapes and bytes, the first half of the hexadecimal digits."""
+    total = hashlib.sha256()
+    for array in arrays:
+        total.update(f"{array.dtype} {array.shape}".encode())
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()[:32]
+
+
+@functools.cache
+def sample(name):
+    """A real sample by name, and its channel axis."""
+    kind, _, how = name.partition("-")
+    if kind == "coffee":
+        return data.coffee()[266:362, 486:582], -1
+    pixels = getattr(data, kind)()[:128, :128]
+    if how == "16":
+        return pixels.astype(np.uint16) * 257 + (np.indices(pixels.shape).sum(0) % 7).astype(np.uint16), None
+    return (pixels[:64, :64] if how == "64" else pixels), None
+
+
+LARGE = {
+    "large brick": ("brick", (256, 256), {}),
+    "large coffee": ("coffee", (160, 160), {}),
+    "large coffee-exact": ("coffee", (48, 64), {"search": "exact", "order": 8}),
+    "large brick-exact": ("brick", (128, 128), {"search": "exact"}),
+    "large brick-paper": ("brick-64", (40, 40), {"preset": "paper", "order": 8}),
+    "large grass-16-bit": ("grass-16", (120, 120), {}),
+    "large gravel-phases": ("gravel-64", (96, 96), {"phases": "all", "edges": "reflect", "order": 8}),
+    "large grass-draws": ("grass-64", (64, 64), {"relaxation": "gibbs", "search": "coherent", "order": 8}),
+    "large luby": ("brick-64", (56, 56), {"schedule": "luby", "order": 8}),
+    "large block-exact": ("brick-64", (56, 56), {"schedule": "block", "search": "exact", "order": 8}),
+    "large raster": ("brick-64", (20, 24), {"schedule": "raster", "order": 5}),
+    "large multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": 0.33}),
+    "large multires-paper": ("brick", (256, 200), {"method": "multires", "edges": "keep", "seams": "cut"}),
+    "large pyramid-grass": ("grass", (128, 160), {"method": "pyramid"}),
+    "large pyramid-coffee": ("coffee", (96, 96), {"method": "pyramid", "match": "lookup", "pyramid": "laplacian"}),
+}
+"""Sample, output's shape and options of larger runs, on the device that is preferred here."""
+
+
+def large(name, device):
+    """The arrays of a larger run."""
+    kind, shape, options = LARGE[name]
+    pixels, axis = sample(kind)
+    image, output = simdtex.synthesize(
+        pixels, shape, channel_axis=axis, rng=7, device=device, full_output=True, **options
+    )
+    return [one for one in (image, output.source, output.temperature) if one is not None]
+
+
+if __name__ == "__main__":
+    found = {name: digest(outcome(name)[0]) for name in RUNS} | {name: digest(large(name, None)) for name in LARGE}
+    PINNED.write_text(json.dumps(found, indent=0, sort_keys=True) + "\n")
