@@ -25,7 +25,6 @@ COMMANDS = {
     "classify": 4,
     "solid": 8,
     "mix": 8,
-    "ising": 6,
     "resume": 0.5,
     "schedules": 0.1,
     "devices": 0.1,
@@ -186,7 +185,7 @@ class Maker:
             else:
                 options.append(parameter)
         samples = words[:]
-        words += ["-o", self.output(name)] if name not in ("devices", "bench", "ising", "resume") else []
+        words += ["-o", self.output(name)] if name not in ("devices", "bench", "resume") else []
         words += (
             ["--size", size]
             if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
@@ -203,9 +202,6 @@ class Maker:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
         if name == "maspar" and rng.random() < 0.9:
             words += ["--array", rng.choice(("4x4", "8x8", "3x5", "16x16"))]
-        if name == "ising":
-            words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2"]
-            words += ["--schedule", rng.choice(("coloring", "raster", "block"))]
         if name == "schedules":
             words += ["--seeds", "1", "--schedule", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes

@@ -34,7 +34,6 @@ LOADING = (
     "extend L.png -o out.jpg --left 1 --order 1",
     "solid L.png -o out.nrrd --size 4 --iterations 1",
     "mix L.png L.png -o out.gif --size 6x6 --iterations 1",
-    "ising --size 4x4 --sweeps 2 --burn-in 1 --seeds 2 --schedules coloring",
     "simulate L.png -o out.npz --size 6x6 --order 1 --number 1",
 )
 """Commands that a worker runs first, so that modules need not be loaded during a try."""

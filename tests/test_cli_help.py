@@ -98,7 +98,7 @@ def test_the_help_of_an_option_begins_with_what_it_does():
 
 
 def test_a_short_list_has_no_groups():
-    assert "\nOptions:\n" in help_of("ising") and "\nOptions:\n" not in help_of("synth")
+    assert "\nOptions:\n" in help_of("demo") and "\nOptions:\n" not in help_of("synth")
 
 
 @pytest.mark.parametrize("words", LINES, ids=lambda words: words[:40])

@@ -23,7 +23,6 @@ TEXTS = {
     *("names", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")
-ISING_START = ("ising", "start")  # up or random
 
 
 def parameters(*roles):
@@ -48,7 +47,7 @@ def test_every_path_has_a_role():
                 assert kind.role in READ + WRITE
                 continue
             assert not isinstance(kind, click.Path), f"{name} {option.name}: give it a role of simdtex.cli.places"
-            if isinstance(kind, click.types.StringParamType) and (name, option.name) != ISING_START:
+            if isinstance(kind, click.types.StringParamType):
                 assert option.name in TEXTS, f"{name} {option.name}: give it a role, or name it in this test"
     assert found > 40
 
@@ -218,7 +217,7 @@ def test_an_empty_size_is_no_default(folder, name):
     args = [*required(COMMANDS[name]), "--size", ""]
     if name in PICTURES:
         args = ["out.png" if word == "fresh.npz" else word for word in args]
-    if name in ("demo", "ising", "schedules"):
+    if name in ("demo", "schedules"):
         args += ["-o", "report"]
     refused("size '' is not ", name, *args)
     assert not Path("report").exists()

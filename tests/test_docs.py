@@ -150,7 +150,7 @@ def quick(line):
     words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
     words += ["--order", "4", "--seeds", "1", "--size", "12x12"] if "schedules" in words else []
     words += ["--order", "2", "--size", "9x8"] if "maspar" in words[1:2] else []
-    return words + (["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else [])
+    return words
 
 
 def check_outputs(words, folder):

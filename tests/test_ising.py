@@ -1,9 +1,8 @@
-"""The Ising model: its exact energy, heat-bath runs, which schedules sample it, and ``simdtex ising``."""
+"""The Ising model: its exact energy, heat-bath runs, which schedules sample it, and ``simdtex schedules --ising``."""
 
 import functools
 import json
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,7 @@ from simdtex.experiments import ising as exact
 from simdtex.experiments.ising import CRITICAL, Chains, Finding, findings
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
-from simdtex.report.schedules import _sublattice
-from simdtex.report.schedules import ising_tables as tables
+from simdtex.report.schedules import _sublattice, ising_tables
 from simdtex.report.tables import print_table
 from simdtex.schedules import Info
 
@@ -390,120 +388,39 @@ def test_what_the_synchronous_schedule_samples_is_known_too(tallies):
     assert stats.chisquare(counts, expected).pvalue > 1e-3
 
 
-# -- ``simdtex ising``, as its user meets it.
-
-PICTURES = ["energy.png", "lattices.png"]
+# -- ``simdtex schedules --ising``, as its user meets it.
 
 
-def run(*args):
-    return CliRunner().invoke(main, ["ising", *(str(arg) for arg in args)])
-
-
-def small(*args, device="reference", schedules="coloring,synchronous"):
-    few = ("--size", "6x4", "--seeds", 4, "--sweeps", 12, "--burn-in", 4)
-    return run("--schedule", schedules, *few, "--device", device, *args)
-
-
-def test_a_table_for_each_temperature():
-    done = small("--temperature", 2, "--temperature", 3.5, schedules="luby,raster,block:2x3")
+def compared(folder, monkeypatch, *args):
+    monkeypatch.setattr("simdtex.experiments.ising.SIZE", (4, 6))
+    few = ("--size", "12x10", "--order", 1, "--seeds", 1, "--schedule", "coloring,synchronous,raster")
+    words = ["schedules", "--ising", *few, "-o", folder, *args]
+    done = CliRunner().invoke(main, [str(word) for word in words])
     assert done.exit_code == 0, done.output
-    for word in ("T = 2:", "T = 3.5:", "luby", "raster", "block:2x3", "keeps", "breaks", "on reference (NumPy)"):
-        assert word in done.output
-    assert "No deviation from the Ising model" in done.output
-    assert "schedule 3 of 3: block:2x3" in done.output  # progress, there being no terminal
+    return done.output, json.loads((folder / "results.json").read_text())["ising"]
 
 
-def test_the_synchronous_schedule_fails_and_coloring_does_not(any_device, tmp_path):
-    options = ("--size", 8, "--seeds", 16, "--sweeps", 150, "--burn-in", 60, "-q", "-o", tmp_path / "report")
-    done = run("--schedule", "coloring,synchronous", "--temperature", 2.6, *options, "--device", any_device.index)
-    assert (done.exit_code, done.output) == (0, "")
-    results = json.loads((tmp_path / "report" / "results.json").read_text())
-    right, wrong = results["findings"]
-    assert not right["differs"] and right["independent"] and right["schedule"] == "coloring"
-    assert wrong["differs"] and wrong["sigmas"] > 8 and not wrong["independent"]
-    assert abs(wrong["neighbours"]) < 0.03 < 0.2 < right["neighbours"]
-    assert results["conclusion"] == [
-        "No deviation from the Ising model at any temperature: coloring.",
+def test_schedules_have_tables_of_the_ising_model_and_a_section_of_the_report(tmp_path, monkeypatch, any_device):
+    said, found = compared(tmp_path / "r", monkeypatch, "--device", any_device.index)
+    for word in ("T = 2:", "T = 2.3:", "T = 2.6:", "coloring", "keeps", "breaks"):
+        assert word in said
+    assert found["conclusion"] == [
+        "No deviation from the Ising model at any temperature: coloring, raster.",
         "Something else is sampled by: synchronous.",
     ]
-
-
-def test_a_report_is_complete(tmp_path):
-    folder = tmp_path / "report"
-    done = small("-o", folder, schedules="coloring,synchronous,random-scan")
-    assert done.exit_code == 0, done.output
-    assert str(folder / "index.html") in done.output
-    assert sorted(path.name for path in folder.iterdir()) == sorted([*PICTURES, "index.html", "results.json"])
-    for name in PICTURES:
-        with Image.open(folder / name) as picture:
+    assert all(sentence in said for sentence in found["conclusion"])
+    assert [one["schedule"] for one in found["findings"]] == ["coloring", "synchronous", "raster"] * 3
+    assert set(found["findings"][0]) == {field.name for field in fields(Finding)}
+    for name in ("energy.png", "lattices.png"):
+        with Image.open(tmp_path / "r" / name) as picture:
             assert min(picture.size) > 300 and len(np.unique(np.asarray(picture.convert("L")))) > 1
-    page = (folder / "index.html").read_text()
-    for word in ("Two interleaved lattices", "T = 2.3", "random-scan", "Kaufman"):
-        assert word in page
-    results = json.loads((folder / "results.json").read_text())
-    assert results["settings"]["rows"] == 4 and results["settings"]["columns"] == 6
-    assert results["settings"]["temperatures"] == [2.0, 2.3, 2.6]
-    assert [one["schedule"] for one in results["findings"]] == ["coloring", "synchronous", "random-scan"] * 3
-    assert set(results["findings"][0]) == {field.name for field in fields(Finding)}
-    assert results["runs"]["random-scan"]["steps"] == 16 * 24
-
-
-def without_times(folder):
-    results = json.loads((folder / "results.json").read_text())
-    assert str(folder) in results.pop("command")
-    for one in results["runs"].values():
-        assert one.pop("seconds") > 0
-    return results
-
-
-def test_the_same_seed_gives_the_same_report_but_for_times(tmp_path):
-    for name in ("one", "two"):
-        assert small("--seed", 3, "-q", "-o", tmp_path / name).exit_code == 0
-    one, two = tmp_path / "one", tmp_path / "two"
-    assert without_times(one) == without_times(two)
-    for name in PICTURES:
-        assert (one / name).read_bytes() == (two / name).read_bytes()
-    assert small("--seed", 4, "-q", "-o", tmp_path / "two").exit_code == 0  # over the report that is there
-    assert without_times(one)["findings"] != without_times(two)["findings"]
-
-
-def test_a_device_finds_what_the_reference_finds(any_device, tmp_path):
-    for name, device in (("ours", any_device.index), ("theirs", "reference")):
-        assert small("-q", "-o", tmp_path / name, device=device).exit_code == 0
-    ours, theirs = (without_times(tmp_path / name) for name in ("ours", "theirs"))
-    assert ours["findings"] == theirs["findings"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["--temperature", "0"], "temperature is 0.0; give a number above 0"),
-        (["--schedule", "chess"], "unknown schedule 'chess'; choose one of: coloring"),
-        (["--size", "1"], "a side of the lattice is 1; give 2 or more"),
-        (["--size", "big"], "size 'big' is not WIDTHxHEIGHT"),
-        (["--seeds", "1"], "--seeds is 1; give 2 or more"),
-        (["--sweeps", "1"], "--sweeps is 1; give 2 or more"),
-        (["--device", "no such device"], "no such device"),
-        (["-o", "nowhere/report"], "the folder nowhere does not exist: create it first"),
-    ],
-)
-def test_bad_input_gives_one_sentence_and_nothing_else(arguments, sentence, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = small(*arguments)
-    assert done.exit_code == 2
-    assert sentence in done.output and done.output.startswith("simdtex: ") and done.output.count("\n") == 1
-    assert not list(Path().iterdir())
-
-
-def test_a_schedule_or_a_temperature_given_twice_counts_once():
-    done = small("--temperature", 2.5, "--temperature", 2.5, schedules="coloring, coloring")
-    assert done.exit_code == 0, done.output
-    assert done.output.count("T = 2.5:") == 1 and "schedule 1 of 1" in done.output
+    page = (tmp_path / "r" / "index.html").read_text()
+    assert "Kaufman" in page and "lattices.png" in page
 
 
 def test_a_narrow_terminal_gets_whole_cells(capsys):
     one = Finding("random-subset:0.25", False, 2.0, -1.74, 0.01, -1.745, 55, 0.911, 0.04, True)
-    (table,) = tables([one])
+    (table,) = ising_tables([one])
     print_table(table, 80)
     shown = capsys.readouterr().out
     assert "…" not in shown and max(map(len, shown.splitlines())) <= 80

@@ -110,7 +110,7 @@ def test_a_table_is_printed(capsys):
 
 def test_results_are_valid_json(tmp_path):
     numbers = {"b": float("nan"), "a": [np.float32(1.5), np.int64(2), np.bool_(True), np.arange(2)], "c": {1: None}}
-    write_report(tmp_path / "r", "A title", "A lead.", [], numbers, "simdtex ising")
+    write_report(tmp_path / "r", "A title", "A lead.", [], numbers, "simdtex schedules")
     text = (tmp_path / "r" / "results.json").read_text(encoding="utf-8")
 
     def refuse(constant):
@@ -121,13 +121,13 @@ def test_results_are_valid_json(tmp_path):
         "a": [1.5, 2, True, [0, 1]],
         "b": None,
         "c": {"1": None},
-        "command": "simdtex ising",
+        "command": "simdtex schedules",
         "files": ["index.html", "results.json"],
         "version": simdtex.__version__,
     }
     assert list(found) == sorted(found)
     assert found["files"] == sorted(os.listdir(tmp_path / "r"))
-    assert "$ simdtex ising" in read_page(tmp_path / "r" / "index.html").text
+    assert "$ simdtex schedules" in read_page(tmp_path / "r" / "index.html").text
 
 
 def test_a_report_replaces_an_earlier_one_and_nothing_else(tmp_path):

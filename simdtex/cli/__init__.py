@@ -33,7 +33,6 @@ GROUPS = {
     },
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",
-        "ising": "Relax Ising spins by each schedule and compare with the exact energy.",
         "maspar": "Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.",
     },
     "This machine": {
@@ -50,7 +49,7 @@ MODULES = {
     **dict.fromkeys(("synth", "extend", "tile", "fill", "mix", "solid"), "textures"),
     **dict.fromkeys(("estimate", "classify"), "simulate"),
     **dict.fromkeys(("live", "demo", "devices", "bench"), "machine"),
-    **{"resume": "tiles", "ising": "schedules"},
+    "resume": "tiles",
 }
 """The modules of commands that are not in the one of their name."""
 

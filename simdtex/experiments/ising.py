@@ -13,14 +13,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import log, pi, prod, sqrt, tanh
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from simdtex import random, schedules
-from simdtex.machine import Machine, memory
+from simdtex.machine import Machine, memory, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.ops.snapshot import snapshot
@@ -410,3 +410,41 @@ def _finding(run: Chains, t: int, least: float) -> Finding:
         neighbours=float(-energy / 2 - (run.even[t] * run.odd[t]).mean()),
         differs=abs(sigmas) > least,
     )
+
+
+TEMPERATURES = (2.0, 2.3, 2.6)
+"""The temperatures of `of_schedules`, below, near and above the critical one."""
+
+SIZE = (24, 24)
+"""Rows and columns of the lattice of `of_schedules`."""
+
+PICTURE_SWEEPS = 50
+"""Sweeps of a picture, from a random start: enough for domains to grow, too few for one to win."""
+
+
+class Spins(NamedTuple):
+    """The Ising model under several schedules: the findings, and a chain of each schedule from a random start."""
+
+    findings: list[Finding]
+    pictures: list[Chains]
+
+
+def of_schedules(
+    chosen: Sequence[schedules.Schedule], device: str | None, seed: int, show: Callable[[float, str, str], None]
+) -> Spins:
+    """Return the Ising model under each schedule: 32 chains at each of `TEMPERATURES`, on a lattice of `SIZE`.
+
+    ``show`` receives the finished share, a text, and the schedule that runs.
+    """
+    machine = open_machine(device)
+    experiment = Experiment(SIZE, TEMPERATURES, seeds=32, sweeps=300, burn_in=600)
+    once = Experiment(SIZE, TEMPERATURES[:1], 1, PICTURE_SWEEPS, 0, start="random")
+    runs, pictures = [], []
+    for place, schedule in enumerate(chosen):
+
+        def part(share: float, place: int = place, name: str = schedule.name) -> None:
+            show((place + share) / len(chosen), "", f"Ising spins by {name}")
+
+        runs.append(ising(machine, experiment, schedule, seed=seed, callback=part))
+        pictures.append(ising(machine, once, schedule, seed=seed))
+    return Spins(findings(runs), pictures)

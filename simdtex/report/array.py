@@ -46,7 +46,7 @@ WHY = (
     "The paper relaxes sites together only if none is a neighbour of another, equation (14), because a site must see "
     "the present values of its neighbours. coloring does so in as few steps as there are colours. raster keeps the "
     "rule too, one site a step. synchronous relaxes all sites in one step and checkerboard in two, but neighbours "
-    "among them: what they draw need not have the distribution of the model (see simdtex schedules and simdtex ising)."
+    "among them: what they draw need not have the distribution of the model (see simdtex schedules --ising)."
 )
 
 

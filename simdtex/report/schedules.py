@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reports of a comparison of schedules, and of the Ising experiment."""
+"""The report of a comparison of schedules, with the Ising model under them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from simdtex import __version__
 from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
-from simdtex.experiments.ising import LEVEL, Chains, Finding
+from simdtex.experiments.ising import LEVEL, Chains, Finding, Spins
 from simdtex.io.image import to_display
 from simdtex.report.page import INK, Figure, Part, Section, legend, new_figure, styles, tidy, write_report
 from simdtex.report.sheet import contact_sheet
@@ -88,7 +88,9 @@ LIKENESS = Topic(
 )
 
 
-def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, command: str = "") -> None:
+def write_comparison(
+    folder: str | os.PathLike[str], comparison: Comparison, command: str = "", spins: Spins | None = None
+) -> None:
     """Write the report of a comparison: ``index.html``, PNG pictures and plots, ``results.json``.
 
     Parameters
@@ -98,6 +100,8 @@ def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, com
     comparison : Comparison
     command : str
         The command line, if there is one.
+    spins : simdtex.experiments.ising.Spins, optional
+        The Ising model under the same schedules.
 
     Raises
     ------
@@ -112,7 +116,14 @@ def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, com
         f"{cols} x {rows}, with {seeds} {'seeds' if seeds > 1 else 'seed'} each. A schedule decides which sites relax "
         "together. Equation (14) demands that no two of them are neighbours; every table says which schedules break it."
     )
-    write_report(folder, "Parallel schedules compared", lead, sections(comparison), comparison.results(), command)
+    parts, results = sections(comparison), comparison.results()
+    if spins:
+        parts.append(ising_section(spins))
+        results["ising"] = {
+            "findings": [vars(one) for one in spins.findings],
+            "conclusion": conclusion(spins.findings),
+        }
+    write_report(folder, "Parallel schedules compared", lead, parts, results, command)
 
 
 def sections(comparison: Comparison) -> list[Section]:
@@ -298,43 +309,16 @@ def conclusion(found: Sequence[Finding]) -> list[str]:
     return [sentence.format(", ".join(names)) for sentence, names in said.items() if names]
 
 
-def results(found: Sequence[Finding], runs: Sequence[Chains], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the numbers for JSON; only ``seconds`` differ from run to run."""
-    counts = ("independent", "steps", "relaxations", "launches", "seconds")
-    return {
-        "settings": settings,
-        "findings": [vars(one) for one in found],
-        "runs": {run.schedule: {name: getattr(run, name) for name in counts} for run in runs},
-        "conclusion": conclusion(found),
-    }
-
-
-def write_ising(
-    folder: str | os.PathLike[str],
-    found: Sequence[Finding],
-    runs: Sequence[Chains],
-    pictures: Sequence[Chains],
-    settings: dict[str, Any],
-    command: str,
-) -> None:
-    """Write the report.
-
-    ``found`` are the findings of ``runs``; ``pictures`` have one chain each, at one temperature, from a random start;
-    and the ``settings`` of the experiment are written to ``results.json``.
-    """
-    sections = [
-        Section("Result", ["\n\n".join(conclusion(found)), *ising_tables(found), _energy(found)]),
-        Section("Two interleaved lattices", [_lattices(pictures)]),
-        Section("The runs", [_work(runs, settings)]),
-    ]
+def ising_section(spins: Spins) -> Section:
+    """Return the section on the Ising model: which schedules sample its distribution."""
     lead = (
         "Heat-bath Ising spins are relaxed by each schedule, and the energy per spin is compared with its exact value "
         "on this very torus (Kaufman 1949). The conditional distributions are those of the Ising model under every "
         "schedule, so any deviation is due to the schedule."
     )
-    write_report(
-        folder, "Which schedules sample the Ising model?", lead, sections, results(found, runs, settings), command
-    )
+    found = spins.findings
+    text = "\n\n".join([lead, *conclusion(found)])
+    return Section("The Ising model", [text, *ising_tables(found), _energy(found), _lattices(spins.pictures)])
 
 
 def ising_tables(found: Sequence[Finding]) -> list[Table]:
@@ -364,21 +348,6 @@ def _row(one: Finding) -> dict[str, str]:
         "|m|": f"{one.magnetisation:.4f}",
         "Neighbours": f"{one.neighbours:z.3f}",
     }
-
-
-def _work(runs: Sequence[Chains], settings: dict[str, Any]) -> Table:
-    rows = [
-        {
-            "Schedule": run.schedule,
-            "Steps": f"{run.steps:,}",
-            "Relaxations in a chain": f"{run.relaxations:,}",
-            "Launches": f"{run.launches:,}",
-            "Seconds": f"{run.seconds:.1f}",
-        }
-        for run in runs
-    ]
-    texts = {k: " and ".join(map(str, v)) if isinstance(v, (list, tuple)) else v for k, v in settings.items()}
-    return Table("Work", rows, ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in texts.items()))
 
 
 def _energy(found: Sequence[Finding]) -> Figure:
