@@ -29,7 +29,7 @@ import simdtex
 from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
-from simdtex.distributed.tasks import context
+from simdtex.distributed.turns import context
 
 RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "stores.csv"
 

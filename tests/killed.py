@@ -78,7 +78,7 @@ def finished(job, longest, rng, left):
 
 def main(wanted, seed, names):
     if "tiles" in names:  # loaded once, and not by each child
-        from simdtex.distributed import cluster, tiling  # noqa: F401
+        from simdtex.distributed import cluster, turns  # noqa: F401
     rng = np.random.default_rng(seed)
     counts = {"kills": 0, "runs": 0, "wrong": []}
     expected, took = {}, {}

@@ -16,8 +16,7 @@ from simdtex import distributed
 from simdtex.distributed import store as store_module
 from simdtex.distributed.layout import planned
 from simdtex.distributed.store import Store, cut
-from simdtex.distributed.tasks import do
-from simdtex.distributed.tiling import Tiles
+from simdtex.distributed.turns import Tiles, do
 from simdtex.driver import drive
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.algorithm import Run
@@ -159,7 +158,7 @@ def test_one_process_at_a_time_leads(tmp_path):
 @pytest.mark.parametrize(("most", "side"), [(1024, (14, 15)), (8, (7, 8))])
 def test_progress_tells_every_tile(tmp_path, monkeypatch, most, side):
     """The picture of a large level is every n-th site."""
-    monkeypatch.setattr("simdtex.distributed.tiling.SHOWN", most)
+    monkeypatch.setattr("simdtex.distributed.turns.SHOWN", most)
     seen = []
 
     def callback(progress):

@@ -11,7 +11,7 @@ import simdtex
 from simdtex import distributed
 from simdtex.distributed import layout
 from simdtex.distributed.store import Store
-from simdtex.distributed.tasks import context
+from simdtex.distributed.turns import context
 from simdtex.io import files
 from simdtex.methods.mrf.tiles import Tally
 

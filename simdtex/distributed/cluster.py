@@ -13,8 +13,7 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from simdtex.distributed.store import Store, Turn
-from simdtex.distributed.tasks import do
-from simdtex.distributed.tiling import Execute
+from simdtex.distributed.turns import Execute, do
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
 from simdtex.options import require, whole

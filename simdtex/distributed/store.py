@@ -4,7 +4,7 @@
     image, source    the output and its source map, and further maps by their names, written tile by tile at the end
     checksums        the checksum of each chunk of those, in the order of the attribute ``arrays`` of ``simdtex``
     work/            removed at the end
-        run          the plan (`simdtex.distributed.description`), conditioning data between sites of levels, and maps
+        run          the plan (`described`), conditioning data between sites of levels, and maps
         turn         the current turn, and the penalty of each candidate during it
         begun0       the turn that began level 0; likewise for each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
@@ -32,7 +32,7 @@ import re
 import secrets
 import shutil
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -45,16 +45,59 @@ import zarr.codecs
 import zarr.storage
 from numpy.typing import NDArray
 
+from simdtex import schedules
 from simdtex.checkpoint import read_state, write_state
-from simdtex.distributed.description import described, restored
 from simdtex.distributed.layout import Arrays, Layout, LevelLayout, Maps, further, planned
 from simdtex.io.files import Damaged, write_durable
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
+from simdtex.methods.mrf.options import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
-from simdtex.model.lattice import Grid
+from simdtex.model.guide import Planes
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import Lattice, Phases
 from simdtex.model.sample import Sample
+from simdtex.model.scale import Scale
 from simdtex.ops.neighbourhood import Confidences, Field
+from simdtex.options import resolve
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The planes of a guide for the sample, in working levels (G, rows, cols) for each picture."""
+
+    samples: list[NDArray[np.uint16]]
+
+    @property
+    def channels(self) -> int:
+        """Number of planes."""
+        return len(self.samples[0])
+
+    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+        """Return the planes unchanged, and no planes of the output."""
+        return Planes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
+
+
+def described(plan: Plan) -> dict[str, Any]:
+    """Return a plan as a tree for `simdtex.checkpoint.pack`, without conditioning data of the output."""
+    pictures = plan.sample.pictures
+    arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
+    sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided), "phases": plan.sample.phases}
+    return {"shape": plan.shape, "levels": plan.levels, "options": asdict(plan.options), **arrays, **sample}
+
+
+def restored(tree: dict[str, Any]) -> Plan:
+    """Return the plan of a tree from `described`, without conditioning data of the output."""
+    options = resolve(Options, "synth", tree["options"])
+    unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
+    pictures = options.of(Pictures(tuple(tree["pixels"]), unknown, usable))
+    guides = [Ready(tree["guides"])] if tree["guides"] else []
+    phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
+    sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
+    schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)
+    return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"])
+
 
 FORMAT = 8
 """Format of the store; all other formats are rejected."""

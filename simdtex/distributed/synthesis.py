@@ -175,7 +175,7 @@ def resume(
     """
     opened = _opened(store)
     from simdtex.distributed.cluster import across, check_workers, connected, here
-    from simdtex.distributed.tiling import Tiles
+    from simdtex.distributed.turns import Tiles
 
     check_workers(workers, device)
     with exclusive(store):
