@@ -11,6 +11,7 @@ import sys
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class Kept:
         try:
             with np.load(io.BytesIO(self._file(name).read_bytes()), allow_pickle=False) as found:
                 return [found[str(n)] for n in range(len(found) - 1)], str(found["text"])
-        except (OSError, ValueError, KeyError, EOFError):
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
             return None  # another process removed it, or it is damaged
 
     def _make(self, name, make):

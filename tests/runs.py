@@ -249,12 +249,12 @@ GIBBS, OPEN = {"relaxation": "gibbs", "bandwidth": 0.4}, {"boundary": "open"}
 DRAWN = {"relaxation": "gibbs", "pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1}
 DENSITY = BARE | DRAWN | {"coherence": 1.0}
 TWO = {"samples": ((9, 11), (8, 7))}
-TOGETHER = ("coloring-fixed", "synchronous", "checkerboard", "block:3x4", "luby", "random-subset:0.3")
 F4 = {"dtype": np.float32}
 
 RUNS = {
     # levels, orders, types, borders
     "defaults": textures(samples=((9, 10),), shape=(3, 4)),
+    "overview": textures({"order": 2, "overview": 20}, samples=((20, 19),), shape=(9, 10)),
     "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
     "overview-whole": textures({"order": 1, "edges": "whole", "phases": "all"}, samples=((20, 19),), shape=(9, 8)),
     "paper": textures({"preset": "paper", "order": 2}),
@@ -289,8 +289,8 @@ RUNS = {
     "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(5, 6), **F4),
     # schedules
     **{
-        name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),), tiles=4 * (name == "coloring-fixed"))
-        for name in TOGETHER
+        name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),))
+        for name in ("coloring-fixed", "synchronous", "checkerboard", "block:3x4", "luby", "random-subset:0.3")
     },
     "synchronous-exact": textures(EXACT | {"levels": 1, "xi": -2.0, "schedule": "synchronous"}, samples=((9, 10),)),
     "block-exact": textures(EXACT | OPEN | {"levels": 1, "xi": -2.0, "schedule": "block:3x4"}, shape=(7, 5)),
@@ -376,7 +376,7 @@ RUNS = {
     "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
     "volume-exact": volume((4, 7, 8), search="exact", relaxation="gibbs", edges="whole", order=1),
     "volume-grey": volume(
-        training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=5, phases="all"
+        (4, 8, 9), training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=3, phases="all"
     ),
     "volume-data": volume((8, 14, 15), given=lambda: {"known": wells((8, 14, 15))}, levels=3),
     "volume-data-exact": volume((6, 8, 9), given=lambda: {"known": wells((6, 8, 9))}, search="exact"),

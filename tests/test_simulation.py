@@ -67,19 +67,6 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
         assert_same_bits(values, own)
 
 
-def test_guides_and_masks_are_those_of_synthesize():
-    guide = texture((16, 20), seed=7), texture(SHAPE, seed=8)
-    mask = np.zeros((16, 20), bool)
-    mask[:, :12] = True
-    found = simulate(n=1, guide=guide, mask=mask, finish=0.0)
-    own = simdtex.synthesize(
-        TRAINING, SHAPE, rng=int(found.seed[0]), guide=guide, mask=mask, finish=0.0, order=2, device="reference",
-        **OWN,
-    )  # fmt: skip
-    assert_same_bits(found.values[0], own)
-    assert np.isin(found.values, TRAINING[:, :12]).all()
-
-
 def test_seeds_are_apart_and_stay_what_they_are():
     seeds = [realisation_seed(seed, number) for seed in (0, 1, 2**64 - 1) for number in range(50)]
     assert len(set(seeds)) == 150
