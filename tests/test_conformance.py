@@ -97,7 +97,7 @@ def test_a_run_that_is_stopped_has_the_same_end(reference, tmp_path, name):
     assert json.loads(found[1]) == json.loads(expected[1])
 
 
-@pytest.mark.parametrize("name", ["more", "luby", "multires", "pyramid-colour", "classify"])
+@pytest.mark.parametrize("name", ["more", "array", "multires", "pyramid-colour", "classify"])
 def test_a_run_that_is_stopped_on_a_device_has_the_same_end(machine, reference, tmp_path, name):
     found, stops = stopped_and_resumed(name, tmp_path / "run", machine)
     assert stops

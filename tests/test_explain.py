@@ -14,7 +14,7 @@ from simdtex.model.guide import UNKNOWN
 BRICK = data.brick()[:24, :24]
 EXPLAINED = (
     *("more", "more-levels", "more-whole", "more-gibbs", "paper", "density-colour", "random-scan", "block-exact"),
-    *("synchronous-exact", "labels", "grey-guide", "known-open", "gaps", "several", "lattice-exact", "novelty-exact"),
+    *("labels", "grey-guide", "known-open", "gaps", "several", "lattice-exact", "novelty-exact"),
 )
 """Runs of the table: with every search and relaxation, several schedules, and every cost."""
 
