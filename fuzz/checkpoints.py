@@ -63,7 +63,7 @@ def inputs():
 
 
 def files():
-    """Return the files of the present folder without the checkpoint; of an npz, which has the time in it, its arrays."""
+    """Return the files here without the checkpoint; of an npz, which has the time in it, its arrays."""
     found = {}
     for path in sorted(Path().rglob("*")):
         if path.suffix == ".npz":
