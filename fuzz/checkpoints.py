@@ -24,7 +24,7 @@ from click.testing import CliRunner
 
 from benchmarks.common import command
 from fuzz.damage import Ends, damaged, put
-from fuzz.lines import OTHERS, Maker
+from fuzz.lines import METHOD_OF, OTHERS, Maker
 from fuzz.record import write
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint
@@ -136,11 +136,10 @@ def damage(name, given, expected, chosen, rng, count, ends):
 def other_options(name, words, given, kept, rng, draws, ends):
     """Give a command with one more option to checkpoints of the one without."""
     samples = [word for word in words[1:3] if word.endswith(".png")]
-    methods = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier", "multires": "multires"}
     options = [one for one in load(words[0]).params if isinstance(one, click.Option) and one.name not in FREE]
     for option in (option for option in options for _ in range(draws)):
         maker = Maker(rng)
-        maker.method = methods.get(name, "pyramid" if name == "pyramid" else "mrf")
+        maker.method = METHOD_OF.get(name, name if name in ("multires", "pyramid") else "mrf")
         line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], words[0], True), *ALWAYS]
         clear(given, maker.files)
         before = files()
