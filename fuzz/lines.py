@@ -71,7 +71,7 @@ DEEP = {"synth": 0.6, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
 OUTPUTS = {
     "solid": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
     **dict.fromkeys(
-        ("simulate", "estimate"), ("out.zarr", *(f"out.{s}" for s in "nc npz gslib sgems png".split()), "out")
+        ("simulate", "estimate"), ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out")
     ),
     **dict.fromkeys(("schedules", "demo"), ("out",)),
     "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
