@@ -353,7 +353,7 @@ DIRECTIONS = {
 def solid(making):
     """Two blocks as one sees them."""
     blocks = [making.block(making.crop(sample), 96)[0] for sample in ISOTROPIC.values()]
-    return common.png(np.concatenate([view(block, size=max(96, making.small(192))) for block in blocks]))
+    return common.png(np.concatenate([view(block, size=max(96, making.small(288))) for block in blocks]))
 
 
 def plane(volume, name, depth):

@@ -1,6 +1,6 @@
 """The memory that is available, the checks before a run, and that a run takes no more than checked."""
 
-import importlib.util
+import importlib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -152,10 +152,9 @@ def test_a_limit_of_counting_says_what_is_counted(shape, values):
 
 
 def benchmark():
-    spec = importlib.util.spec_from_file_location("memory_benchmark", ROOT / "benchmarks" / "memory.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "benchmarks")
+        return importlib.import_module("memory")
 
 
 @pytest.mark.slow
