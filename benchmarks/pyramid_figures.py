@@ -72,10 +72,13 @@ FAILURES = {
 """Textures with structures beyond them, and of what kind they are."""
 
 
+def given(machine, sample):
+    return {"channel_axis": common.axis(sample), "rng": 1, "device": machine, "full_output": True}
+
+
 def run(machine, sample, side, **options):
     """An image of a side and the output of its run."""
-    given = {"channel_axis": common.axis(sample), "rng": 1, "device": machine, "full_output": True}
-    return simdtex.synthesize(sample, (side, side), **given | options)
+    return simdtex.synthesize(sample, (side, side), **given(machine, sample) | options)
 
 
 @dataclass
@@ -99,14 +102,13 @@ class Making:
         return image, output.statistics["iterations"]
 
     def mix(self, inputs, side, **options):
-        pictures = [self.crop(picture) for picture in inputs]
-        given = {"channel_axis": common.axis(inputs[0]), "rng": 1, "device": self.machine}
-        return simdtex.mix(pictures, (self.small(side),) * 2, **given | options)
+        pictures, options = [self.crop(one) for one in inputs], given(self.machine, inputs[0]) | options
+        return simdtex.mix(pictures, (self.small(side),) * 2, **options)[0]
 
     def block(self, sample, side, **options):
         """A block and the reports of its iterations."""
-        given = {"channel_axis": common.axis(sample), "rng": 1, "device": self.machine, "full_output": True}
-        block, output = simdtex.synthesize_solid(sample, (self.small(side),) * 3, **given | options)
+        shape, options = (self.small(side),) * 3, given(self.machine, sample) | options
+        block, output = simdtex.synthesize_solid(sample, shape, **options)
         return block, output.statistics["iterations"]
 
     def decompose(self, sample, levels, boundary="open"):
@@ -351,7 +353,7 @@ DIRECTIONS = {
 def solid(making):
     """Two blocks as one sees them."""
     blocks = [making.block(making.crop(sample), 96)[0] for sample in ISOTROPIC.values()]
-    return common.png(np.concatenate([view(block, size=max(96, making.small(192))) for block in blocks]))
+    return common.png(np.concatenate([view(block, size=max(96, making.small(288))) for block in blocks]))
 
 
 def plane(volume, name, depth):

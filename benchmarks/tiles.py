@@ -135,10 +135,12 @@ def turn_of_a_tile(pixels, side, device):
 def task_of_the_leader():
     """Seconds that the leader takes for a task."""
     with connected(1) as client:
-        for count in (100, 2000):
-            tasks = [client.submit(nothing, number, pure=False) for number in range(count)]
-            seconds = common.timed(client.gather, tasks)[1]
-        return seconds / 2000
+
+        def done(count):
+            client.gather([client.submit(nothing, number, pure=False) for number in range(count)])
+
+        done(100)
+        return common.timed(done, 2000)[1] / 2000
 
 
 def note_and_turn_of_the_leader(pixels, side):

@@ -210,20 +210,8 @@ def research():
 
 
 WISHES = (
-    balance,
-    novelty,
-    structure,
-    order,
-    period,
-    finish,
-    tile,
-    hole,
-    some,
-    proportions,
-    shares,
-    methods,
-    alpha,
-    paper,
+    *(balance, novelty, structure, order, period, finish, tile, hole, some),
+    *(proportions, shares, methods, alpha, paper),
 )
 READERS = (materials, maps, geoscience)
 

@@ -19,7 +19,6 @@ from skimage import data
 import simdtex
 from simdtex.io.image import write
 from simdtex.model.display import source_colours, temperature_colours
-from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, magnified
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -48,9 +47,6 @@ maps = [
 ]
 contact_sheet(maps, folder / "candidates.png", columns=4)
 
-# Arrange another map of the material by the source map, and show the source map in false colours.
-height = gravel.astype(np.uint16) * 257
-write(folder / "texture.png", texture)
-write(folder / "height.png", apply_source_map(output.source, height, gravel.shape))
+# Show in false colours where each of its pixels is from.
 write(folder / "source.png", source_colours(output.source, gravel.shape))
-print(f"sheet.png, candidates.png, texture.png, height.png and source.png are in {folder}")
+print(f"sheet.png, candidates.png and source.png are in {folder}")

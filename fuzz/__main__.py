@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run `simdtex` with random command lines and damaged files, and check the results.
 
-    python -m fuzz [--minutes 10 | --tries N] [--seed 1] [--workers N] [--record]
+    python -m fuzz [--minutes 10 | --tries N] [--seed 1] [--workers N] [--device TEXT] [--out build/fuzz] [--record]
     python -m fuzz --replay FILE
 
 A try passes if it ends with exit code 0, or with 2 and one sentence, within 10 s and 1 GiB, changes no input, leaves no
 temporary file and writes nowhere else. Each different fault is written once to build/fuzz, with its command and files.
+``--device`` is that of tries that name none; ``--record`` writes docs/fuzzing/lines.csv.
 """
 
-import argparse
 import itertools
 import json
 import os
@@ -16,67 +16,51 @@ import sys
 import time
 from pathlib import Path
 
-RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "lines.csv"
+from benchmarks.common import command
+from fuzz import pool
+from fuzz.record import Record, write
+
+OUT = Path("build") / "fuzz"
 
 
-def replay(path, device):
-    """Run the try of a file, and print what is wrong with it."""
-    from fuzz import pool
-
-    kept = json.loads(path.read_text())
-    answers = []
-    pool.run(iter([kept["try"]]), 1, lambda _, answer: answers.append(answer), device)
-    result = answers[0][2]
-    print(kept["command"])
+def show(path, result):
+    """Print the command of a try and what is wrong with it."""
+    print(json.loads(path.read_text())["command"])
     print(result["said"], end="")
     print(f"exit code {result['code']}, {result['seconds']:.2f} s, {result['bytes'] / 2**20:.0f} MiB")
     for what, text in result["faults"]:
         print(f"{what}: {text}")
-    return bool(result["faults"])
 
 
-def main():
-    parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--tries", type=int, help="the number of tries, however long they take")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--device", default="reference", help="the device of tries that name none")
-    parser.add_argument("--out", type=Path, default=Path("build/fuzz"), metavar="DIR")
-    parser.add_argument("--record", action="store_true", help="write docs/fuzzing/lines.csv")
-    parser.add_argument("--replay", type=Path, metavar="FILE", help="run the try of a file, and say what is wrong")
-    options = parser.parse_args()
-    if options.replay:
-        return replay(options.replay, options.device)
-    from fuzz import pool
-    from fuzz.lines import made
-    from fuzz.record import Record, write_counts
+def questions(seed, tries, end):
+    """Yield the seed and the number of each try."""
+    for number in itertools.count() if tries is None else range(tries):
+        if tries is None and time.monotonic() > end:
+            return
+        yield {"seed": seed, "number": number}
 
-    record = Record(options.seed, options.out)
-    end = time.monotonic() + 60 * options.minutes
 
-    def questions():
-        for number in itertools.count():
-            if number == options.tries or (options.tries is None and time.monotonic() > end):
-                return
-            yield {"seed": options.seed, "number": number}
+@command
+def main(minutes=10.0, tries=int, seed=1, workers=int, device="reference", out=OUT, record=False, replay=Path):
+    kept = Record(seed, out)
 
-    def took(question, answer):
-        record.add(lambda: made(question["seed"], question["number"]), *answer)
+    def took(question, result):
+        kept.add(pool.asked(question), result)
         if sys.stderr.isatty():
-            print(f"\r{record.tries} tries, {len(record.first)} faults ", end="", file=sys.stderr, flush=True)
+            print(f"\r{kept.tries} tries, {len(kept.files)} faults ", end="", file=sys.stderr, flush=True)
 
-    pool.run(questions(), options.workers, took, options.device)
-    found = record.results()
-    print("\n".join(f"{what}: {number}" for what, number in found.items() if what != "faults"))
-    for fault in found["faults"]:
-        print(f"{fault['tries']:6} {fault['kind']}: {fault['text']}")
-        print(f"       python -m fuzz --replay {fault['file']}")
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "fuzz.json").write_text(json.dumps(found, indent=1) + "\n")
-    if options.record:
-        write_counts(RECORD, record.counts())
-    return bool(record.faults)
+    if replay:
+        results = []
+        pool.run(iter([json.loads(replay.read_text())["try"]]), 1, lambda _, result: results.append(result), device)
+        show(replay, results[0])
+        return bool(results[0]["faults"])
+    pool.run(questions(seed, tries, time.monotonic() + 60 * minutes), workers or os.cpu_count(), took, device)
+    print("\n".join(f"{what}: {number}" for what, number in kept.counts().items()))
+    for (what, text), count in kept.faults.most_common():
+        print(f"{count:6} {what}: {text}\n       python -m fuzz --replay {kept.files[what, text]}")
+    if record:
+        write("lines.csv", [("what", "how many"), *kept.counts().items()])
+    return bool(kept.faults)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage the checkpoints of every command, go on with other options, and check the result.
 
-    python -m fuzz.checkpoints [--damages 20] [--draws 2] [--seed 1] [--record] [COMMAND...]
+    python -m fuzz.checkpoints [--damages 20] [--draws 2] [--moments 3] [--seed 1] [--record] [--commands NAME ...]
 
-Each command runs once, and its checkpoint is kept after every write. A checkpoint is cut, emptied or removed, or a bit
-of it is flipped, and `simdtex resume` goes on: it writes the files of a run that was never stopped, or ends with exit
-code 2, one sentence and no file. Then the command is given again with one more option, as drawn by `fuzz.lines`: it is
-refused in one sentence and the checkpoint is as it was, or it writes the files that it writes without a checkpoint.
+Each command runs once, and its checkpoint is kept after every write. As many states as ``--moments`` are emptied,
+removed, cut ``--damages`` times, and a bit of them is flipped as often, and `simdtex resume` goes on: it writes the
+files of a run that was never stopped, or ends with exit code 2, one sentence and no file. Then the command is given
+again with one more option, as drawn by `fuzz.lines` ``--draws`` times: it is refused in one sentence and the checkpoint
+is as it was, or it writes the files that it writes without a checkpoint.
 """
 
-import argparse
-import json
 import random
 import shutil
 import sys
 import tempfile
 import warnings
-from collections import Counter
 from contextlib import chdir
 from pathlib import Path
 
@@ -24,30 +22,33 @@ import click
 import numpy as np
 from click.testing import CliRunner
 
-from fuzz.lines import OTHERS, Maker
+from benchmarks.common import command
+from fuzz.damage import Ends, damaged, put
+from fuzz.lines import METHOD_OF, OTHERS, Maker
+from fuzz.record import write
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint
-from simdtex.cli import load, main
+from simdtex.cli import load
+from simdtex.cli import main as simdtex
 from simdtex.io import image
 
-RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "checkpoints.csv"
-
-SIZED = ("--size", "14x13")
-SHORT = ("--order", "1", "--levels", "2", "--xi", "-6")
+SHORT = "--order 1 --levels 2 --xi -6 --source-map where.npz"
 RUNS = {
-    "synth": ("synth", "L.png", "-o", "out.png", *SIZED, *SHORT, "--source-map", "where.npz"),
-    "multires": ("synth", "RGB.png", "-o", "out.png", *SIZED, "--method", "multires"),
-    "pyramid": ("synth", "RGB.png", "-o", "out.png", *SIZED, "--method", "pyramid", "--iterations", "2"),
-    "fill": ("fill", "L.png", "-o", "out.png", "--mask", "hole.png", "--order", "1", "--levels", "1"),
-    "extend": ("extend", "L.png", "-o", "out.png", "--right", "3", "--order", "1"),
-    "mix": ("mix", "L.png", "M.png", "-o", "out.png", *SIZED, "--iterations", "2"),
-    "solid": ("solid", "L.png", "-o", "out.npz", "--size", "6", "--iterations", "2"),
-    "simulate": ("simulate", "L.png", "-o", "out.npz", *SIZED, "-n", "3", "--order", "1", "--jobs", "1"),
-    "classify": ("classify", "L.png", "-o", "out.png", "--texture", "a=L.png", "--texture", "b=M.png"),
+    "synth": f"synth L.png -o out.png --size 14x13 {SHORT}",
+    "multires": "synth RGB.png -o out.png --size 14x13 --method multires",
+    "pyramid": "synth RGB.png -o out.png --size 14x13 --method pyramid --iterations 2",
+    "fill": "fill L.png -o out.png --mask hole.png --order 1 --levels 1",
+    "extend": "extend L.png -o out.png --right 3 --order 1",
+    "mix": "mix L.png M.png -o out.png --size 14x13 --iterations 2",
+    "solid": "solid L.png -o out.npz --size 6 --iterations 2",
+    "simulate": "simulate L.png -o out.npz --size 14x13 -n 3 --order 1 --jobs 1",
+    "classify": "classify L.png -o out.png --texture a=L.png --texture b=M.png",
 }
 ALWAYS = ("--seed", "5", "--device", "reference", "--quiet")
-FREE = ("output", "checkpoint", "help", "seed", "device", "quiet")
+FREE = ("output", "checkpoint", "help", "seed", "device", "quiet", *OTHERS)
 """Options that are not changed, as they say where the result is, or are tried otherwise."""
+
+KEPT, KEEP = Path("kept"), ("--checkpoint", "kept")
 
 
 def inputs():
@@ -62,25 +63,35 @@ def inputs():
 
 
 def files():
-    """Return the files of the present folder; arrays as they are, since an npz has the time in it."""
+    """Return the files here without the checkpoint; of an npz, which has the time in it, its arrays."""
     found = {}
     for path in sorted(Path().rglob("*")):
         if path.suffix == ".npz":
             with np.load(path) as arrays:
                 found[str(path)] = {name: arrays[name].tobytes() for name in arrays.files}
-        elif path.is_file() and path.name != "kept":
+        elif path.is_file() and path != KEPT:
             found[str(path)] = path.read_bytes()
     return found
 
 
+def clear(given, more=()):
+    """Bring the present folder back to the files that it had, and some more."""
+    for path in Path().iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path.name not in given:
+            path.unlink()
+    for name in set(more) - set(given):
+        Path(name).write_bytes(more[name])
+
+
 def call(*words):
     """Call the command; return its exit code, standard error, and the traceback if there was one."""
-    done = CliRunner().invoke(main, [str(word) for word in words])
-    error = done.exception if not isinstance(done.exception, (SystemExit, type(None))) else None
-    return done.exit_code, done.stderr, error
+    done = CliRunner().invoke(simdtex, [str(word) for word in words])
+    return done.exit_code, done.stderr, None if isinstance(done.exception, SystemExit) else done.exception
 
 
-def moments(words):
+def states(words):
     """Run a command, and return its files and its checkpoint after every write."""
     kept, save = [], Checkpoint._write
 
@@ -90,157 +101,99 @@ def moments(words):
 
     Checkpoint._write = keeping
     try:
-        code, said, _ = call(*words, *ALWAYS, "--checkpoint", "kept")
+        code, said, _ = call(*words, *ALWAYS, *KEEP)
     finally:
         Checkpoint._write = save
     assert code == 0, said
     return files(), kept
 
 
-def damages(data, rng, count):
-    """Yield how a checkpoint is damaged, and its content; None if it is removed."""
-    yield "emptied", b""
-    yield "removed", None
-    for _ in range(count):
-        at = rng.randrange(len(data))
-        yield f"cut at {at}", data[:at]
-        yield f"bit of {at}", data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :]
-
-
-class Place:
-    """A folder with the inputs, to which it is brought back."""
-
-    def __init__(self):
-        inputs()
-        self.given = files()
-
-    def clear(self, more=None):
-        for path in Path().iterdir():
-            if path.is_dir():
-                shutil.rmtree(path)
-            elif path.name not in self.given:
-                path.unlink()
-        for name, data in (more or {}).items():
-            if name not in self.given:
-                Path(name).write_bytes(data)
-
-
-def refused(code, said, error, before):
+def refused(answer, before, data):
     """Return what is wrong with a refusal."""
+    code, said, error = answer
     if error is not None:
         return f"traceback {type(error).__name__}: {error}"
     if code != 2 or len(said.strip().splitlines()) != 1:
         return f"exit code {code}: {said.strip()}"
-    return "" if files() == before else "files were written"
+    if files() != before:
+        return "files were written"
+    return "the checkpoint was changed" if data is not None and KEPT.read_bytes() != data else ""
 
 
-def damaged(name, place, given, rng, count):
-    """Go on with damaged checkpoints of a command; return how often it was said, and faults."""
-    words, ends, faults = RUNS[name], Counter(), []
-    place.clear()
-    expected, kept = moments(words)
-    for data in rng.sample(kept, min(given.moments, len(kept))):
-        for what, content in damages(data, rng, count):
-            place.clear()
-            if content is not None:
-                Path("kept").write_bytes(content)
-            before, answer = files(), call("resume", "kept")
-            if answer[0] == 0:
-                wrong = "" if files() == expected else "other files"
-            else:
-                wrong = refused(*answer, before)
-                if not wrong and content is not None and Path("kept").read_bytes() != content:
-                    wrong = "the checkpoint was changed"
-            ends["fault" if wrong else "went on" if answer[0] == 0 else "said"] += 1
-            faults += [f"{name}, {what}: {wrong}"] * bool(wrong)
-    return ends, faults
+def damage(name, given, expected, chosen, rng, count, ends):
+    """Go on with damaged checkpoints of a command."""
+    for data in chosen:
+        for how in ("empty", "remove", *("cut", "bit") * count):
+            clear(given)
+            content = damaged(data, how, rng)
+            put(KEPT, content)
+            answer = call("resume", KEPT)
+            done = answer[0] == 0
+            fault = ("" if files() == expected else "other files") if done else refused(answer, given, content)
+            ends.add("damage", "went on" if done else "said", fault and f"{name}, {how}: {fault}")
 
 
-def other_options(name, place, given, rng):
-    """Give commands with one more option to checkpoints of others; return how they ended, and faults."""
-    words, ends, faults = RUNS[name], Counter(), []
-    place.clear()
-    _, kept = moments(words)
-    samples = [word for word in words[1:3] if word.endswith(".png")][: 2 if name == "mix" else 1]
-    for option in load(words[0]).params:
-        if not isinstance(option, click.Option) or option.name in (*FREE, *OTHERS):
-            continue
-        for _ in range(given.draws):
-            maker = Maker(rng)
-            methods = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier"}
-            maker.method = methods.get(name, name if name in ("multires", "pyramid") else "mrf")
-            more = maker.option(option, samples, words[0], True)
-            line = [*words, *more, *ALWAYS]
-            place.clear(maker.files)
-            before = files()
-            fresh = call(*line)
-            expected = files()
-            place.clear(maker.files)
-            data = kept[rng.randrange(len(kept))]
-            Path("kept").write_bytes(data)
-            code, said, error = call(*line, "--checkpoint", "kept")
-            if code == 0:
-                found = files()
-                wrong = [path for path in {**found, **expected} if found.get(path) != expected.get(path)]
-                if option.name == "stages":  # those from there on
-                    wrong = [path for path in wrong if path in found]
-                elif option.name == "report":  # which has the time in it
-                    wrong = [path for path in wrong if Path(path).name not in ("index.html", "results.json")]
-                wrong = "" if fresh[0] == 0 and not wrong else f"other files than without a checkpoint: {wrong}"
-                end = "went on" if not wrong else "fault"
-            else:
-                wrong = refused(code, said, error, before)
-                if not wrong and Path("kept").read_bytes() != data:
-                    wrong = "the checkpoint was changed"
-                if not wrong and fresh[0] == 0 and "another" not in said and "--" not in said:
-                    wrong = f"no reason: {said.strip()}"
-                end = "fault" if wrong else "refused" if fresh[0] == 0 else "wrong anyway"
-            ends[end] += 1
-            if given.verbose and end in ("went on", "refused"):
-                print(name, *more, end, said.strip())
-            faults += [f"{name} {' '.join(more)}: {wrong}"] * bool(wrong)
-    return ends, faults
+def other_options(name, words, given, kept, rng, draws, ends):
+    """Give a command with one more option to checkpoints of the one without."""
+    samples = [word for word in words[1:3] if word.endswith(".png")]
+    options = [one for one in load(words[0]).params if isinstance(one, click.Option) and one.name not in FREE]
+    for option in (option for option in options for _ in range(draws)):
+        maker = Maker(rng)
+        maker.method = METHOD_OF.get(name, name if name in ("multires", "pyramid") else "mrf")
+        line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], words[0], True), *ALWAYS]
+        clear(given, maker.files)
+        before = files()
+        valid = call(*line)[0] == 0
+        expected, data = files(), rng.choice(kept)
+        clear(given, maker.files)
+        put(KEPT, data)
+        answer = call(*line, *KEEP)
+        if answer[0] == 0:
+            found = files()
+            wrong = [path for path in {**found, **expected} if found.get(path) != expected.get(path)]
+            if option.name == "stages":  # those from there on
+                wrong = [path for path in wrong if path in found]
+            elif option.name == "report":  # which has the time in it
+                wrong = [path for path in wrong if Path(path).name not in ("index.html", "results.json")]
+            end, fault = "went on", "" if valid and not wrong else f"other files than without a checkpoint: {wrong}"
+        else:
+            end, fault = "refused" if valid else "wrong anyway", refused(answer, before, data)
+            if not fault and valid and "another" not in answer[1] and "--" not in answer[1]:
+                fault = f"no reason: {answer[1].strip()}"
+        ends.add("options", end, fault and f"{' '.join(line)}: {fault}")
 
 
-def run():
-    parser = argparse.ArgumentParser(prog="python -m fuzz.checkpoints", description=__doc__.splitlines()[0])
-    parser.add_argument("--damages", type=int, default=20, help="cuts and bits of each kept state")
-    parser.add_argument("--moments", type=int, default=3, help="kept states of each command that are damaged")
-    parser.add_argument("--draws", type=int, default=2, help="values of each option")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--record", action="store_true", help=f"write docs/fuzzing/{RECORD.name}")
-    parser.add_argument("--verbose", action="store_true", help="print each option that went on or was refused")
-    parser.add_argument("commands", nargs="*", default=list(RUNS))
-    given = parser.parse_args()
+COLUMNS = {
+    "states that were damaged": ("damage", None),
+    "of these refused in a sentence": ("damage", "said"),
+    "options that were added": ("options", None),
+    "of these refused by the checkpoint": ("options", "refused"),
+    "refused without a checkpoint too": ("options", "wrong anyway"),
+    "accepted: files as without a checkpoint": ("options", "went on"),
+}
+
+
+@command
+def main(damages=20, moments=3, draws=2, seed=1, record=False, commands=tuple(RUNS)):
     warnings.simplefilter("ignore")
     checkpoints.FIRST, checkpoints.SHARE = 0.0, 0
-    results = {}
+    rows, faults = [["run", *COLUMNS, "faults"]], 0
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        place = Place()
-        for name in given.commands:
-            rng = random.Random(f"{given.seed}-{name}")
-            damage, wrong = damaged(name, place, given, rng, given.damages)
-            options, more = other_options(name, place, given, rng)
-            results[name] = {"damage": damage, "options": options}
-            print(name, json.dumps(results[name]), flush=True)
-            for fault in wrong + more:
-                print(fault, flush=True)
-    if given.record:
-        columns = {
-            "states that were damaged": ("damage", ("went on", "said", "fault")),
-            "of these refused in a sentence": ("damage", ("said",)),
-            "options that were added": ("options", ("went on", "refused", "wrong anyway", "fault")),
-            "of these refused by the checkpoint": ("options", ("refused",)),
-            "refused without a checkpoint too": ("options", ("wrong anyway",)),
-            "accepted: files as without a checkpoint": ("options", ("went on",)),
-        }
-        lines = [",".join(f'"{one}"' for one in ("run", *columns, "faults"))]
-        for name, one in results.items():
-            counts = [sum(one[what].get(end, 0) for end in ends) for what, ends in columns.values()]
-            lines.append(",".join(map(str, (name, *counts, sum(ends.get("fault", 0) for ends in one.values())))))
-        RECORD.write_text("\n".join(lines) + "\n")
-    return any("fault" in ends for one in results.values() for ends in one.values())
+        inputs()
+        given = files()
+        for name in commands:
+            rng, ends, words = random.Random(f"{seed}-{name}"), Ends(), RUNS[name].split()
+            clear(given)
+            expected, kept = states(words)
+            damage(name, given, expected, rng.sample(kept, min(moments, len(kept))), rng, damages, ends)
+            other_options(name, words, given, kept, rng, draws, ends)
+            rows.append([name, *(ends.total(*column) for column in COLUMNS.values()), ends.faults])
+            print(*rows[-1], flush=True)
+            faults += ends.faults
+    if record:
+        write("checkpoints.csv", rows)
+    return bool(faults)
 
 
 if __name__ == "__main__":
-    sys.exit(run())
+    sys.exit(main())

@@ -7,15 +7,17 @@ import struct
 import zlib
 
 import numpy as np
+import tifffile
+from PIL import Image
 
 SIDE = 10
 """Rows and columns of the pictures."""
 
 
-def _saved(write):
-    """The bytes that a function writes to a file, or to a path where it wants one."""
+def _saved(write, *args, **options):
+    """The bytes that a function writes to a file."""
     file = io.BytesIO()
-    write(file)
+    write(file, *args, **options)
     return file.getvalue()
 
 
@@ -32,56 +34,71 @@ def _pixels(channels, dtype, rows=SIDE, cols=SIDE):
     return (values * (np.iinfo(dtype).max // 255)).astype(dtype)
 
 
+def _npy(values):
+    return _saved(np.save, values)
+
+
+def _tif(values, **options):
+    return _saved(tifffile.imwrite, values, **options)
+
+
+def _drawn(values, kind="png", **options):
+    picture = values if isinstance(values, Image.Image) else Image.fromarray(values)
+    return _saved(picture.save, kind, **options)
+
+
 def pictures():
     """Name -> bytes."""
-    from PIL import Image
-
     grey, rgb, rgba = (_pixels(n, np.uint8) for n in (1, 3, 4))
-    modes = {"L": grey[..., 0], "RGB": rgb, "RGBA": rgba}
+    grey, short = grey[..., 0], _pixels(1, np.uint16)[..., 0]
     made = {}
-    for mode, values in modes.items():
-        picture = Image.fromarray(values, mode)
-        made[f"{mode}.png"] = _saved(lambda file, p=picture: p.save(file, "png"))
-        made[f"{mode}.tif"] = _saved(lambda file, p=picture: p.save(file, "tiff"))
-        made[f"{mode}.webp"] = _saved(lambda file, p=picture: p.save(file, "webp", lossless=True))
-    colour, plain = Image.fromarray(rgb), Image.fromarray(grey[..., 0])
-    others = [Image.fromarray(np.roll(rgb, n, 0)) for n in range(1, 4)]
-    for name, picture, kind, options in (
-        ("jpeg.jpg", colour, "jpeg", {}),
-        ("grey.jpg", plain, "jpeg", {}),
-        ("colour.bmp", colour, "bmp", {}),
-        ("grey.gif", plain, "gif", {}),
-        ("animated.gif", colour, "gif", {"save_all": True, "append_images": others}),
-        ("animated.webp", colour, "webp", {"save_all": True, "append_images": others}),
-        ("animated.png", colour, "png", {"save_all": True, "append_images": others}),
-        ("lossy.webp", colour, "webp", {"quality": 50}),
-        ("palette.png", colour.quantize(8), "png", {}),
-        ("bits.png", plain.convert("1"), "png", {}),
-        ("sixteen.png", Image.fromarray(_pixels(1, np.uint16)[..., 0]), "png", {}),
-        ("lzw.tif", colour, "tiff", {"compression": "tiff_lzw"}),
-        ("packed.tif", plain, "tiff", {"compression": "packbits"}),
-    ):
-        made[name] = _saved(lambda file, p=picture, k=kind, o=options: p.save(file, k, **o))
-    made["alpha-hole.png"] = _holed(rgb)
+    for mode, values in {"L": grey, "RGB": rgb, "RGBA": rgba}.items():
+        for suffix, kind, options in (("png", "png", {}), ("tif", "tiff", {}), ("webp", "webp", {"lossless": True})):
+            made[f"{mode}.{suffix}"] = _drawn(values, kind, **options)
+    several = {"save_all": True, "append_images": [Image.fromarray(np.roll(rgb, n, 0)) for n in range(1, 4)]}
+    holed, alpha = _pixels(1, np.float32)[..., 0].copy(), np.full((SIDE, SIDE, 1), 255, np.uint8)
+    holed[2:5, 2:6], alpha[3:6, 3:7] = np.nan, 0
+    made |= {
+        "jpeg.jpg": _drawn(rgb, "jpeg"),
+        "grey.jpg": _drawn(grey, "jpeg"),
+        "colour.bmp": _drawn(rgb, "bmp"),
+        "grey.gif": _drawn(grey, "gif"),
+        **{f"animated.{kind}": _drawn(rgb, kind, **several) for kind in ("gif", "webp", "png")},
+        "lossy.webp": _drawn(rgb, "webp", quality=50),
+        "palette.png": _drawn(Image.fromarray(rgb).quantize(8)),
+        "bits.png": _drawn(Image.fromarray(grey).convert("1")),
+        "sixteen.png": _drawn(short),
+        "lzw.tif": _drawn(rgb, "tiff", compression="tiff_lzw"),
+        "packed.tif": _drawn(grey, "tiff", compression="packbits"),
+        "alpha-hole.png": _drawn(np.concatenate([rgb, alpha], -1)),
+    }
     for dtype in ("uint8", "uint16", "float32", "float64", "bool", "int16", "int64"):
-        made[f"{dtype}.npy"] = _saved(lambda file, d=dtype: np.save(file, _pixels(1, d)[..., 0]))
-        made[f"{dtype}-3.npy"] = _saved(lambda file, d=dtype: np.save(file, _pixels(3, d)))
-    holed = _pixels(1, np.float32)[..., 0].copy()
-    holed[2:5, 2:6] = np.nan
-    made["nan.npy"] = _saved(lambda file: np.save(file, holed))
-    made["fortran.npy"] = _saved(lambda file: np.save(file, np.asfortranarray(_pixels(1, np.uint8)[..., 0])))
-    made["big-endian.npy"] = _saved(lambda file: np.save(file, _pixels(1, np.uint16)[..., 0].astype(">u2")))
-    made["complex.npy"] = _saved(lambda file: np.save(file, np.ones((4, 4), complex)))
-    made["object.npy"] = _saved(lambda file: np.save(file, np.array([[None]]), allow_pickle=True))
-    made["empty.npy"] = _saved(lambda file: np.save(file, np.zeros((0, 5), np.uint8)))
-    made["constant.npy"] = _saved(lambda file: np.save(file, np.full((9, 9), 7, np.uint8)))
-    made["one.npy"] = _saved(lambda file: np.save(file, np.full((1, 1), 7, np.uint8)))
-    made["huge-values.npy"] = _saved(lambda file: np.save(file, _pixels(1, np.float64)[..., 0] * 1e308))
-    made["tiny-values.npy"] = _saved(lambda file: np.save(file, _pixels(1, np.float64)[..., 0] * 1e-320))
-    made["inf.npy"] = _saved(lambda file: np.save(file, np.full((6, 6), np.inf)))
-    made["labels.npy"] = _saved(lambda file: np.save(file, (_pixels(1, np.uint8)[..., 0] > 100).astype(np.uint8)))
-    made |= _tiffs()
-    return made
+        made[f"{dtype}.npy"], made[f"{dtype}-3.npy"] = _npy(_pixels(1, dtype)[..., 0]), _npy(_pixels(3, dtype))
+    arrays = {
+        "nan": holed,
+        "fortran": np.asfortranarray(grey),
+        "big-endian": short.astype(">u2"),
+        "complex": np.ones((4, 4), complex),
+        "object": np.array([[None]]),
+        "empty": np.zeros((0, 5), np.uint8),
+        "constant": np.full((9, 9), 7, np.uint8),
+        "one": np.full((1, 1), 7, np.uint8),
+        "huge-values": _pixels(1, np.float64)[..., 0] * 1e308,
+        "tiny-values": _pixels(1, np.float64)[..., 0] * 1e-320,
+        "inf": np.full((6, 6), np.inf),
+        "labels": (grey > 100).astype(np.uint8),
+    }
+    made |= {f"{name}.npy": _npy(values) for name, values in arrays.items()}
+    return made | {
+        "float32.tif": _tif(_pixels(1, np.float32)[..., 0]),
+        "float64.tif": _tif(_pixels(1, np.float64)[..., 0]),
+        "sixteen-3.tif": _tif(_pixels(3, np.uint16), photometric="rgb"),
+        "planar.tif": _tif(np.moveaxis(rgb, -1, 0), photometric="rgb", planarconfig="separate"),
+        "pages.tif": _tif(np.stack([grey] * 3), photometric="minisblack"),
+        "big.tif": _tif(grey, bigtiff=True),
+        "tiled.tif": _tif(_pixels(1, np.uint8, 32, 32)[..., 0], tile=(16, 16)),
+        "deflate.tif": _tif(grey, compression="zlib"),
+    }
 
 
 def grids():
@@ -97,43 +114,15 @@ def grids():
     }
 
 
-def _holed(rgb):
-    from PIL import Image
-
-    alpha = np.full((SIDE, SIDE, 1), 255, np.uint8)
-    alpha[3:6, 3:7] = 0
-    return _saved(lambda file: Image.fromarray(np.concatenate([rgb, alpha], -1)).save(file, "png"))
-
-
-def _tiffs():
-    import tifffile
-
-    made = {}
-    for name, values, options in (
-        ("float32.tif", _pixels(1, np.float32)[..., 0], {}),
-        ("float64.tif", _pixels(1, np.float64)[..., 0], {}),
-        ("sixteen-3.tif", _pixels(3, np.uint16), {"photometric": "rgb"}),
-        ("planar.tif", np.moveaxis(_pixels(3, np.uint8), -1, 0), {"photometric": "rgb", "planarconfig": "separate"}),
-        ("pages.tif", np.stack([_pixels(1, np.uint8)[..., 0]] * 3), {"photometric": "minisblack"}),
-        ("big.tif", _pixels(1, np.uint8)[..., 0], {"bigtiff": True}),
-        ("tiled.tif", _pixels(1, np.uint8, 32, 32)[..., 0], {"tile": (16, 16)}),
-        ("deflate.tif", _pixels(1, np.uint8)[..., 0], {"compression": "zlib"}),
-    ):
-        made[name] = _saved(lambda file, v=values, o=options: tifffile.imwrite(file, v, **o))
-    return made
-
-
 def masks():
     """Pictures of black and white of the same size."""
-    from PIL import Image
-
     mask = np.zeros((SIDE, SIDE), np.uint8)
     mask[3:6, 3:7] = 255
     return {
-        "hole.png": _saved(lambda file: Image.fromarray(mask).save(file, "png")),
-        "most.png": _saved(lambda file: Image.fromarray(255 - mask).save(file, "png")),
-        "black.png": _saved(lambda file: Image.fromarray(0 * mask).save(file, "png")),
-        "hole.npy": _saved(lambda file: np.save(file, mask > 0)),
+        "hole.png": _drawn(mask),
+        "most.png": _drawn(255 - mask),
+        "black.png": _drawn(0 * mask),
+        "hole.npy": _npy(mask > 0),
     }
 
 
@@ -156,19 +145,17 @@ def tables():
 
 def volumes():
     """Blocks in every format, 6 x 6 x 6."""
-    import tifffile
-
     block = np.stack([_pixels(1, np.uint8, 6, 6)[..., 0]] * 6)
     header = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 6 6 6\nencoding: %s\n%s\n"
     return {
-        "block.npy": _saved(lambda file: np.save(file, block)),
-        "block.npz": _saved(lambda file: np.savez_compressed(file, volume=block)),
-        "block.tif": _saved(lambda file: tifffile.imwrite(file, block, photometric="minisblack")),
+        "block.npy": _npy(block),
+        "block.npz": _saved(np.savez_compressed, volume=block),
+        "block.tif": _tif(block, photometric="minisblack"),
         "block.nrrd": header % (b"raw", b"") + block.tobytes(),
         "gzip.nrrd": header % (b"gzip", b"") + gzip.compress(block.tobytes(), mtime=0),
         "text.nrrd": header % (b"ascii", b"") + b" ".join(b"%d" % v for v in block.ravel()),
         "detached.nrrd": header % (b"raw", b"data file: ../beside/secret.raw\n"),
-        "three.npz": _saved(lambda file: np.savez(file, a=block, b=block)),
+        "three.npz": _saved(np.savez, a=block, b=block),
         "bomb.npz": _bomb(),
     }
 
@@ -176,11 +163,8 @@ def volumes():
 def _bomb():
     """An archive of half a mebibyte that opens to 512: pieces of zeros, packed once."""
     zeros, pieces = bytes(2**20), 512
-    head = _saved(
-        lambda file: np.lib.format.write_array_header_1_0(
-            file, {"descr": "|u1", "fortran_order": False, "shape": (pieces, 1024, 1024)}
-        )
-    )
+    told = {"descr": "|u1", "fortran_order": False, "shape": (pieces, 1024, 1024)}
+    head = _saved(np.lib.format.write_array_header_1_0, told)
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     packed = packer.compress(head) + packer.flush(zlib.Z_FULL_FLUSH)
     packed += (packer.compress(zeros) + packer.flush(zlib.Z_FULL_FLUSH)) * pieces + packer.flush()
@@ -207,30 +191,15 @@ def strange():
 
 def build():
     """Role -> name -> bytes; the same on every call."""
-    made = {
-        "picture": pictures(),
-        "mask": masks(),
-        "table": tables(),
-        "grid": grids(),
-        "volume": volumes(),
-        "strange": strange(),
-    }
+    roles = {"picture": pictures, "mask": masks, "table": tables, "grid": grids, "volume": volumes, "strange": strange}
+    made = {role: make() for role, make in roles.items()}
     made["picture"]["page.png"] = made["strange"]["page.eps"]
     return made
 
 
 WORDS = (
-    b"0",
-    b"-1",
-    b"nan",
-    b"inf",
-    b"1e308",
-    b"4294967295",
-    b"2147483648",
-    b"99999999999999999999",
-    b"",
-    b"\x00",
-    b"\xff",
+    *(b"0", b"-1", b"nan", b"inf", b"1e308", b"4294967295", b"2147483648", b"99999999999999999999"),
+    *(b"", b"\x00", b"\xff"),
 )
 NUMBERS = tuple(
     n.to_bytes(4, order) for n in (0, 1, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 10**9) for order in ("little", "big")
@@ -254,8 +223,7 @@ def mutated(rng, data, others):
             begin = rng.randrange(len(other) + 1)
             data[at : at + rng.randrange(64)] = other[begin : begin + rng.randrange(64)]
         elif kind == 3:
-            number = rng.choice(NUMBERS)
-            data[at : at + 4] = number
+            data[at : at + 4] = rng.choice(NUMBERS)
         elif kind == 4:
             data[at:at] = data[at : at + rng.randrange(40)] * rng.choice((1, 2, 50))
         elif kind == 5:

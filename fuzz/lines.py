@@ -15,23 +15,9 @@ from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.options import table
 
 COMMANDS = {
-    "synth": 48,
-    "fill": 12,
-    "tile": 5,
-    "extend": 6,
-    "maspar": 2,
-    "simulate": 8,
-    "estimate": 3,
-    "classify": 4,
-    "solid": 8,
-    "mix": 8,
-    "resume": 0.5,
-    "schedules": 0.1,
-    "devices": 0.1,
-    "demo": 0.05,
-    "bench": 0.05,
-    "": 0.2,
-    "nothing": 0.1,
+    **{"synth": 48, "fill": 12, "tile": 5, "extend": 6, "maspar": 2, "simulate": 8, "estimate": 3, "classify": 4},
+    **{"solid": 8, "mix": 8, "resume": 0.5, "schedules": 0.1, "devices": 0.1, "demo": 0.05, "bench": 0.05},
+    **{"": 0.2, "nothing": 0.1},
 }
 """Weight of each command; reports and their plots take long, so commands that always write one are rare."""
 
@@ -44,17 +30,13 @@ SIZES = (
 )
 
 MODEST = {
-    **dict.fromkeys(("order",), (1, 2, 4)),
+    "order": (1, 2, 4),
     **dict.fromkeys(("levels", "orientations", "iterations", "free_sweeps", "split"), (1, 2, 4)),
     **dict.fromkeys(("chance", "coarse_chance", "overview"), (0, 1, 4, 64)),
     **dict.fromkeys(("left", "right", "top", "bottom", "band", "reach"), (0, 1, 3)),
-    **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
     **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),
-    "seed": (0, 1, 2**63),
-    "exemplars": (16, 40),
-    "coupling": (0.5, 2),
-    "xi": (-1, -0.5, -5),
-    "tiles": (8, 12, 16),
+    **{"seeds": (2, 3), "sweeps": (2, 3), "seed": (0, 1, 2**63), "exemplars": (16, 40), "tiles": (8, 12, 16)},
+    **{"coupling": (0.5, 2), "xi": (-1, -0.5, -5)},
 }
 """Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
 
@@ -91,8 +73,19 @@ OUTPUTS = {
     **dict.fromkeys(
         ("simulate", "estimate"), ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out")
     ),
+    **dict.fromkeys(("schedules", "demo"), ("out",)),
     "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
 }
+
+NEEDED = {
+    "maspar": (0.9, "--array 4x4|8x8|3x5|16x16"),
+    "schedules": (1, "--seeds 1 --schedule coloring --order 1"),
+    "bench": (1, "--json no/such/file.json"),  # else it measures for minutes
+}
+"""Options that a command is given in a share of the tries, so that it takes no longer than others."""
+
+METHOD_OF = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier"}
+"""The method of commands that have one of their own."""
 
 
 @dataclass
@@ -177,20 +170,16 @@ class Maker:
         options = []
         for parameter in command.params:
             if isinstance(parameter, click.Argument):
-                count = (
-                    rng.choices((1, 2, 3), (8, 1, 1) if name != "mix" else (3, 3, 1))[0] if parameter.nargs < 0 else 1
-                )
+                few = (3, 3, 1) if name == "mix" else (8, 1, 1)
+                count = rng.choices((1, 2, 3), few)[0] if parameter.nargs < 0 else 1
                 role = "grid" if name in ("simulate", "estimate") and rng.random() < 0.3 else "picture"
                 words += [self.file(role) for _ in range(count)]
             else:
                 options.append(parameter)
         samples = words[:]
         words += ["-o", self.output(name)] if name not in ("devices", "bench", "resume") else []
-        words += (
-            ["--size", size]
-            if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
-            else []
-        )
+        if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3):
+            words += ["--size", size]
         if method and rng.random() < 0.03:
             method = "mrf"  # as without the option
         else:
@@ -200,12 +189,9 @@ class Maker:
             words += ["--mask", self.file("mask")]
         if name == "extend" and "--size" not in words:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
-        if name == "maspar" and rng.random() < 0.9:
-            words += ["--array", rng.choice(("4x4", "8x8", "3x5", "16x16"))]
-        if name == "schedules":
-            words += ["--seeds", "1", "--schedule", "coloring", "--order", "1"]
-        if name == "bench":  # which measures for minutes
-            words += ["--json", "no/such/file.json"]
+        share, needed = NEEDED.get(name, (1, ""))
+        if share == 1 or rng.random() < share:
+            words += [rng.choice(word.split("|")) if "|" in word else word for word in needed.split()]
         if name in ("simulate", "synth", "fill", "extend", "tile", "maspar") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
         if name == "classify" and rng.random() < 0.9:
@@ -217,7 +203,7 @@ class Maker:
         usual = [option for option in options if not taken & set(option.opts) and option.name not in OTHERS]
         if method and fitting:
             usual = [option for option in usual if _of_method(option, method)]
-        self.method = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier"}.get(name, method or "mrf")
+        self.method = METHOD_OF.get(name, method or "mrf")
         if fitting:
             useless = ("profile", *(("source_map", "also") if self.method == "pyramid" else ()))
             usual = [option for option in usual if option.name not in useless]
@@ -304,8 +290,6 @@ class Maker:
     def output(self, name):
         rng = self.rng
         names = OUTPUTS.get(name, OUTPUTS[""])
-        if name in ("schedules", "demo"):
-            names = ("out",)
         if rng.random() < 0.85:
             return names[0] if rng.random() < 0.5 else rng.choice(names)
         if self.files and rng.random() < 0.2:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pebble import ProcessExpired, ProcessPool
 
+from fuzz.lines import Try, made
 from fuzz.worker import DEMO, Worker
 
 GRACE = 3.0
@@ -26,42 +27,32 @@ def _start(root, device):
     _worker = Worker(Path(root) / str(os.getpid()), device)
 
 
-def _asked(question):
-    from fuzz.lines import Try, made
-
+def asked(question):
+    """Return the try of a question."""
     return made(question["seed"], question["number"]) if "seed" in question else Try.from_json(question)
 
 
 def _answer(question):
-    one = _asked(question)
-    return one.kind, one.args[:1], vars(_worker.run(one))
+    return vars(_worker.run(asked(question)))
 
 
 def _result(question, future):
-    """The kind of a try, its command and its result, also if its process was killed or died."""
+    """Return the result of a try, also if its process was killed or died."""
+    command = "".join(asked(question).args[:1])
     try:
         return future.result()
     except TimeoutError:
-        one = _asked(question)
-        fault = "time", one.args[0]
+        fault = "time", command
     except ProcessExpired as error:
-        one = _asked(question)
-        fault = "died", f"{one.args[0]}: exit code {error.exitcode}"
-    result = {"code": None, "said": "", "seconds": DEMO + GRACE, "bytes": 0, "faults": [fault]}
-    return one.kind, one.args[:1], result
+        fault = "died", f"{command}: exit code {error.exitcode}"
+    return {"code": None, "said": "", "seconds": DEMO + GRACE, "bytes": 0, "faults": [fault]}
 
 
 def run(questions, workers, took, device="reference"):
-    """Ask every question, and call ``took(question, answer)`` with each answer.
+    """Ask every question, and call ``took(question, result)`` with each result.
 
-    Parameters
-    ----------
-    questions : iterator
-        Of tries as dictionaries, or of dictionaries with the ``seed`` and ``number`` of one.
-    workers : int
-    took : callable
-    device : str
-        The device of tries that name none.
+    A question is a try as a dictionary, or the ``seed`` and ``number`` of one; the device is that of tries that name
+    none.
     """
     shared = "/dev/shm" if os.path.isdir("/dev/shm") else None
     with (

@@ -49,15 +49,8 @@ HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8,}|\.tmp\b|<[a-z_.]+ object a
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
 CHANGES = (
-    "os.rename",
-    "os.remove",
-    "os.mkdir",
-    "os.rmdir",
-    "os.link",
-    "os.symlink",
-    "os.truncate",
-    "os.chmod",
-    "os.utime",
+    *("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink"),
+    *("os.truncate", "os.chmod", "os.utime"),
 )
 
 
@@ -82,21 +75,22 @@ class Watch:
     def hook(self, event, args):
         if not self.on:
             return
+        what, paths = "write", ()
         if event == "open":
-            path, mode, flags = args
-            writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) if flags else False
-            writes = writes or (isinstance(mode, str) and set(mode) & set("wax+"))
-            if isinstance(path, (str, bytes, os.PathLike)):
-                self.seen.append(("write" if writes else "read", os.path.abspath(os.fsdecode(path))))
+            paths, mode, flags = args[:1], args[1], args[2] or 0
+            writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) or (
+                isinstance(mode, str) and set(mode) & set("wax+")
+            )
+            what = "write" if writes else "read"
         elif event in CHANGES:
-            for path in args[: 2 if event == "os.rename" else 1]:
-                if isinstance(path, (str, bytes, os.PathLike)):
-                    self.seen.append(("write", os.path.abspath(os.fsdecode(path))))
-        elif event in PROGRAMS:
-            if args[0] not in LOOKING:
-                self.seen.append(("program", f"{event} {args[0]!r}"))
+            paths = args[: 2 if event == "os.rename" else 1]
+        elif event in PROGRAMS and args[0] not in LOOKING:
+            self.seen.append(("program", f"{event} {args[0]!r}"))
         elif event in NETWORK:
             self.seen.append(("network", event))
+        for path in paths:
+            if isinstance(path, (str, bytes, os.PathLike)):
+                self.seen.append((what, os.path.abspath(os.fsdecode(path))))
 
 
 class Sandbox:
@@ -108,15 +102,16 @@ class Sandbox:
         for name in ("home", "tmp", "beside"):
             (self.root / name).mkdir(parents=True, exist_ok=True)
         (self.root / "beside" / "secret.raw").write_bytes(bytes(range(216)))  # which a damaged header names
-        self.around = self.listing(("home", "tmp", "beside"))
+        self.around = self.listing()
 
-    def listing(self, names):
-        """Path -> size and time of everything within some folders."""
+    def listing(self):
+        """Path -> size and time of everything but the try."""
         found = {}
-        for name in names:
-            for folder, _, files in os.walk(self.root / name):
-                found[folder] = None
-                found |= {os.path.join(folder, file): _stamp(os.path.join(folder, file)) for file in files}
+        for path in self.root.rglob("*"):
+            if self.folder not in (path, *path.parents):
+                with contextlib.suppress(OSError):  # it is gone
+                    told = path.lstat()
+                    found[str(path)] = None if path.is_dir() else (told.st_size, told.st_mtime_ns)
         return found
 
     def fresh(self, files):
@@ -125,14 +120,6 @@ class Sandbox:
         self.folder.mkdir()
         for name, data in files.items():
             (self.folder / name).write_bytes(data)
-
-
-def _stamp(path):
-    try:
-        found = os.lstat(path)
-    except OSError:
-        return None
-    return found.st_size, found.st_mtime_ns
 
 
 class Worker:
@@ -208,15 +195,11 @@ class Worker:
 
         The first of several outputs may be new, and all of them if a Ctrl-C comes after the last.
         """
-        left = {
-            name: (self.sandbox.folder / name).read_bytes()
-            for name in one.old
-            if (self.sandbox.folder / name).is_file()
-        }
+        paths = {name: self.sandbox.folder / name for name in one.old}
+        left = {name: path.read_bytes() for name, path in paths.items() if path.is_file()}
         self.run(replace(one, interrupt=None))
         for name, data in left.items():
-            path = self.sandbox.folder / name
-            if data != one.files[name] and not (path.is_file() and path.read_bytes() == data):
+            if data != one.files[name] and not (paths[name].is_file() and paths[name].read_bytes() == data):
                 return faults
         return [fault for fault in faults if fault[0] != "old output changed"]
 
@@ -228,11 +211,9 @@ class Worker:
         if "Traceback (most recent call last)" in said:
             yield "traceback", said.strip().splitlines()[-1][:200]
             return
-        allowed = (0, 2, 130) if one.interrupt else (0, 2)
-        if code not in allowed:
+        if code not in ((0, 2, 130) if one.interrupt else (0, 2)):
             yield "exit code", str(code)
-        warned = re.findall(r"\w*Warning: .*", said)
-        if warned:
+        if warned := re.search(r"\w*Warning: .*", said):
             yield "warning", warned[0][:160]
         if not code:
             return
@@ -265,11 +246,7 @@ class Worker:
     def left_wrong(self, one, result):
         """Yield the faults of the files that are there now, and of those that were opened."""
         folder = self.sandbox.folder
-        there = {}
-        for top, folders, files in os.walk(folder):
-            for name in (*files, *folders):
-                path = Path(top, name)
-                there[str(path.relative_to(folder))] = path
+        there = {str(path.relative_to(folder)): path for path in folder.rglob("*")}
         named = {word for arg in one.args for word in re.split(r"[=,]", arg)}
         if "--preview" in one.args:
             named |= {f"{Path(word).stem}-3x3.png" for word in named if word}
@@ -278,11 +255,8 @@ class Worker:
             path = folder / name
             if not path.is_file():
                 yield "input gone", f"{one.args[0]} {_plain(name)}"
-            elif path.read_bytes() != data:
-                if name in one.old and not result.code:
-                    continue
-                what = "old output changed" if name in one.old else "input changed"
-                yield what, f"{one.args[0]} {Path(name).suffix}"
+            elif path.read_bytes() != data and (result.code or name not in one.old):
+                yield "old output changed" if name in one.old else "input changed", f"{one.args[0]} {path.suffix}"
         for name in there:
             if name in one.files:
                 continue
@@ -294,12 +268,11 @@ class Worker:
                     yield "file nobody named", f"{one.args[0]} {_plain(name)}"
             elif failed and not one.interrupt and name == first and there[name].is_file():
                 yield "written on failure", f"{one.args[0]} {_plain(name)}"
-        now = self.sandbox.listing(("home", "tmp", "beside"))
+        now = self.sandbox.listing()
         for path in now.keys() ^ self.sandbox.around.keys():
             if not _of_libraries(path):
                 yield "left elsewhere", _plain(os.path.relpath(path, self.sandbox.root))
-        if now != self.sandbox.around:
-            self.sandbox.around = now
+        self.sandbox.around = now
         for what, path in self.watch.seen:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]

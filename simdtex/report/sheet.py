@@ -112,7 +112,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
         raise ValueError(f"size is {size}: give {LEAST_SIDE} to {MOST_SIDE} pixels")
     if path is not None:
         check_writable(path, np.uint8, 3)  # before the work
-    block = to_display(block[..., : 3 if block.shape[3] >= 3 else 1] if block.ndim == 4 else block)
+    block = to_display(block[..., :3] if block.ndim == 4 else block)
     (rows, cols), behind = block.shape[1:3], (len(block) - 1) // 2
     cube = np.full((behind + rows, behind + cols, 3), 255, np.uint8)
     for z in reversed(range(len(block))):  # those in front hide the others but for their first rows and last columns
