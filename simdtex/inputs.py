@@ -11,6 +11,7 @@ a checkpoint; the option of the command and the reader of its files (`simdtex.cl
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 from simdtex.options import UNSET, Choice, Number, Option, Switch, Whole, table
@@ -640,6 +641,20 @@ TABLES_OF: dict[str, Any] = {
     **{"classify": Classify, "mix": Mix},
 }
 """The tables by job, which has the name of its command."""
+
+METHODS = {
+    "synth": ("mrf", "multires", "pyramid"),
+    "mix": ("pyramid",),
+    "solid": ("pyramid.solid",),
+    "classify": ("classifier",),
+    "estimate": (),
+}
+"""The methods of a job, in `simdtex.methods`; any other has ``mrf``."""
+
+
+def options_of(job: str) -> dict[str, Any]:
+    """Return the classes of options of a job's methods, by method."""
+    return {one: import_module(f"simdtex.methods.{one}").Options for one in METHODS.get(job, ("mrf",))}
 
 
 def inputs(job: str) -> dict[str, Input]:

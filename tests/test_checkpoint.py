@@ -166,7 +166,7 @@ def test_another_run_is_refused(file):
             {"version": "0.0.1"},
             r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; go on with",
         ),
-        ({"format": 3}, r"is of format 3 and this simdtex reads 4; go on with the code of simdtex .* that wrote it,"),
+        ({"format": 4}, r"is of format 4 and this simdtex reads 5; go on with the code of simdtex .* that wrote it,"),
     ],
     ids=["version", "format"],
 )

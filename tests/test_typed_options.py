@@ -138,7 +138,7 @@ def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
     monkeypatch.setitem(inputs.TABLES_OF, "fill", Fill)
     monkeypatch.setitem(checks.CHECKS, "frame", lambda name, value, call: call.image[0] + value)
     monkeypatch.setattr(readers, "read_frame", lambda path, files: f"{files.flag} {path}", raising=False)
-    filled = checks.public("fill", mrf.Options)(planned)
+    filled = checks.public("fill")(planned)
     assert signature(filled).parameters["frame"].default is None
     assert "frame : (rows, cols) array, optional\n    The frame of the picture.\n" in filled.__doc__
     call, _ = filled.prepare(np.ones((2, 2)), frame=2)

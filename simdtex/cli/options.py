@@ -6,7 +6,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from importlib import import_module
 from typing import Any
 
 import click
@@ -14,19 +13,11 @@ from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
-from simdtex.inputs import SHARED, Input, inputs
+from simdtex.inputs import SHARED, Input, inputs, options_of
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
 Command = Callable[..., Any]
-
-METHODS = {
-    "synth": ("mrf", "multires", "pyramid"),
-    "mix": ("pyramid",),
-    "solid": ("pyramid.solid",),
-    "classify": ("classifier",),
-}
-"""The methods of a command, in `simdtex.methods`; any other has ``mrf``."""
 
 
 class Option(click.Option):
@@ -112,10 +103,7 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
 
 def job_options(job: str) -> Callable[[Command], Command]:
     """Return a decorator that adds to a command all options of its methods that it shows."""
-    tables = {
-        path.partition(".")[0]: table(import_module(f"simdtex.methods.{path}").Options)
-        for path in METHODS.get(job, ("mrf",))
-    }
+    tables = {method.partition(".")[0]: table(options) for method, options in options_of(job).items()}
     found: dict[str, dict[str, Declared]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
     for method, options in tables.items():
         for name, one in options.items():
@@ -126,7 +114,7 @@ def job_options(job: str) -> Callable[[Command], Command]:
 
 def paper_options(*names: str) -> Callable[[Command], Command]:
     """Return a decorator that adds to a command options of the method mrf, whose defaults are the paper's."""
-    declared = table(import_module("simdtex.methods.mrf").Options)
+    declared = table(options_of("synth")["mrf"])
     paper = {name: declared[name].default if declared[name].paper is UNSET else declared[name].paper for name in names}
     return together(*(_option("", name, {"": replace(declared[name], default=paper[name])}) for name in names))
 

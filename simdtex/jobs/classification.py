@@ -23,7 +23,7 @@ from simdtex.random import as_seed
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
-@public("classify", Options)
+@public("classify")
 def classify(call: Any) -> Work:
     """Return a label for each pixel of a picture: the texture around it, or unknown.
 

@@ -78,7 +78,7 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     return [Window(r, c, wanted) for r, c in found]
 
 
-@public("fill", Options)
+@public("fill")
 def fill(call: Any) -> Work:
     """Return a picture with its holes filled with the texture around them.
 
@@ -125,7 +125,7 @@ def fill(call: Any) -> Work:
     return Work(job, chosen, call.channel_axis)
 
 
-@public("extend", Options, without="boundary")
+@public("extend", without="boundary")
 def extend(call: Any) -> Work:
     """Return a picture that is continued beyond its edges, or seamless.
 

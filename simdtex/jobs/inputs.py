@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing, digest
 from simdtex.driver import Plan, check_shape, check_sides, drive, execute
-from simdtex.inputs import Input, inputs, parameter_types
+from simdtex.inputs import Input, inputs, options_of, parameter_types
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
 from simdtex.machine import Machine, memory
@@ -61,15 +61,16 @@ class Work(NamedTuple):
     finish: Callable[[Any, Output], Any] | None = None
 
 
-def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[Any], Work]], Any]:
+def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any]:
     """Return a decorator that makes the public function of a job from a function that plans it.
 
     ``plan(call)`` gets all inputs of `simdtex.inputs` by name, as their checks return them, and ``options``, those of
-    the ``methods``, but for the one `without`, as they were given. The public function has these parameters, and its
+    the job's methods, but for the one `without`, as they were given. The public function has these parameters, and its
     docstring describes them; it opens the device and the checkpoint, runs the `Work` and returns the result. Its
     attribute ``prepare``, with the same parameters, returns the call and the work.
     """
     own = {name: one for name, one in inputs(job).items() if not one.command_only}
+    methods = [*options_of(job).values()]
     written = Signature(
         [
             *(_parameter(name, own[name], type_) for name, type_ in parameter_types(job).items()),
@@ -110,7 +111,7 @@ def public(job: str, *methods: Any, without: str = "") -> Callable[[Callable[[An
     return decorate
 
 
-def _described(doc: str, own: dict[str, Input], methods: tuple[Any, ...]) -> str:
+def _described(doc: str, own: dict[str, Input], methods: list[Any]) -> str:
     """Return the docstring of a public function from one without the sections Parameters and Raises."""
     about, returns, *notes = re.split(r"^(?=\w+\n---)", cleandoc(doc), flags=re.MULTILINE)
     alone = {name for name, one in own.items() if one.method and len(methods) > 1}  # of one of several methods

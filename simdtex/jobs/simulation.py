@@ -48,7 +48,7 @@ MOST_TOGETHER = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""
 
 
-@public("simulate", mrf.Options)
+@public("simulate")
 def simulate(call: Any) -> Work:
     """Return realisations that look like a training image and honour data (multiple-point simulation).
 

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.driver import with_channels_last
+from simdtex.inputs import options_of
 from simdtex.jobs.inputs import Work, check_inputs, public
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods import mrf, pyramid
 from simdtex.methods.mrf.replay import Replay
 from simdtex.methods.pyramid import solid
 from simdtex.methods.pyramid.mixtures import mixture
@@ -31,7 +32,7 @@ TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 NOT_REPLAYED = ("method", "callback", "full_output", "checkpoint", "options")
 
 
-@public("synth", mrf.Options, multires.Options, pyramid.Options)
+@public("synth")
 def synthesize(call: Any) -> Work:
     """Synthesise a picture of any size with the texture of a sample.
 
@@ -67,8 +68,8 @@ def synthesize(call: Any) -> Work:
             f"the method {call.method} takes one sample that is known everywhere, no mask, no known values and no "
             'guide; give method="mrf"'
         )
-    table = import_module(f"simdtex.methods.{call.method}").Options
-    chosen: Any = resolve(table, "synth", with_channels_last(call.options, call.channel_axis))
+    given = with_channels_last(call.options, call.channel_axis)
+    chosen: Any = resolve(options_of("synth")[call.method], "synth", given)
     if call.method == "mrf":
         plan = mrf.plan(call.sample, call.shape, chosen, call.inputs.given, call.inputs.guide)
         return Work(replace(plan, remedy=TILED), chosen, call.channel_axis)
@@ -76,7 +77,7 @@ def synthesize(call: Any) -> Work:
     return Work(algorithm.Plan(call.sample.pixels[0], call.shape, chosen), chosen, call.channel_axis)
 
 
-@public("solid", solid.Options)
+@public("solid")
 def synthesize_solid(call: Any) -> Work:
     """Make a solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
 
@@ -102,7 +103,7 @@ def synthesize_solid(call: Any) -> Work:
     return Work(solid.Plan(call.sample, call.shape, chosen), chosen, None if call.channel_axis is None else -1)
 
 
-@public("mix", pyramid.Options)
+@public("mix")
 def mix(call: Any) -> Work:
     """Return a mixture of several textures, by pyramid matching.
 
