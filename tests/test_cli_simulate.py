@@ -392,7 +392,7 @@ def test_an_estimate_is_that_of_the_function(folder, out):
         (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
     ],
 )
-def test_an_estimate_of_nothing_is_refused(words, sentence):
+def test_an_estimate_of_nothing_is_refused(folder, words, sentence):
     result = estimate(*words, "-o", "out.npz")
     assert result.exit_code != 0 and sentence in " ".join(result.output.split())
     assert not (folder / "out.npz").exists()

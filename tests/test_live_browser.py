@@ -434,6 +434,7 @@ def test_a_page_that_is_loaded_again_during_a_run_has_its_settings(page, wall):
     page.button("Cancel").click()
 
 
+@pytest.mark.slow
 def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -471,6 +472,7 @@ def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
     assert page.results == 4
 
 
+@pytest.mark.slow
 def test_a_refusal_leaves_no_result_as_if_it_were_its(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -495,6 +497,7 @@ def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
     assert not bad and len(page.all(FOCUS)) > 30
 
 
+@pytest.mark.slow
 def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
     shown(page.driver, width=390, height=700)
     page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
@@ -552,6 +555,7 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         assert tops == sorted(tops) and page.one("canvas.view").rect["y"] < 350
 
 
+@pytest.mark.slow
 def test_a_widget_is_not_much_higher_than_its_view(page, wall):
     page.script("document.getElementById('simdtex-live').style.width = '1008px'")
     drop(page.driver, wall)
@@ -559,6 +563,7 @@ def test_a_widget_is_not_much_higher_than_its_view(page, wall):
     assert page.script("return document.querySelector('.columns').scrollHeight") < 1300
 
 
+@pytest.mark.slow
 def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
     shown(page.driver, width=1280, height=720)
     drop(page.driver, wall)
@@ -575,6 +580,7 @@ def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wal
     assert len(page.script("return [...heights]")) == 1
 
 
+@pytest.mark.slow
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.script("page.auto.checked = false")
     file = tmp_path / "moving.gif"
@@ -699,6 +705,7 @@ def test_a_click_explains_a_pixel(inside):
     assert inside.faults() == []
 
 
+@pytest.mark.slow
 def test_the_time_line_steps_and_plays(inside):
     assert at(inside) is None
     sweeps = inside.script("return page.inside.sweeps")
@@ -724,6 +731,7 @@ def test_the_time_line_steps_and_plays(inside):
     assert 3 < seen[0] < len(sweeps)
 
 
+@pytest.mark.slow
 def test_two_results_side_by_side_share_window_moment_and_pixel(inside):
     inside.choose("Beside it", "Result 2")
     until(lambda: inside.script("return page.inside.panes.length") == 2)
@@ -742,6 +750,7 @@ def test_two_results_side_by_side_share_window_moment_and_pixel(inside):
     assert inside.faults() == []
 
 
+@pytest.mark.slow
 def test_a_saved_view_brings_all_of_it_back(inside, served):
     inside.choose("Beside it", "Result 2")
     until(lambda: inside.script("return page.inside.panes.length") == 2)
@@ -770,6 +779,7 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
         other.driver.switch_to.window(inside.handle)
 
 
+@pytest.mark.slow
 def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
     inside.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
     inside.result(4)
@@ -782,6 +792,7 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     until(lambda: inside.script("return !page.inside.open"))
 
 
+@pytest.mark.slow
 def test_the_tour_has_five_steps_and_needs_nothing(page):
     page.button("Tour in five steps").click()
     until(lambda: page.one(".tour").is_displayed())
@@ -794,6 +805,7 @@ def test_the_tour_has_five_steps_and_needs_nothing(page):
     assert explained(page)["candidates"], "the tour has explained a pixel"
 
 
+@pytest.mark.slow
 def test_a_key_shows_the_sample_while_it_is_held(page):
     page.button("gravel").click()
     page.result(1)
@@ -805,6 +817,7 @@ def test_a_key_shows_the_sample_while_it_is_held(page):
     until(lambda: page.script("return page.seen") == "picture")
 
 
+@pytest.mark.slow
 def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
     page.button("brick").click()
     page.result(1)

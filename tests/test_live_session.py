@@ -76,7 +76,7 @@ JOBS = {
 }
 
 
-SLOW = ("guide-everywhere", "guide-of-a-part", "extend-a-part")
+SLOW = ("part", "guide-everywhere", "guide-of-a-part", "extend-a-part")
 
 
 def assert_command_repeats(page, number, folder, monkeypatch):
@@ -261,13 +261,9 @@ def test_a_cancelled_run_is_continued(opened):
 def test_another_seed_size_part_or_picture_begins_anew(opened):
     opened.result()
     for other in ({"seed": 8}, {"width": 37}, {"part": [0, 0, 40, 40]}, {"guide": GUIDE}):
-        after = len(opened.got)
-        opened.result(**other)
-        assert opened.wait("begun", after=after)[0]["from"] is None, other
+        assert opened.ask("begun", **asked(**other))[0]["from"] is None, other
     opened.ask("picture", png(texture(seed=3)), kind="open", name="other.png")
-    after = len(opened.got)
-    opened.result()
-    assert opened.wait("begun", after=after)[0]["from"] is None
+    assert opened.ask("begun", **asked())[0]["from"] is None
 
 
 def test_states_are_kept_apart_from_the_runs_that_use_them():
@@ -679,6 +675,7 @@ def test_a_stroke_is_round_and_the_last_one_counts():
     assert (label[distance <= 3.5] == 1).all() and not label[distance > 5.5].any()
     label = paint([stroke_frames(1, 8, (2, 10), (18, 10)), stroke_frames(2, 4, (10, 0), (10, 20))], (21, 21))
     assert (label[10, 4], label[10, 10], label[0, 10], label[0, 0]) == (1, 2, 2, 0)
+    assert 7 <= (label[:, 5] == 1).sum() <= 9, "as wide as its stroke"
     assert paint([stroke_frames(1, 8, (5, 5)), stroke_frames(0, 30, (5, 5))], (12, 12)).sum() == 0
     assert paint([stroke_frames(1, 4, (-50, 5), (500, 5))], (12, 12))[5].all(), "it goes on beyond the edges"
 

@@ -515,15 +515,18 @@ def below_the_floor(name, search, found):
     return worse
 
 
+QUICK_FLOOR = ("brick", "default")
+
+
 @pytest.mark.parametrize(
-    ("name", "search"), [pytest.param(*key, marks=[pytest.mark.slow] * (key[1] == "exact")) for key in MEASURED]
+    ("name", "search"), [pytest.param(*key, marks=[pytest.mark.slow] * (key != QUICK_FLOOR)) for key in MEASURED]
 )
 def test_quality_stays_above_the_floor(any_device, name, search):
     found = figures_floor(name, search, opencl(any_device))
     assert not below_the_floor(name, search, found), found
 
 
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", ["brick", *(pytest.param(one, marks=pytest.mark.slow) for one in SAMPLES[1:])])
 def test_a_hasty_relaxation_falls_below_the_floor(any_device, name):
     """One sweep for each site, and no finish that melts what is torn: the floor is high enough to tell."""
     found = figures_floor(name, "default", opencl(any_device), xi=-1000.0, free_sweeps=0, finish=0.0)
