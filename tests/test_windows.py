@@ -152,7 +152,7 @@ def test_fields_are_those_of_the_run(machine, schedule):
         np.testing.assert_array_equal(replay.at(n - len(seen)).image, found.image)
 
 
-@pytest.mark.parametrize("schedule", ["coloring", "checkerboard", "synchronous", "random-subset", "random-scan"])
+@pytest.mark.parametrize("schedule", ["coloring", "checkerboard", "synchronous", "random-subset"])
 def test_a_set_changes_its_own_sites_alone(schedule):
     replay = simdtex.replay(BRICK, SHAPE, schedule=schedule, **RULES, device="reference")
     n = len(replay.sweeps) - 1
@@ -172,8 +172,8 @@ def test_a_set_changes_its_own_sites_alone(schedule):
 
 
 def test_checkerboard_has_two_sets_and_raster_one_for_each_site():
-    for schedule, sets in [("checkerboard", 2), ("synchronous", 1), ("raster", 18 * 21)]:
-        assert simdtex.replay(BRICK, SHAPE, schedule=schedule, **RULES, device="reference").sweeps[-1].sets == sets
+    for schedule, sets in [("checkerboard", 2), ("synchronous", 1), ("raster", 10 * 12)]:
+        assert simdtex.replay(BRICK, (10, 12), schedule=schedule, **RULES, device="reference").sweeps[-1].sets == sets
 
 
 def test_states_that_are_not_kept_are_computed_again(monkeypatch):
