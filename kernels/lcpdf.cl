@@ -16,7 +16,7 @@
 #endif
 
 // W_p times the kernel of equation (7) around y_p, at grey levels x_c in all channels but one.
-inline ulong weight_at(ulong w, __global const LEVEL *y, const int plane, const __private int *x, const int but,
+inline ulong weight_at(ulong w, __global const float *y, const int plane, const __private int *x, const int but,
                        __global const float *window, const int radius)
 {
     for (int c = 0; c < MADE && w; ++c)
@@ -35,7 +35,7 @@ inline ulong weight_at(ulong w, __global const LEVEL *y, const int plane, const 
         __global const int2 *restrict offsets, __global const int *restrict reach,                                     \
         __global const int *restrict index_of, __global const int *restrict positions,                                 \
         __global const float *restrict disc, __global const int2 *restrict looks, COSTS,                               \
-        __global const LEVEL *restrict own, const int greys
+        __global const float *restrict own, const int greys
 #define GATHERED                                                                                                       \
     const int s = first + (int)get_global_id(0);                                                                       \
     if (s >= S)                                                                                                        \

@@ -45,9 +45,7 @@
 #define STEP 4 // vectors of candidates in registers together
 #endif
 #define CHECK 4    // neighbours between two looks at the bound
-#ifndef NOISY
-#define NOISY 0
-#endif
+#define NOISY 8    // neighbours before the noise of a draw is looked at, since it costs as much as many
 #define BUCKETS 8  // of confidence, the most certain neighbours first
 #define SLACK(terms) (1.0f + ((terms) + 8) * 0x1p-22f) // what a sum in another order may exceed this one by
 #if V == 1
@@ -60,7 +58,7 @@
 #define WIDTH(g) (((g).cols + (g).runs * LANES - 1) / ((g).runs * LANES))
 
 // -G of candidate p; of a density, more by the logarithm of the share of the kernel around it that is legal.
-inline float noise_of(const Level g, const uint turn, const ulong place, const int p, __global const LEVEL *y,
+inline float noise_of(const Level g, const uint turn, const ulong place, const int p, __global const float *y,
                       __global const uint *noise)
 {
     const int row = p / g.cols, col = p % g.cols, run = row * g.runs + col % g.runs, n = col / g.runs;
@@ -79,15 +77,18 @@ inline float repeated(const int p, const __private int *next, const __private in
     return (float)found;
 }
 
-// Evaluate candidate p, and keep it if it is the best so far.
+// Evaluate candidate p, and keep it if it is the best so far. Noise takes `most` away at most.
 #define CONSIDER(p, factor)                                                                                            \
     {                                                                                                                  \
-        float total_ = EVALUATED(p, factor, site) + REPEATED(p);                                                       \
-        if (g.spread > 0.0f)                                                                                           \
-            total_ = fma(g.spread, noise_of(g, turn, place, p, levels + at[p], noise), total_);                        \
-        if (total_ < best || (total_ == best && (p) < best_at)) {                                                      \
-            best = total_;                                                                                             \
-            best_at = p;                                                                                               \
+        float total_ = EVALUATED(p, factor, site);                                                                     \
+        if (total_ - most <= best) {                                                                                   \
+            total_ += REPEATED(p);                                                                                     \
+            if (g.spread > 0.0f)                                                                                       \
+                total_ = fma(g.spread, noise_of(g, turn, place, p, levels + at[p], noise), total_);                    \
+            if (total_ < best || (total_ == best && (p) < best_at)) {                                                  \
+                best = total_;                                                                                         \
+                best_at = p;                                                                                           \
+            }                                                                                                          \
         }                                                                                                              \
     }
 
@@ -134,6 +135,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     const int2 heat = gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu);
 #define NEIGHBOUR(k) in_square(h, site, i, j, row, col, ROW(offsets[k].x), offsets[k].y + RADIUS)
 
+    const float most = MOST_GUMBEL * g.spread;
     float best = INFINITY;
     int best_at = 0x7fffffff;
 #ifndef EXACT
@@ -205,10 +207,9 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     // All candidates against the bound, V x STEP side by side. Three facts make that exact: partial sums never fall, no
     // cost is below 0, and a sum in another order differs by less than the slack. What survives is evaluated.
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs;
-    const float most = MOST_GUMBEL * g.spread;
     ulong done = 0;
     for (int b = 0; b < runs * wide; b += STEP) {
-        __global const LEVEL *y[STEP];
+        __global const float *y[STEP];
         vec d[STEP];
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
@@ -250,7 +251,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
                     const vec uc = tu[(k + n) * CONFIDENCES + CONFIDENT(c)], xuc = txu[(k + n) * C + c];
 #pragma unroll
                     for (int q = 0; q < STEP; ++q) {
-                        const vec e = GAP(LEVELS(y[q] + c * g.plane + o), uc, xuc);
+                        const vec e = GAP(LOAD(y[q] + c * g.plane + o), uc, xuc);
                         d[q] = fma(e, e, d[q]);
                     }
                 }

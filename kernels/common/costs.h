@@ -36,7 +36,7 @@
 // pixels_ (C, plane_)      the sample
 // at_     (listed,)        pixel index of each candidate
 #define COSTS                                                                                                          \
-    __global const int *restrict at, __global const LEVEL *restrict levels, __global const float *restrict penalty,    \
+    __global const int *restrict at, __global const float *restrict levels, __global const float *restrict penalty,    \
         __global const float *restrict waves, const int listed, __global const ushort *restrict phases,                \
         const int area_, const float certain_, const float free_, __global const int *restrict begin_,                 \
         __global const int *restrict reach_, __global const ushort *restrict told, const float hard_,                  \

@@ -12,15 +12,6 @@
 #include "common/level.h"
 #include "common/vector.h"
 
-#ifdef USHORT
-#define LEVEL ushort
-#define LEVELS16(p) convert_float16(vload16(0, p))
-#define LEVELS(p) WIDE(convert_float)(LOAD(p))
-#else
-#define LEVEL float
-#define LEVELS16(p) vload16(0, p)
-#define LEVELS(p) LOAD(p)
-#endif
 #ifndef RADIUS
 #define RADIUS 4 // of the neighbourhood
 #endif
@@ -199,7 +190,7 @@ inline int2 gather(const Level g, const int site, const int i, const int j, cons
 #endif
 
 // Equation (12): d of the candidate whose grey levels are at y, in a sample whose rows are `down` apart, layers `deep`.
-inline float distance_in_lanes(__global const LEVEL *restrict y, SQUARE_ARG(const), const int plane, const int down,
+inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane, const int down,
                                const int deep)
 {
 #if V == 1
@@ -212,7 +203,7 @@ inline float distance_in_lanes(__global const LEVEL *restrict y, SQUARE_ARG(cons
                 const float un = U(cell, c, n);
                 if (un == 0.0f) // would add 0
                     continue;
-                const float yn = (float)y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
+                const float yn = y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
                 const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
                 d[n] = fma(e, e, d[n]);
             }
@@ -222,7 +213,7 @@ inline float distance_in_lanes(__global const LEVEL *restrict y, SQUARE_ARG(cons
     for (int cell = 0; cell < CELLS; ++cell)
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float16 yn = LEVELS16(y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16);
+            const float16 yn = vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16);
             const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
             d = fma(e, e, d);
         }

@@ -158,7 +158,7 @@ class Costs(NamedTuple):
             terms["distance"] = cost
         if self.discount != 1:
             less = np.where(coherent, cost * self.discount, cost)
-            terms["coherence"] = less - cost
+            terms["coherence"] = less - np.where(np.isinf(cost), np.float32(0), cost)
             cost = less
         more = {"use": self.penalty[np.maximum(numbers, 0)]}
         if self.phased:
@@ -169,9 +169,10 @@ class Costs(NamedTuple):
             more["soft"] = self.kinds.cost(numbers, sites)
         if self.novelty:
             times = np.zeros(cost.shape, np.float32)
-            for source, often in ((continuing(candidates, around.source), 1), (candidates.number_of(around.source), AGAIN)):
-                for number in source:
-                    times += np.float32(often) * (numbers == np.where(number < 0, -2, number))
+            pairs = (continuing(candidates, around.source), 1), (candidates.number_of(around.source), AGAIN)
+            for number, often in pairs:
+                k, s = np.nonzero(number >= 0)
+                np.add.at(times, (number[k, s], s), np.float32(often))
             more["novelty"] = self.novelty * times
         for term in more.values():
             cost = cost + term

@@ -154,7 +154,9 @@ def taken(
 
     That is the first of the least cost (slots, S), of a draw plus 2 h^2 times ``noise``, see `simdtex.ops.relax`.
     """
-    total = fma32(choice.spread, noise, cost) if choice.draws else cost
+    total = cost
+    if choice.draws:  # an empty slot stays empty
+        total = np.where(np.isinf(cost), cost, fma32(choice.spread, noise, np.where(np.isinf(cost), np.float32(0), cost)))
     chosen = np.where(total == total.min(0), numbers, candidates.size).min(0)
     source = candidates.positions[chosen]
     values = candidates.pixels[: candidates.made, source].astype(np.uint16)
