@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from simdtex.machine import runtimes
 from simdtex.machine.opencl import kernel_source
-from simdtex.ops.arithmetic import exp32, fma32, log32
+from simdtex.ops.arithmetic import exp32, fma32, log32, minus_gumbel
 
 SOURCE = """
 #pragma OPENCL FP_CONTRACT OFF
@@ -24,6 +24,11 @@ __kernel void exps(__global const float *x, __global float *out)
 {
     const int i = get_global_id(0);
     out[i] = exp32(x[i]);
+}
+__kernel void gumbels(__global const uint *x, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = minus_gumbel(x[i]);
 }
 __kernel void logs(__global const float *x, __global float *out)
 {
@@ -134,7 +139,7 @@ def test_exp32_of_0_is_1_and_it_never_exceeds_1():
 @pytest.fixture(scope="module")
 def build(machine):
     """The program above on a machine, as it builds its own."""
-    headers = kernel_source("common/exp.h") + kernel_source("common/log.h")
+    headers = kernel_source("common/exp.h") + kernel_source("common/gumbel.h")
     kernels = runtimes.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):
@@ -162,14 +167,15 @@ def test_exp32_of_a_device_has_the_twins_bits(build):
     assert_same_bits(build("exps", x), exp32(x))
 
 
-def numbers_from_1():
+def numbers_to_log():
     rng = np.random.default_rng(2)
     near, whole = 1 + rng.random(100_000), np.arange(1, 2**17)
-    return np.concatenate([near, whole, np.exp(rng.uniform(0, 16.6, 200_000)), [2**24 - 1]]).astype(np.float32)
+    small = np.exp(rng.uniform(-23, 0, 100_000))
+    return np.concatenate([near, whole, np.exp(rng.uniform(0, 16.6, 200_000)), [2**24 - 1], small]).astype(np.float32)
 
 
 def test_log32_is_as_close_as_stated():
-    x = numbers_from_1()
+    x = numbers_to_log()
     assert abs(log32(x) - np.log(x.astype(np.float64))).max() < tolerances.LOG32
 
 
@@ -179,5 +185,26 @@ def test_log32_of_1_is_0_and_of_2_squared_twice_that_of_2():
 
 
 def test_log32_of_a_device_has_the_twins_bits(build):
-    x = numbers_from_1()
+    x = numbers_to_log()
     assert_same_bits(build("logs", x), log32(x))
+
+
+def words_of_all_sizes():
+    """Random words, and many near both ends."""
+    near = np.unique(np.exp(np.linspace(0, 22, 100_000)).astype(np.int64))
+    among = np.random.default_rng(3).integers(0, 2**32, 200_000)
+    split = int(2**32 * 0.5**0.5) + np.arange(-1000, 1000)  # where u is sqrt(1/2)
+    return np.unique(np.concatenate([[0], near, 2**32 - 1 - near, [2**32 - 1], among, split])).astype(np.uint32)
+
+
+def test_gumbel_noise_is_as_close_as_stated_at_both_ends():
+    bits = words_of_all_sizes()
+    rest = (2.0**32 - 1 - bits + 0.5) / 2**32  # 1 - u, exact in float64
+    exact = np.where(rest < 0.5, np.log(-np.log1p(-rest)), np.log(-np.log((bits + 0.5) / 2**32)))
+    assert abs(minus_gumbel(bits) - exact).max() < tolerances.GUMBEL
+    assert minus_gumbel(np.uint32([2**32 - 1]))[0] == pytest.approx(-33 * np.log(2))
+
+
+def test_gumbel_noise_of_a_device_has_the_twins_bits(build):
+    bits = words_of_all_sizes()
+    assert_same_bits(build("gumbels", bits), minus_gumbel(bits))

@@ -64,15 +64,18 @@ def test_draws_of_many_sites_are_the_draws_of_each():
     assert np.array_equal(np.stack(many, -1), np.array(each))
 
 
+PURPOSES = ("START", "DRAW", "COLOR", "SCHEDULE", "NOISE", "SEARCH", "GUMBEL")
+
+
 def test_no_two_purposes_share_a_number():
-    purposes = [random.START, random.DRAW, random.COLOR, random.SCHEDULE]
+    purposes = [getattr(random, name) for name in PURPOSES]
     assert len(set(purposes)) == len(purposes)
     assert max(purposes) < 256, "the level begins at bit 8"
 
 
 def test_the_kernels_know_the_same_purposes():
     header = (kernel_folder() / "common" / "philox.h").read_text()
-    for name in ("START", "DRAW", "COLOR"):
+    for name in PURPOSES:
         assert f"#define PURPOSE_{name} {getattr(random, name)}u\n" in header
 
 

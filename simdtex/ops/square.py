@@ -64,7 +64,7 @@ class Square(NamedTuple):
             inside = np.flatnonzero(columns == lane)
             for k in inside[np.lexsort((offsets[inside, 1], offsets[inside, 0]))]:
                 apart = layer[k] * self.deep + line[k] * self.down + offsets[k, 1]
-                for c, y in enumerate(self.levels):
+                for c, y in enumerate(self.levels[: x.shape[1]]):
                     e = ((x[k, c] - y[there + apart]) * u[k, c if u.shape[1] > 1 else 0]).astype(np.float64)
                     d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
             lanes.append(d)
