@@ -141,7 +141,16 @@ class Problem(NamedTuple):
         return Costs(penalty, *factors, phased, self.scattered(machine), self.kinds(machine, every))
 
     def relaxation(
-        self, machine, exact=False, chance=4, gibbs=False, density=False, bandwidth=0.5, seed=2**33 + 5, level=0, **costs
+        self,
+        machine,
+        exact=False,
+        chance=4,
+        gibbs=False,
+        density=False,
+        bandwidth=0.5,
+        seed=2**33 + 5,
+        level=0,
+        **costs,
     ):
         """The relaxation of the sites by the coherent search, or the exact one; it costs nothing unless told."""
         candidates, square = self.candidates(machine, exact), self.square(machine, exact)

@@ -264,7 +264,8 @@ class Level:
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate, self.strict = o.balance * differing, 0.5 * differing
-        self.novelty = float32(o.novelty * min(1.0, 256 / n, (n / 128) ** 2) * Y.matched * Y.variance if coarsest else 0)
+        freedom = min(1.0, 256 / n, (n / 128) ** 2) if coarsest else 0.0
+        self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, problem
+from cases import REFERENCE, assert_same_bits, problem
 from test_relax import apart
 
 from simdtex.model.lattice import Grid, neighbourhood_offsets

@@ -149,17 +149,17 @@ class Costs(NamedTuple):
         equation (12) without guides, and each term that is added to it, by name and in the order of the sum.
         """
         sites, x, u, *_ = around
-        terms = {} if terms is None else terms
-        cost = square.distance(numbers, x, u, offsets)
-        if candidates.guides:
-            terms["distance"] = square.distance(numbers, *(a[:, : -candidates.guides] for a in (x, u)), offsets)
-            terms["guide"] = cost - terms["distance"]
-        else:
-            terms["distance"] = cost
+        cost = whole = square.distance(numbers, x, u, offsets)
         if self.discount != 1:
-            less = np.where(coherent, cost * self.discount, cost)
-            terms["coherence"] = less - np.where(np.isinf(cost), np.float32(0), cost)
-            cost = less
+            cost = np.where(coherent, cost * self.discount, cost)
+        if terms is not None:
+            there, distance = np.isfinite(whole), whole  # an empty slot is infinitely far
+            if candidates.guides:
+                distance = square.distance(numbers, x[:, : -candidates.guides], u[:, : -candidates.guides], offsets)
+                terms["guide"] = np.subtract(whole, distance, where=there, out=np.zeros_like(whole))
+            if self.discount != 1:
+                terms["coherence"] = np.subtract(cost, whole, where=there, out=np.zeros_like(whole))
+            terms["distance"] = distance
         more = {"use": self.penalty[np.maximum(numbers, 0)]}
         if self.phased:
             more["lattice"] = self.phased.cost(numbers, sites)
@@ -176,7 +176,8 @@ class Costs(NamedTuple):
             more["novelty"] = self.novelty * times
         for term in more.values():
             cost = cost + term
-        terms |= more
+        if terms is not None:
+            terms |= more
         return cost
 
 

@@ -156,7 +156,9 @@ def taken(
     """
     total = cost
     if choice.draws:  # an empty slot stays empty
-        total = np.where(np.isinf(cost), cost, fma32(choice.spread, noise, np.where(np.isinf(cost), np.float32(0), cost)))
+        total = np.where(
+            np.isinf(cost), cost, fma32(choice.spread, noise, np.where(np.isinf(cost), np.float32(0), cost))
+        )
     chosen = np.where(total == total.min(0), numbers, candidates.size).min(0)
     source = candidates.positions[chosen]
     values = candidates.pixels[: candidates.made, source].astype(np.uint16)
@@ -213,7 +215,9 @@ def spread(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
 
 
 @Operation
-def density(machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None) -> Array:
+def density(
+    machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None
+) -> Array:
     """Return the density of one channel at each grey level, up to a factor, (S, greys) float32.
 
     ``relaxation`` proposes all candidates, and its random numbers are not read. ``own`` (1, plane) float32 is the grey
@@ -221,7 +225,9 @@ def density(machine: Launcher | None, sites: Array, field: Field, relaxation: Re
     """
     if machine is None:
         cost = relaxation.evaluate(sites, field, 0).cost
-        return smoothed(_greys(relaxation, own), weights(cost, relaxation.choice.window.scale), relaxation.choice.window).T
+        return smoothed(
+            _greys(relaxation, own), weights(cost, relaxation.choice.window.scale), relaxation.choice.window
+        ).T
     return density_and_mode(machine, sites, field, relaxation, own)[0]
 
 
@@ -254,7 +260,8 @@ def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: 
 def _greys(relaxation: Relaxation, own: NDArray[np.float32] | None) -> NDArray[np.int64]:
     """Return the grey level of each candidate in the first channel."""
     square = relaxation.proposal.square
-    return (square.levels if own is None else own)[0][square.at].astype(np.int64)
+    greys: NDArray[np.int64] = (square.levels if own is None else own)[0][square.at].astype(np.int64)
+    return greys
 
 
 def _table(

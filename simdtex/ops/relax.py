@@ -9,7 +9,6 @@ for the mode of a density ``kernels/lcpdf.cl``.
 
 from __future__ import annotations
 
-from functools import partial
 from math import prod
 from typing import Any, NamedTuple
 
@@ -50,9 +49,7 @@ class AllCandidates(NamedTuple):
         """Number of candidates that a site evaluates."""
         return self.candidates.size
 
-    def propose(
-        self, around: Near, relaxation: Relaxation, turn: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def propose(self, around: Near, relaxation: Relaxation, turn: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the numbers (slots, 1) of the candidates, and a mask (slots, S) of those that are coherent."""
         coherent = np.zeros((self.slots, around.sites.size), bool)
         number = continuing(self.candidates, around.source)
@@ -77,9 +74,7 @@ class CandidateList(NamedTuple):
         """The most candidates that a site evaluates."""
         return min(most_listed(self.neighbours, self.chance), self.candidates.size)
 
-    def propose(
-        self, around: Near, relaxation: Relaxation, turn: int
-    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def propose(self, around: Near, relaxation: Relaxation, turn: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the numbers (slots, S) of the candidates, -1 in empty slots, and a mask of those that are coherent."""
         sites = around.sites
         numbers = np.full((self.slots + 1, sites.size), -1)  # one more for a repeated number
@@ -191,9 +186,7 @@ class Relaxation(NamedTuple):
             found = found - share
         return found
 
-    def arguments(
-        self, machine: Launcher, sites: Array, field: Field
-    ) -> tuple[dict[str, int], list[Any]]:
+    def arguments(self, machine: Launcher, sites: Array, field: Field) -> tuple[dict[str, int], list[Any]]:
         """Return the -D constants and the first arguments of kernels that evaluate candidates."""
         (candidates, square), choice, costs = self.proposal[:2], self.choice, self.costs
         window, confidences = choice.window, self.confidences
@@ -266,16 +259,18 @@ def relax(
         defines, arguments = _kernel(machine, sites, count, field, evaluations, relaxation, turn)
         machine.launch_groups("relax", steps, *arguments, *field, defines=defines)
         return field
-    run, write = (
-        operation.reference if machine is None else partial(operation, machine)
-        for operation in (relax_out_of_place, commit)
-    )
     for begin, end in steps.tolist():
         most = max(1, PAIRS // relaxation.proposal.slots) if machine is None else max(1, end - begin)
         for first in range(begin, end, most):  # no site sees another of its step
             last = min(end, first + most)
-            here = sites[first:last] if machine is None else machine.part(sites, first, last)
-            field = write(field, here, *run(here, field, evaluations, relaxation, turn))
+            if machine is None:
+                here = sites[first:last]
+                done = relax_out_of_place.reference(here, field, evaluations, relaxation, turn)
+                field = commit.reference(field, here, *done)
+            else:
+                here = machine.part(sites, first, last)
+                done = relax_out_of_place(machine, here, field, evaluations, relaxation, turn)
+                field = commit(machine, field, here, *done)
     return field
 
 

@@ -163,7 +163,9 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
             if outcomes:
                 yield Part(len(outcomes) == 1, outcomes[-1][0].size, False, chosen.turn, field)
             here = machine.put(step.sites[first : first + level.at_once])
-            outcomes.append((here, *relax_out_of_place(machine, here, field, level.evaluations, relaxation, chosen.turn)))
+            outcomes.append(
+                (here, *relax_out_of_place(machine, here, field, level.evaluations, relaxation, chosen.turn))
+            )
             machine.sync(level.work * here.size)
         for here, taken, cooled in outcomes:
             field = commit(machine, field, here, taken, cooled)

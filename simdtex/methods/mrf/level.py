@@ -118,8 +118,8 @@ class Lattices:
     """A plan on a machine: the constants of the run, and its levels.
 
     ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
-    plan. ``planes`` are the sample's working levels on the machine, and ``evaluations`` (H, W) counts the candidates that
-    each site of the whole has evaluated.
+    plan. ``planes`` are the sample's working levels on the machine, and ``evaluations`` (H, W) counts the candidates
+    that each site of the whole has evaluated.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
