@@ -23,7 +23,8 @@ from plain_shown import finished, picture
 
 from simdtex import random
 
-LANES = 16
+LANES = 16  # of a sum of squares
+UNIT = 16  # candidates, four of which share their draws
 CATEGORIES = 16  # different pixels of a map of categories, at most
 EXHAUSTIVE = 64  # candidates of a level that are all evaluated, at most
 SUGGESTING = 12  # nearest neighbours that suggest a candidate
@@ -494,8 +495,8 @@ def noise(level, p, s, turn):
         row, col = (level.lines[axis].index(level.at[p][axis]) for axis in (0, 1))
         cols = len(level.lines[1])
         runs = min(level.spacing // level.step, cols)
-    unit = (row * runs + col % runs) * -(-cols // (runs * LANES)) + col // runs // LANES
-    attempt, which = unit // 4 * LANES + col // runs % LANES, unit % 4
+    unit = (row * runs + col % runs) * -(-cols // (runs * UNIT)) + col // runs // UNIT
+    attempt, which = unit // 4 * UNIT + col // runs % UNIT, unit % 4
     found = minus_gumbel(words(level.seed, level.number, turn, level.index(s), random.GUMBEL, attempt)[which])
     for y in level.own[:, p].tolist() if level.o.pixel == "density" else []:
         found = found - (logarithm(mass(level, y)[1])[0] - float32(22.1807098))
