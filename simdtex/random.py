@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 # The purposes of draws, with the numbers of kernels/common/philox.h.
 START, DRAW, COLOR, SCHEDULE = 1, 2, 3, 4
-NOISE, SEARCH = 5, 6
+NOISE, SEARCH, GUMBEL = 5, 6, 7
 
 _LOW = np.uint64(0xFFFFFFFF)
 _SHIFT = np.uint64(32)

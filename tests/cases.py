@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
+from scipy.stats import chisquare
+from tolerances import SIGNIFICANCE
 
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
@@ -15,11 +17,10 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
-from simdtex.ops.coherence import coherence
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
-from simdtex.ops.nearest import TAIL, strip_of
-from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood
-from simdtex.ops.square import square_of
+from simdtex.ops.neighbourhood import Confidences, Field
+from simdtex.ops.relax import AllCandidates, CandidateList, Relaxation
+from simdtex.ops.square import TAIL, square_of
 from simdtex.schedules import Setting
 
 REFERENCE = Reference()
@@ -85,20 +86,17 @@ class Problem(NamedTuple):
     def candidates(self, machine, every=False):
         return self.sample.candidates(machine, self.places(), every=every)
 
-    def strip(self, machine):
-        return strip_of(machine, self.sample, self.places())
-
-    def square(self, machine):
-        return square_of(machine, self.sample, self.places())
+    def square(self, machine, every=False):
+        return square_of(machine, self.sample, self.places(), every)
 
     def penalty(self, dear=1.0, every=False):
-        """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance.
+        """Of each candidate, and of some more: some cost nothing, some much in terms of a distance.
 
         With ``every`` of each place, infinity where no candidate is.
         """
         candidates = self.candidates(REFERENCE, every)
         scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
-        penalty = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
+        penalty = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.size + TAIL)
         allowed = self.places().allowed
         if every and allowed is not None:
             penalty[: candidates.size][~allowed] = np.inf
@@ -108,7 +106,7 @@ class Problem(NamedTuple):
         """Phases of each candidate, or place, and of each site, a quarter of them equal; None without."""
         if not self.regular:
             return None
-        rng, candidates = np.random.default_rng(7), self.candidates(REFERENCE, every).positions.size
+        rng, candidates = np.random.default_rng(7), self.candidates(REFERENCE, every).size
         waves = rng.choice([0, 0, 40, 97], (4, candidates + TAIL)).astype(np.float32)
         here = rng.choice([0, 40], (4, *self.field.source.shape)).astype(np.uint16)
         return Phased(machine.put(waves), machine.put(here), np.float32(3), np.float32(15000))
@@ -131,31 +129,47 @@ class Problem(NamedTuple):
         """So many kinds of each candidate, or place, of four that there are, some excluded here and there; or None."""
         if not self.soft:
             return None
-        rng, candidates = np.random.default_rng(9), self.candidates(REFERENCE, every).positions.size
+        rng, candidates = np.random.default_rng(9), self.candidates(REFERENCE, every).size
         of = rng.integers(0, 4, (self.soft, candidates + TAIL)).astype(np.uint16)
         dear = rng.choice([0, 0, 700.5, 90000.25, EXCLUDED], (4, *self.field.source.shape)).astype(np.float32)
         return Kinds(machine.put(of), machine.put(dear))
 
-    def costs(self, machine, dear=1.0, every=False):
+    def costs(self, machine, dear=1.0, every=False, coherence=0.0, novelty=0.0):
         """The penalties of the candidates, or places, their phases, data between the sites, and kinds."""
         penalty, phased = machine.put(self.penalty(dear, every)), self.phased(machine, every)
-        return Costs(penalty, phased, self.scattered(machine), self.kinds(machine, every))
+        factors = np.float32(1 / (1 + coherence)), np.float32(novelty * self.sample.variance)
+        return Costs(penalty, *factors, phased, self.scattered(machine), self.kinds(machine, every))
+
+    def relaxation(
+        self,
+        machine,
+        exact=False,
+        chance=4,
+        gibbs=False,
+        density=False,
+        bandwidth=0.5,
+        seed=2**33 + 5,
+        level=0,
+        **costs,
+    ):
+        """The relaxation of the sites by the coherent search, or the exact one; it costs nothing unless told."""
+        candidates, square = self.candidates(machine, exact), self.square(machine, exact)
+        proposal = AllCandidates(candidates, square)
+        if not exact:
+            proposal = CandidateList(candidates, square, len(self.offsets), chance)
+        terms = self.costs(machine, every=exact, **{"dear": 0.0} | costs)
+        choice = lcpdf.Choice(gibbs, density, self.window(bandwidth)[0])
+        offsets = machine.put(self.offsets)
+        return Relaxation(self.grid, offsets, proposal, terms, choice, -1024, seed, level, self.confidences)
+
+    def cost(self, **how):
+        """The costs (places, sites) of all candidates by the reference."""
+        return self.relaxation(REFERENCE, exact=True, **how).evaluate(self.sites, self.field, 3).cost
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
         field = Field(*(machine.put(a) for a in self.field))
         return machine.put(self.sites), field, machine.put(self.offsets)
-
-    def distances(self, machine, strength=0.0):
-        """The distances of equation (12), divided for coherent candidates; and the candidates."""
-        sites, field, offsets = self.on(machine)
-        candidates = self.candidates(machine)
-        near = neighbourhood(machine, sites, field, offsets, self.grid, self.confidences)
-        found = lcpdf.distance(machine, near, candidates)
-        if strength:
-            discount = np.float32(1 / (1 + strength))
-            found = coherence(machine, found, candidates, sites, field, offsets, self.grid, discount)
-        return found, candidates
 
     def window(self, bandwidth=1.0):
         n = len(self.offsets)
@@ -303,6 +317,22 @@ def assert_same_bits(ours, theirs):
         f"{ours[tuple(different[0])]} and {theirs[tuple(different[0])]}"
     )
     assert ours.tobytes() == theirs.tobytes()
+
+
+def check_chi_square(counts, probabilities):
+    """Pearson's test; outcomes expected less than 5 times are taken together."""
+    expected = probabilities / probabilities.sum() * counts.sum()
+    rare = expected < 5
+    if rare.any():
+        counts = np.append(counts[~rare], counts[rare].sum())
+        expected = np.append(expected[~rare], expected[rare].sum())
+        if expected[-1] < 5:  # all the rare ones are rare together
+            least = expected[:-1].argmin()
+            counts[least] += counts[-1]
+            expected[least] += expected[-1]
+            counts, expected = counts[:-1], expected[:-1]
+    assert expected.size >= 3, "there is something to draw from"
+    assert chisquare(counts, expected).pvalue > SIGNIFICANCE
 
 
 def laid_out(machine, pixels, shape, options, seed):

@@ -16,20 +16,17 @@ import numpy as np
 import plain
 from numpy import float32
 from plain_multires import within
-from plain_numbers import cumulative, exponential, fma
+from plain_numbers import cumulative, exponential, fma, logarithm, minus_gumbel
 from plain_sample import NOWHERE, UNKNOWN, between, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 from plain_shown import finished, picture
 
 from simdtex import random
 
-ALL_IN_LANES = False
-"""Whether sums are in lanes also where all candidates are weighed. They are not; True shows that a test can tell."""
-
-LANES = 16
+LANES = 16  # of a sum of squares
+UNIT = 16  # candidates, four of which share their draws
 CATEGORIES = 16  # different pixels of a map of categories, at most
-MOST_KEPT = 1024  # candidates of a level that knows novelty, at most
-EXHAUSTIVE = 64  # candidates of a level that are all weighed, at most
+EXHAUSTIVE = 64  # candidates of a level that are all evaluated, at most
 SUGGESTING = 12  # nearest neighbours that suggest a candidate
 
 DEFAULTS = {
@@ -160,7 +157,7 @@ def relaxed(level, X, old, s, turn):
     if level.Y.guides:  # at the site itself these alone count
         x, certain, _, _ = look(level, X, level.pixel(s))
         itself = [(x, [0] * level.Y.matched + [level.Y.centre * u for u in certain[level.Y.matched :]])]
-    d = distances(level, near + itself, numbers, level.lanes)
+    d = distances(level, near + itself, numbers)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
     d = d + level.penalty[numbers]
     if level.Y.waves:
@@ -169,8 +166,8 @@ def relaxed(level, X, old, s, turn):
         d = d + misfit(level, s, numbers)
     if level.Y.soft:
         d = d + of_kind(level, s, numbers)
-    for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
-        d[p] += float32(times) * level.novelty
+    if level.novelty:  # the numbers are all candidates
+        d = d + level.novelty * np.bincount([p for p, _ in charged], [n for _, n in charged], len(d)).astype(float32)
 
     if level.gibbs:  # 6.2.2.2
         values, p = drawn(level, d, numbers, s, turn)
@@ -265,13 +262,11 @@ class Level:
         coarsest, coherent = number == levels - 1, o.search == "coherent"
         self.gibbs = o.relaxation == "gibbs" or coarsest
         self.all = not coherent or coarsest or n <= EXHAUSTIVE
-        self.lanes = LANES if ALL_IN_LANES or not self.all else 1
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate, self.strict = o.balance * differing, 0.5 * differing
-        crossings = len(self.lines[0]) * len(self.lines[1])
-        anew = coarsest and crossings <= MOST_KEPT
-        self.novelty = float32(o.novelty * min(1.0, 256 / n, (n / 128) ** 2) * Y.matched * Y.variance if anew else 0)
+        freedom = min(1.0, 256 / n, (n / 128) ** 2) if coarsest else 0.0
+        self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""
@@ -403,19 +398,17 @@ def candidates_of(level, X, s, near, turn):
     return found, [k < favoured for k in range(len(found))], []
 
 
-def distances(level, near, numbers, lanes):
+def distances(level, near, numbers):
     """d_p of equation (12) for each candidate, rounded after each term.
 
-    In lanes there is a sum for each column, modulo 16, of the square around the neighbourhood, which is gone through
-    row by row; a tree adds them up.
+    There is a sum for each column, modulo 16, of the square around the neighbourhood, which is gone through row by row;
+    a tree adds them up.
     """
-    d, offsets = np.zeros((lanes, len(numbers)), float32), [*level.offsets, (0, 0)]
-    inside = [k for k, r in enumerate(near) if r is not None]
-    if lanes > 1:
-        inside.sort(key=lambda k: offsets[k])
+    d, offsets = np.zeros((LANES, len(numbers)), float32), [*level.offsets, (0, 0)]
+    inside = sorted((k for k, r in enumerate(near) if r is not None), key=lambda k: offsets[k])
     for k in inside:
         x, certain = near[k][:2]
-        lane = (offsets[k][1] + isqrt(level.o.order)) % lanes
+        lane = (offsets[k][1] + isqrt(level.o.order)) % LANES
         for x_r, u, y_r in zip(x, certain, level.around[k], strict=True):
             e = (x_r - y_r[numbers]) * float(u)
             d[lane] = (e * e + d[lane].astype(float)).astype(float32)  # the double is exact
@@ -477,13 +470,11 @@ def weights(level, d):
 
 
 def drawn(level, d, numbers, s, turn):
-    """The Gibbs sampler: a candidate by its weight and, of a density, a step from its grey levels."""
+    """The Gibbs sampler: the candidate of least d_p - 2h^2 G_p and, of a density, a step from its grey levels."""
     density = level.o.pixel == "density"
-    w = weights(level, d)
-    for y in level.own if density else []:
-        w = [max(1, w_p * mass(level, y[p])[1] >> 32) if w_p else 0 for w_p, p in zip(w, numbers, strict=True)]
-    target = below(words(level.seed, level.number, turn, level.index(s), random.DRAW), sum(w))
-    p = next(p for k, p in enumerate(numbers) if sum(w[: k + 1]) > target)
+    spread = float32(1) / level.scale
+    total = [fma(spread, np.atleast_1d(noise(level, p, s, turn)), d_p)[0] for d_p, p in zip(d, numbers, strict=True)]
+    p = min(zip(total, numbers, strict=True))[1]
     values = level.own[:, p].tolist()
     for c, y in enumerate(values if density else []):
         low, whole = mass(level, y)
@@ -491,6 +482,25 @@ def drawn(level, d, numbers, s, turn):
         step = next(k for k, end in enumerate(level.below_step) if end > u) - level.reach
         values[c] = y + step
     return values, p
+
+
+def noise(level, p, s, turn):
+    """-G_p, less the logarithms of the shares of the kernels around y_p that are legal.
+
+    Candidates of a row that are a neighbour's distance apart are a run, and have their words by sixteens: four sixteens
+    share one draw.
+    """
+    row, col, cols, runs = 0, p, len(level.places), 1
+    if level.all:
+        row, col = (level.lines[axis].index(level.at[p][axis]) for axis in (0, 1))
+        cols = len(level.lines[1])
+        runs = min(level.spacing // level.step, cols)
+    unit = (row * runs + col % runs) * -(-cols // (runs * UNIT)) + col // runs // UNIT
+    attempt, which = unit // 4 * UNIT + col // runs % UNIT, unit % 4
+    found = minus_gumbel(words(level.seed, level.number, turn, level.index(s), random.GUMBEL, attempt)[which])
+    for y in level.own[:, p].tolist() if level.o.pixel == "density" else []:
+        found = found - (logarithm(mass(level, y)[1])[0] - float32(22.1807098))
+    return found
 
 
 def mode(level, d):

@@ -13,7 +13,7 @@ from plain_numbers import philox
 from simdtex import random
 from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_folder, kernel_source
-from simdtex.ops.arithmetic import exp32, fma32, log32
+from simdtex.ops.arithmetic import exp32, fma32, log32, minus_gumbel
 
 # -- fma(), exp() and log(): the bits of the NumPy twins against exact arithmetic, and of devices against the twins.
 
@@ -28,6 +28,11 @@ __kernel void exps(__global const float *x, __global float *out)
 {
     const int i = get_global_id(0);
     out[i] = exp32(x[i]);
+}
+__kernel void gumbels(__global const uint *x, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = minus_gumbel(x[i]);
 }
 __kernel void logs(__global const float *x, __global float *out)
 {
@@ -138,7 +143,7 @@ def test_exp32_of_0_is_1_and_it_never_exceeds_1():
 @pytest.fixture(scope="module")
 def build(machine):
     """The program above on a machine, as it builds its own."""
-    headers = kernel_source("common/exp.h") + kernel_source("common/log.h")
+    headers = kernel_source("common/exp.h") + kernel_source("common/gumbel.h")
     kernels = devices.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):
@@ -166,14 +171,15 @@ def test_exp32_of_a_device_has_the_twins_bits(build):
     assert_same_bits(build("exps", x), exp32(x))
 
 
-def numbers_from_1():
+def numbers_to_log():
     rng = np.random.default_rng(2)
     near, whole = 1 + rng.random(100_000), np.arange(1, 2**17)
-    return np.concatenate([near, whole, np.exp(rng.uniform(0, 16.6, 200_000)), [2**24 - 1]]).astype(np.float32)
+    small = np.exp(rng.uniform(-23, 0, 100_000))
+    return np.concatenate([near, whole, np.exp(rng.uniform(0, 16.6, 200_000)), [2**24 - 1], small]).astype(np.float32)
 
 
 def test_log32_is_as_close_as_stated():
-    x = numbers_from_1()
+    x = numbers_to_log()
     assert abs(log32(x) - np.log(x.astype(np.float64))).max() < tolerances.LOG32
 
 
@@ -183,8 +189,29 @@ def test_log32_of_1_is_0_and_of_2_squared_twice_that_of_2():
 
 
 def test_log32_of_a_device_has_the_twins_bits(build):
-    x = numbers_from_1()
+    x = numbers_to_log()
     assert_same_bits(build("logs", x), log32(x))
+
+
+def words_of_all_sizes():
+    """Random words, and many near both ends."""
+    near = np.unique(np.exp(np.linspace(0, 22, 100_000)).astype(np.int64))
+    among = np.random.default_rng(3).integers(0, 2**32, 200_000)
+    split = int(2**32 * 0.5**0.5) + np.arange(-1000, 1000)  # where u is sqrt(1/2)
+    return np.unique(np.concatenate([[0], near, 2**32 - 1 - near, [2**32 - 1], among, split])).astype(np.uint32)
+
+
+def test_gumbel_noise_is_as_close_as_stated_at_both_ends():
+    bits = words_of_all_sizes()
+    rest = (2.0**32 - 1 - bits + 0.5) / 2**32  # 1 - u, exact in float64
+    exact = np.where(rest < 0.5, np.log(-np.log1p(-rest)), np.log(-np.log((bits + 0.5) / 2**32)))
+    assert abs(minus_gumbel(bits) - exact).max() < tolerances.GUMBEL
+    assert minus_gumbel(np.uint32([2**32 - 1]))[0] == pytest.approx(-33 * np.log(2))
+
+
+def test_gumbel_noise_of_a_device_has_the_twins_bits(build):
+    bits = words_of_all_sizes()
+    assert_same_bits(build("gumbels", bits), minus_gumbel(bits))
 
 
 # -- simdtex/random.py: Philox4x32-10 against its authors' known answers, and what is made of its bits.
@@ -242,15 +269,18 @@ def test_draws_of_many_sites_are_the_draws_of_each():
     assert np.array_equal(np.stack(many, -1), np.array(each))
 
 
+PURPOSES = ("START", "DRAW", "COLOR", "SCHEDULE", "NOISE", "SEARCH", "GUMBEL")
+
+
 def test_no_two_purposes_share_a_number():
-    purposes = [random.START, random.DRAW, random.COLOR, random.SCHEDULE]
+    purposes = [getattr(random, name) for name in PURPOSES]
     assert len(set(purposes)) == len(purposes)
     assert max(purposes) < 256, "the level begins at bit 8"
 
 
 def test_the_kernels_know_the_same_purposes():
     header = (kernel_folder() / "common" / "philox.h").read_text()
-    for name in ("START", "DRAW", "COLOR"):
+    for name in PURPOSES:
         assert f"#define PURPOSE_{name} {getattr(random, name)}u\n" in header
 
 

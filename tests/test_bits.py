@@ -93,17 +93,12 @@ import sys
 import numpy as np
 import simdtex
 from cases import REFERENCE, assert_same_bits, ising, texture
-import simdtex.ops.relax as rule
-from simdtex.methods.mrf import level
-from simdtex.ops import leaves
 from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
 
 info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
 few = (np.indices((5, 6)).sum(0) // 2 % 3).astype(np.uint8)
-leaves.LEAST = 1  # few as the candidates are
-rule.KEPT = level.KEPT = 40  # of finer levels, they are weighed by several kernels
 runs = [
     (grey, None, {"order": 1, "levels": 2}),
     (texture((8, 9)), None, {"order": 5, "levels": 2, "search": "exact"}),
@@ -116,7 +111,7 @@ runs = [
     (grey, None, {"method": "pyramid", "iterations": 1, "levels": 1, "orientations": 2}),
     (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup"}),
 ]
-machines = [OpenCL(info, work_group=3, vector=4, split=3), OpenCL(info, work_group=4, vector=1, split=64)]
+machines = [OpenCL(info, work_group=3, vector=4), OpenCL(info, work_group=4, vector=1)]
 machines = [OpenCL(info), *machines]
 for number, (sample, axis, options) in enumerate(runs):
     for machine in machines[: 3 if number < 2 else 1]:

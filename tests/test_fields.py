@@ -9,6 +9,7 @@ from cases import REFERENCE, assert_same_bits, host, problem, problems, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
+from test_relax import apart
 from tolerances import SIGNIFICANCE
 
 from simdtex import random
@@ -17,7 +18,7 @@ from simdtex.model.sample import Sample
 from simdtex.ops import sites as sites_module
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Relaxed
-from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.neighbourhood import Field, near
 from simdtex.ops.sites import among, stretches, survey
 from simdtex.ops.snapshot import TYPES, snapshot
 from simdtex.ops.start import start
@@ -317,34 +318,30 @@ TILED = [
 @pytest.mark.parametrize("options", TILED, ids=str)
 def test_a_neighbourhood_reads_the_older_picture_across_an_edge(options):
     p, now, old = tiled(1, **options)
-    sites, field, offsets = p.on(REFERENCE)
-    confidence, weighted, _ = neighbourhood(REFERENCE, sites, field, offsets, p.grid)
+    _, values, confidence, *_ = near(p.sites, p.field, p.offsets, p.grid, p.confidences)
     spacing, grid = p.grid.spacing, p.grid
     for s, (row, col) in enumerate(p.where()):
         i, j = row // spacing, col // spacing
         for k, r in enumerate(plain.neighbours(i, j, p.order, grid.rows, grid.cols, grid.torus)):
             if r is None:
-                assert not confidence[k, s] and not weighted[k, :, s].any()
+                assert not confidence[k, 0, s]
                 continue
             seen = now if tiles_of(grid, i, j) == tiles_of(grid, *r) else old
             here = r[0] * spacing, r[1] * spacing
             u = 1 - seen.temperature[here] / 1024
-            assert confidence[k, s] == u
-            assert np.array_equal(weighted[k, :, s], seen.values[(slice(None), *here)] * u)
+            assert confidence[k, 0, s] == u
+            assert np.array_equal(values[k, :, s], seen.values[(slice(None), *here)])
 
 
+@pytest.mark.parametrize("exact", [False, True], ids=["list", "exact"])
 @pytest.mark.parametrize("options", TILED, ids=str)
-def test_every_reader_has_its_twins_bits_on_a_device(machine, options):
+def test_every_reader_has_its_twins_bits_on_a_device(machine, options, exact):
     p, now, _ = tiled(2, **options)
-    outcomes = []
-    for m in (REFERENCE, machine):
-        sites, field, offsets = p.on(m)
-        near = neighbourhood(m, sites, field, offsets, p.grid)
-        confidence, weighted, cooled = host(m, (*near[:2], temperature(m, sites, field, offsets, p.grid, -1024)))
-        found, candidates = p.distances(m, 1.0)
-        distance = np.abs(m.get(found.distance))[: candidates.size, : p.sites.size]
-        outcomes.append([confidence[:, : p.sites.size], weighted[..., : p.sites.size], cooled, distance])
-    assert_same_bits(*outcomes)
+    how = {"exact": exact, "coherence": 1.0}
+    assert_same_bits(apart(machine, p, **how), apart(REFERENCE, p, **how))
+    sites, field, offsets = p.on(machine)
+    cooled = machine.get(temperature(machine, sites, field, offsets, p.grid, -1024))
+    assert_same_bits(cooled, apart(REFERENCE, p, **how)[2])
     alone = p._replace(field=now, grid=replace(p.grid, tile=None))
-    apart = (alone.distances(REFERENCE, 1.0)[0].distance != p.distances(REFERENCE, 1.0)[0].distance).any()
-    assert apart == (options["tile"] != (50, 50)), "the older picture matters, unless there is one tile"
+    differs = (alone.cost() != p.cost()).any()
+    assert differs == (options["tile"] != (50, 50)), "the older picture matters, unless there is one tile"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import simdtex
 from simdtex.model.sample import Sample
-from simdtex.ops.histogram import histogram
+from simdtex.ops.lcpdf import histogram
 
 GREYS = 3
 
@@ -24,8 +24,8 @@ def few_levels(seed, order, torus, temperatures="mixed", side=12):
 
 
 def run(machine, p):
-    distances, candidates = p.distances(machine)
-    return machine.get(histogram(machine, distances, candidates, GREYS))
+    sites, field, _ = p.on(machine)
+    return machine.get(histogram(machine, sites, field, p.relaxation(machine, exact=True), GREYS))
 
 
 def counted(p):

@@ -27,7 +27,6 @@ from simdtex.model.given import around, between
 from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of, sums_around
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.ops.nearest import strip_of
 from simdtex.ops.sites import coloring
 from simdtex.ops.square import square_of
 from simdtex.run import Simulating
@@ -112,13 +111,13 @@ def test_candidates_and_their_neighbours_are_those_of_plain_loops(spacing, phase
     assert sample.own(places.positions)[:, 0].tolist() == [volume[at] for at in wanted]
     assert places.shape == tuple(len({at[axis] for at in wanted}) for axis in range(3))
     machine = simdtex.open_machine("reference")
-    strip, square = strip_of(machine, sample, places), square_of(machine, sample, places)
+    square = square_of(machine, sample, places, True)
     for number, at in enumerate(wanted):
         near = [framed[tuple(a + margin + spacing * b for a, b in zip(at, o, strict=True))] for o in ball(order)]
         assert sample.working[0, places.positions[number] + places.reach].tolist() == near
-        row, col = divmod(number, strip.cols)
-        first = strip.first + row // strip.high * strip.thick + row % strip.high * strip.pitch + col
-        assert strip.pixels[0, first + strip.reach].tolist() == near
+        row, col = divmod(number, square.cols)
+        first = square.at[row * square.cols + col % square.runs]
+        assert square.at[number] == first + col // square.runs, "every `runs`-th of a row is side by side"
         layer, line, column = parts_of(offsets)
         there = square.at[number] + layer * square.deep + line * square.down + column
         assert square.levels[0, there].tolist() == near

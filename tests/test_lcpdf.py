@@ -3,20 +3,14 @@
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems, texture
+from cases import REFERENCE, assert_same_bits, check_chi_square, opencl, problem, problems, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import chisquare
-from tolerances import LCPDF, SIGNIFICANCE
+from test_relax import apart
+from tolerances import LCPDF
 
 import simdtex
-from simdtex.model.lattice import Grid
 from simdtex.ops import lcpdf
-
-
-def distances(machine, p):
-    found, candidates = p.distances(machine)
-    return np.asarray(machine.get(found.distance))[: candidates.size, : found.sites]
 
 
 def plain_distances(p):
@@ -32,44 +26,15 @@ def plain_distances(p):
 @given(problems(max_order=5))
 @settings(max_examples=20)
 def test_the_distance_is_equation_12(p):
-    ours = distances(REFERENCE, p)
+    p = p._replace(regular=False, between=False, soft=0)
+    ours = p.cost()
     # float32 holds 24 bits; the rounding of each of at most 60 terms adds half a unit in the last place.
     np.testing.assert_allclose(ours, plain_distances(p), rtol=60 * 2.0**-24, atol=0)
 
 
 def test_the_distance_of_cold_8_bit_pixels_is_exact():
     p = problem(1, order=18, temperatures="zero", torus=False)
-    assert np.array_equal(distances(REFERENCE, p), plain_distances(p))
-
-
-@given(p=problems(max_order=18))
-@settings(max_examples=30)
-def test_distances_of_a_device_have_the_references_bits(machine, p):
-    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
-@pytest.mark.parametrize("channels", [1, 3, 4])
-def test_distances_at_large_orders_have_the_references_bits(machine, channels, dtype):
-    """The most neighbours times channels: the sums are longest and least exact here."""
-    p = problem(2, order=50, channels=channels, dtype=dtype, sample_shape=(20, 19), shape=(20, 17), count=40)
-    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
-
-
-@pytest.mark.parametrize("how", [{"guides": 2}, {"nowhere": 0.3, "weight": 1.0}], ids=str)
-def test_distances_and_the_least_of_what_is_given_have_the_references_bits(machine, how):
-    p = problem(5, order=8, channels=2, sample_shape=(16, 15), shape=(13, 12), count=70, **how)
-    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
-    choice, key = lcpdf.Choice(False, False, p.window()[0]), lcpdf.Key(1, 0, 1)
-    taken = {
-        m.name: host(m, lcpdf.take(m, *p.distances(m), m.put(p.sites), p.grid, choice, key))
-        for m in (REFERENCE, machine)
-    }
-    first, second = taken.values()
-    assert_same_bits(first, second)
-    assert len(first[1]) == p.sample.channels, "a guide is never made"
-    nearest = p.distances(REFERENCE)[0].distance.argmin(0)
-    assert_same_bits(first[0], p.candidates(REFERENCE).positions[nearest])
+    assert np.array_equal(p.cost(), plain_distances(p))
 
 
 @given(st.integers(0, 100), st.sampled_from([1, 2, 8]), st.sampled_from([1, 3]))
@@ -209,13 +174,16 @@ DRAWS = 10_000
 SEEDS = (1, 2**33 + 7, 2**64 - 1)
 
 
-def draw_many(machine, p, win, noisy, strength=0.0):
-    """Draws at the problem's only site, each under another site's number and over several seeds."""
-    p = p._replace(sites=np.repeat(p.sites[:1], DRAWS))
-    found, candidates = p.distances(machine, strength)
-    numbers = machine.put(np.arange(DRAWS, dtype=np.int32))
-    how = (found, candidates, numbers, Grid(1, DRAWS), lcpdf.Choice(True, noisy, win))
-    drawn = [host(machine, lcpdf.take(machine, *how, lcpdf.Key(seed, 1, 3))) for seed in SEEDS]
+def draw_many(p, win, density, strength=0.0):
+    """Draws at the problem's first site, each under another site's number and over several seeds."""
+    drawn, places = [], np.arange(DRAWS)
+    for seed in SEEDS:
+        rule = p.relaxation(REFERENCE, exact=True, coherence=strength, seed=seed, level=1)
+        rule = rule._replace(choice=lcpdf.Choice(True, density, win))
+        numbers, cost = rule.evaluate(p.sites[:1], p.field, 3)
+        many, noise = np.repeat(cost, DRAWS, 1), rule.noise(numbers, places, 3)
+        found = lcpdf.taken(numbers, many, noise, p.candidates(REFERENCE), places, rule.choice, lcpdf.Key(seed, 1, 3))
+        drawn.append(found)
     choice, values = (np.concatenate(a, -1) for a in zip(*drawn, strict=True))
     return choice, values
 
@@ -230,22 +198,6 @@ def reweighted(p, strength):
         d = plain.distance(x, p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus)
         found.append(d / (1 + strength) if position in continuing else d)
     return np.array(found)
-
-
-def check_chi_square(counts, probabilities):
-    """Pearson's test; outcomes expected less than 5 times are taken together."""
-    expected = probabilities / probabilities.sum() * counts.sum()
-    rare = expected < 5
-    if rare.any():
-        counts = np.append(counts[~rare], counts[rare].sum())
-        expected = np.append(expected[~rare], expected[rare].sum())
-        if expected[-1] < 5:  # all the rare ones are rare together
-            least = expected[:-1].argmin()
-            counts[least] += counts[-1]
-            expected[least] += expected[-1]
-            counts, expected = counts[:-1], expected[:-1]
-    assert expected.size >= 3, "there is something to draw from"
-    assert chisquare(counts, expected).pvalue > SIGNIFICANCE
 
 
 CASES = [
@@ -265,7 +217,7 @@ def test_a_draw_of_a_grey_level_follows_the_density(case, seed):
     order, bandwidth, temperatures, strength, torus = case
     p = problem(seed, order=order, temperatures=temperatures, torus=torus, shape=(7, 8))
     win, h = p.window(bandwidth)
-    _, values = draw_many(REFERENCE, p, win, True, strength)
+    _, values = draw_many(p, win, True, strength)
     density = plain.mixture(reweighted(p, strength), [p.padded()[0][q] for q in p.positions()], h, 256)
     check_chi_square(np.bincount(values[0], minlength=256), density)
 
@@ -276,7 +228,7 @@ def test_a_draw_of_a_source_follows_the_weights(case, seed):
     order, bandwidth, temperatures, strength, torus = case
     p = problem(seed, order=order, channels=3, temperatures=temperatures, torus=torus, shape=(7, 8))
     win, h = p.window(bandwidth)
-    choice, values = draw_many(REFERENCE, p, win, False, strength)
+    choice, values = draw_many(p, win, False, strength)
     d = reweighted(p, strength)
     weights = np.exp(-(d - d.min()) / (2 * h * h))
     where = p.candidates(REFERENCE)
@@ -292,7 +244,7 @@ def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
     p.sample._lay([levels], p.sample.margin)
     p = p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
     win, h = p.window(1.0)
-    _, values = draw_many(REFERENCE, p, win, True)
+    _, values = draw_many(p, win, True)
     for c in range(2):
         density = plain.mixture(reweighted(p, 0), [p.padded()[c][q] for q in p.positions()], h, 256)
         check_chi_square(np.bincount(values[c], minlength=256), density)
@@ -306,45 +258,29 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
     p = p._replace(field=p.field._replace(source=np.zeros_like(p.field.source), values=p.field.values * 0))
     for h in (0.5, 40.0, 1e6):
         win = lcpdf.window(h, 255)
-        _, values = draw_many(REFERENCE, p, win, True)
+        _, values = draw_many(p, win, True)
         steps = np.exp(-(np.arange(256) ** 2) / (2 * h * h))
         if h > 0.5:
             check_chi_square(np.bincount(values[0], minlength=256), steps)
         assert values.max() <= 255
 
 
-CHOICES = [(False, False), (True, False), (True, True), (False, True)]
-"""Whether sites draw, and whether they take grey levels of the density."""
+@given(
+    p=problems(max_order=8, channels=(1, 3)),
+    bandwidth=st.sampled_from([0.15, 1.0, 3.0]),
+    coherence=st.sampled_from([0.0, 1.0]),
+)
+@settings(max_examples=12)
+def test_the_mode_of_a_device_has_the_references_bits(machine, p, bandwidth, coherence):
+    how = {"exact": True, "density": True, "dear": 0.1, "bandwidth": bandwidth, "coherence": coherence}
+    assert_same_bits(apart(machine, p, **how), apart(REFERENCE, p, **how))
 
 
-def relaxed(machine, p, bandwidth, strength, draws, density):
-    found, candidates = p.distances(machine, strength)
-    choice, key = lcpdf.Choice(draws, density, p.window(bandwidth)[0]), lcpdf.Key(2**63 + 11, 3, 2)
-    return host(machine, lcpdf.take(machine, found, candidates, machine.put(p.sites), p.grid, choice, key))
-
-
-bandwidths = st.sampled_from([0.15, 1.0, 3.0])
-strengths = st.sampled_from([0.0, 1.0])
-
-
-@given(p=problems(channels=(1, 3)), bandwidth=bandwidths, strength=strengths)
-@settings(max_examples=25)
-def test_a_device_has_the_references_bits(machine, p, bandwidth, strength):
-    for choice in CHOICES:
-        theirs = relaxed(REFERENCE, p, bandwidth, strength, *choice)
-        assert_same_bits(relaxed(machine, p, bandwidth, strength, *choice), theirs)
-
-
-def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
+@pytest.mark.parametrize("gibbs", [False, True], ids=["mode", "draw"])
+def test_choices_near_the_ends_of_the_levels_have_the_references_bits(machine, gibbs):
     """A wide kernel around black and white pixels."""
     p = problem(8, order=1, channels=3, shape=(9, 9))
     extremes = np.where(p.sample.levels[0] > 127, 255, 0).astype(np.uint16)
-    p.sample._lay([extremes], 0)
-    win = lcpdf.window(90.0, 255)
-
-    def run(m):
-        found, candidates = p.distances(m)
-        how = (m.put(p.sites), p.grid, lcpdf.Choice(True, True, win), lcpdf.Key(5, 0, 1))
-        return host(m, lcpdf.take(m, found, candidates, *how))
-
-    assert_same_bits(run(machine), run(REFERENCE))
+    p.sample._lay([extremes], p.sample.margin)
+    how = {"exact": True, "density": True, "gibbs": gibbs, "bandwidth": 3.0}
+    assert_same_bits(apart(machine, p, **how), apart(REFERENCE, p, **how))

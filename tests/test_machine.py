@@ -30,7 +30,6 @@ from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import PENDING, Log, Reference
-from simdtex.model.sample import BLOCK
 from simdtex.report.tables import profile_summary, profile_table, seconds_text
 from simdtex.run import Iterating, Progress, Relaxing, Sampling, paced
 
@@ -371,12 +370,12 @@ def test_the_reference_has_no_profile(tmp_path):
 @given(st.integers(1, 200_000), st.integers(1, 300), st.integers(1, 4))
 def test_a_chunk_of_sites_fits_the_scratch_memory(candidates, neighbours, channels):
     machine = OpenCL.__new__(OpenCL)
-    machine.scratch, machine.vector = 2**24, 16
-    sites = machine.chunk(candidates, neighbours, channels)
-    padded = -(-candidates // BLOCK) * BLOCK
-    per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
-    assert sites % 16 == 0
-    assert sites == 16 or (sites * per_site <= 2**24 and sites * padded * neighbours * channels <= 2e9)
+    machine.scratch = 2**24
+    for table in (0, 3072):
+        sites = machine.chunk(candidates, neighbours, channels, table)
+        per_site = table + 8 * neighbours * (1 + channels)
+        assert sites == 1 or sites * per_site <= 2**24
+        assert sites == 1 or sites * candidates * neighbours * channels <= 2e9
 
 
 def test_a_run_that_does_not_fit_the_device_is_refused(any_device):

@@ -18,7 +18,7 @@ from simdtex.methods.mrf.record import Record, expected_work
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.ops.relax import Everything, Listed
+from simdtex.ops.relax import AllCandidates, CandidateList
 
 
 def test_the_mode_of_a_density_is_of_all_candidates():
@@ -175,13 +175,13 @@ def test_a_window_of_a_level():
     run = prepared()
     whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
     assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
-    assert (window.weighed.shape, window.weighed.dtype, window.weighed.any()) == ((4, 5), np.int32, False)
-    assert whole.weighed is run.weighed
-    assert (run.weighed.shape, run.weighed.dtype, run.weighed.any()) == ((20, 23), np.int32, False)
+    assert (window.evaluations.shape, window.evaluations.dtype, window.evaluations.any()) == ((4, 5), np.int32, False)
+    assert whole.evaluations is run.evaluations
+    assert (run.evaluations.shape, run.evaluations.dtype, run.evaluations.any()) == ((20, 23), np.int32, False)
 
 
-def test_a_level_with_few_candidates_weighs_them_all(monkeypatch):
-    for most, kind in ((599, Listed), (600, Everything)):
+def test_a_level_with_few_candidates_evaluates_them_all(monkeypatch):
+    for most, kind in ((599, CandidateList), (600, AllCandidates)):
         monkeypatch.setattr("simdtex.methods.mrf.level.EXHAUSTIVE", most)
         assert type(prepared(search="coherent").level(0).proposal) is kind
 

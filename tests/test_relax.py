@@ -1,39 +1,20 @@
-"""The relaxation of a site: candidates that neighbours suggest, or all of them, weighed in one kernel or in several."""
+"""The relaxation of a site: candidates that neighbours suggest, or all of them, and the choice among them."""
 
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl, problem, texture
+from cases import REFERENCE, assert_same_bits, check_chi_square, host, opencl, problem, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
 from simdtex.machine.opencl import OpenCL
-from simdtex.ops import lcpdf
+from simdtex.model.lattice import Grid
 from simdtex.ops.commit import commit
-from simdtex.ops.lcpdf import Choice
-from simdtex.ops.relax import SUGGESTING, Everything, Listed, Relaxation, relax, relax_apart
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.relax import SUGGESTING, relax, relax_out_of_place
 from simdtex.ops.sites import coloring
 from simdtex.schedules import Checked, Coloring
-
-
-def proposal(machine, p, exhaustive=False, chance=4):
-    """The coherent search's proposer; `exhaustive`: the exact one's."""
-    if exhaustive:
-        return Everything(p.candidates(machine, every=True), p.strip(machine))
-    return Listed(p.candidates(machine), p.square(machine), len(p.offsets), chance)
-
-
-def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
-    window, _ = p.window(0.5)
-    discount, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
-    terms = (
-        discount,
-        np.float32(novelty * p.sample.variance),
-        p.costs(machine, dear, options.get("exhaustive", False)),
-    )
-    proposed = proposal(machine, p, **options)
-    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.confidences)
 
 
 def counter(machine, p):
@@ -41,11 +22,11 @@ def counter(machine, p):
 
 
 def apart(machine, p, turn=3, **how):
-    """What the problem's sites become, and how many candidates each weighed."""
+    """What the problem's sites become, and how many candidates each has evaluated."""
     sites, field, _ = p.on(machine)
-    weighed = counter(machine, p)
-    relaxed, cooled = relax_apart(machine, sites, field, weighed, relaxation(machine, p, **how), turn)
-    return host(machine, [relaxed.choice, relaxed.values, cooled, weighed])
+    evaluations = counter(machine, p)
+    relaxed, cooled = relax_out_of_place(machine, sites, field, evaluations, p.relaxation(machine, **how), turn)
+    return host(machine, [relaxed.choice, relaxed.values, cooled, evaluations])
 
 
 def suggestions(p, site):
@@ -88,9 +69,9 @@ def reflecting(draw):
 FORMS = st.fixed_dictionaries(
     {
         "chance": st.sampled_from([0, 1, 4, 6]),
-        "exhaustive": st.sampled_from([False, False, True]),
+        "exact": st.sampled_from([False, False, True]),
         "gibbs": st.booleans(),
-        "noisy": st.booleans(),
+        "density": st.booleans(),
         "coherence": st.sampled_from([0.0, 0.7, 3.0]),
         "dear": st.sampled_from([0.0, 1.0]),
         "novelty": st.sampled_from([0.0, 0.0, 2.0]),
@@ -101,13 +82,12 @@ FORMS = st.fixed_dictionaries(
 @given(p=reflecting(), form=FORMS)
 @settings(max_examples=20)
 def test_a_device_has_the_references_bits(machine, p, form):
-    form = form | {"noisy": form["noisy"] and (form["gibbs"] or (form["exhaustive"] and not form["novelty"]))}
-    if not form["exhaustive"]:  # a list knows no novelty
-        form["novelty"] = 0.0
+    form["density"] &= form["gibbs"] or (form["exact"] and not form["novelty"])
+    form["novelty"] *= form["exact"]  # a list knows no novelty
     assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
 
 
-HOWS = [{"chance": 9}, {"gibbs": True}, {"exhaustive": True, "novelty": 2.0}, {"exhaustive": True, "gibbs": True}]
+HOWS = [{"chance": 9}, {"gibbs": True}, {"exact": True, "novelty": 2.0}, {"exact": True, "gibbs": True}]
 GIVEN = [
     {"nowhere": 0.3, "weight": 1.0},
     {"guides": 2, "channels": 2, "spacing": 2, "torus": False},
@@ -120,16 +100,9 @@ GIVEN = [
 
 @pytest.mark.parametrize("form", HOWS, ids=str)
 @pytest.mark.parametrize("how", GIVEN, ids=str)
-def test_a_device_has_the_references_bits_of_what_is_given(machine, monkeypatch, how, form):
-    """In one kernel, and of all candidates in several."""
+def test_a_device_has_the_references_bits_of_what_is_given(machine, how, form):
     p = problem(9, order=8, sample_shape=(11, 12), shape=(13, 17), edges="reflect", count=90, **how)
-    expected = apart(REFERENCE, p, dear=0.3, **form)
-    assert_same_bits(apart(machine, p, dear=0.3, **form), expected)
-    if form.get("exhaustive"):
-        monkeypatch.setattr("simdtex.ops.relax.KEPT", 10)
-        form = form | {"novelty": 0.0}
-        assert not relaxation(machine, p, **form).fused
-        assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
+    assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
 
 
 @pytest.mark.parametrize("form", HOWS, ids=str)
@@ -149,7 +122,7 @@ def test_a_wide_neighbourhood_takes_more_than_one_vector_a_row(machine):
 def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
     p = problem(seed, order=5, shape=(10, 11), spacing=spacing, edges="reflect", temperatures="mixed", channels=2)
     discount = 1 / (1 + 0.7)
-    choice, values, cooled, weighed = apart(REFERENCE, p, chance=0, coherence=0.7)
+    choice, values, cooled, evaluations = apart(REFERENCE, p, chance=0, coherence=0.7)
     for s, site in enumerate(p.where()):
         found = suggestions(p, site)
         own = tuple(int(n) for n in p.source()[site])
@@ -157,29 +130,15 @@ def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
         t, here = p.temperature(), (p.order, spacing, p.grid.torus)
         d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
         d = [a * (discount if position in found else 1) for a, position in zip(d, listed, strict=True)]
-        assert weighed[site] == len(listed)
+        assert evaluations[site] == len(listed)
         best = listed.index(divmod(int(choice[s]), p.sample.cols))
         assert d[best] <= min(d) * (1 + 1e-5)
         assert_same_bits(values[:, s], p.sample.working[:, choice[s]])
         assert cooled[s] == plain.cooled(p.field.temperature, site, p.order, spacing, p.grid.torus, -1024)
 
 
-def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
-    p = problem(8, order=2, edges="reflect", sample_shape=(4, 5), temperatures="mixed", count=1)
-    found, candidates = p.distances(REFERENCE, 1.0)
-    window, _ = p.window(0.5)
-    share = lcpdf.weights(found.distance, window.scale)[:, 0].astype(float)
-    drawn = [int(apart(REFERENCE, p, turn, gibbs=True, exhaustive=True)[0][0]) for turn in range(700)]
-    seen = np.array([drawn.count(int(position)) for position in candidates.positions[: candidates.size]])
-    expected = share / share.sum() * len(drawn)
-    often = expected > 5
-    chi2 = ((seen - expected)[often] ** 2 / expected[often]).sum()
-    assert often.sum() > 2
-    assert chi2 < 3 * often.sum() + 10
-
-
 @pytest.mark.parametrize("longest", [16, 2**17])
-@pytest.mark.parametrize("how", [{}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str)
+@pytest.mark.parametrize("how", [{}, {"exact": True}, {"exact": True, "gibbs": True}], ids=str)
 def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     """In pieces, too, where a step has more sites than a launch may."""
     monkeypatch.setattr("simdtex.machine.opencl.LONGEST", longest)
@@ -191,25 +150,25 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     after = {}
     for m in (REFERENCE, machine):
         _, field, _ = p.on(m)
-        weighed = counter(m, p)
-        field = relax(m, m.put(sites), steps, field, weighed, relaxation(m, p, **how), 3)
-        after[m.name] = host(m, [*field, weighed])
+        evaluations = counter(m, p)
+        field = relax(m, m.put(sites), steps, field, evaluations, p.relaxation(m, **how), 3)
+        after[m.name] = host(m, [*field, evaluations])
     first, second = after.values()
     assert_same_bits(first, second)
 
     _, field, _ = p.on(REFERENCE)
-    weighed, rule = counter(REFERENCE, p), relaxation(REFERENCE, p, **how)
+    evaluations, rule = counter(REFERENCE, p), p.relaxation(REFERENCE, **how)
     for begin, end in steps:
         here = sites[begin:end]
-        field = commit(REFERENCE, field, here, *relax_apart(REFERENCE, here, field, weighed, rule, 3))
-    assert_same_bits(first, [*field, weighed])
+        field = commit(REFERENCE, field, here, *relax_out_of_place(REFERENCE, here, field, evaluations, rule, 3))
+    assert_same_bits(first, [*field, evaluations])
 
 
 def test_each_candidate_has_its_penalty():
     """The mode is the least of distance, discounted or not, and penalty."""
     p = problem(3, order=5, shape=(10, 11), edges="reflect", temperatures="mixed", channels=2)
     penalty, discount = p.penalty(), 1 / (1 + 0.7)
-    _, candidates = p.distances(REFERENCE)
+    candidates = p.candidates(REFERENCE)
     numbers = {int(position): n for n, position in enumerate(candidates.positions[: candidates.size])}
     dear = cheap = 0
     choice, *_ = apart(REFERENCE, p, chance=0, coherence=0.7, dear=1.0)
@@ -231,47 +190,156 @@ def test_each_candidate_has_its_penalty():
 
 def test_each_neighbour_that_is_continued_or_taken_again_costs():
     p = problem(4, order=4, shape=(10, 11), edges="reflect", sample_shape=(9, 10))
-    cost = np.float32(2 * p.sample.variance)
-    rule, sites = relaxation(REFERENCE, p, exhaustive=True, coherence=0.0), p.sites
-    _, plainly = rule.proposal.weighed(sites, p.field, rule, 3)
-    _, charged = rule.proposal.weighed(sites, p.field, rule._replace(novelty=cost), 3)
+    plainly, charged, cost = p.cost(), p.cost(novelty=2.0), np.float32(2 * p.sample.variance)
     most = 0
     for s, site in enumerate(p.where()):
         i, j = site
-        costs = {position: [] for position in p.positions()}
+        times = dict.fromkeys(p.positions(), 0)
         near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
         for (di, dj), r in zip(plain.offsets(p.order), near, strict=True):
             if r is not None and p.field.temperature[r] < 1024:
                 row, col = p.source()[r]
-                costs.setdefault((int(row) - di, int(col) - dj), []).append(cost)
-                costs.setdefault((int(row), int(col)), []).append(4 * cost)
+                for position, often in (((int(row) - di, int(col) - dj), 1), ((int(row), int(col)), 4)):
+                    times[position] = times.get(position, 0) + often
         for n, position in enumerate(p.positions()):
-            expected = plainly.distance[n, s]
-            for each in costs[position]:
-                expected = np.float32(expected + each)
-            assert charged.distance[n, s] == expected
-            most = max(most, len(costs[position]))
-    assert most > 1
+            assert charged[n, s] == plainly[n, s] + cost * np.float32(times[position])
+            most = max(most, times[position])
+    assert most > 5
 
 
-@pytest.mark.parametrize("dear", [0.0, 1.0])
-@pytest.mark.parametrize("how", [{}, {"gibbs": True}, {"gibbs": True, "noisy": True}], ids=str)
-def test_few_candidates_in_one_kernel_are_many_in_several(machine, monkeypatch, how, dear):
-    """The exact search has the same bits in either form."""
-    how = how | {"dear": dear}
-    p = problem(14, order=8, channels=2, shape=(11, 13), edges="reflect", sample_shape=(9, 13))
-    one = apart(machine, p, exhaustive=True, **how)
-    monkeypatch.setattr("simdtex.ops.relax.KEPT", 10)
-    assert not relaxation(machine, p, exhaustive=True, **how).fused
-    assert_same_bits(apart(machine, p, exhaustive=True, **how), one)
+FORMS_OF_LAUNCH = [{}, {"vector": 1, "step": 1}, {"vector": 4, "step": 2}, {"step": 8, "work_group": 3}]
+"""The device's own form first; the second is a GPU's."""
 
 
-def test_a_site_that_nothing_suggests_for_weighs_one_candidate_at_random():
+@pytest.mark.parametrize("options", FORMS_OF_LAUNCH, ids=str)
+@pytest.mark.parametrize("gibbs", [False, True], ids=["icm", "gibbs"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"order": 5, "spacing": 2, "edges": "whole", "phases": "all", "sample_shape": (23, 22)},
+        {"order": 5, "spacing": 4, "edges": "reflect", "phases": "all", "sample_shape": (23, 3)},
+        {"order": 5, "spacing": 2, "edges": "reflect", "phases": "decimated", "sample_shape": (41, 82)},
+        {"order": 50, "channels": 3, "sample_shape": (33, 31), "regular": True, "between": True, "soft": 2},
+        {"order": 8, "channels": 2, "sample_shape": (26, 31), "edges": "reflect", "masked": 0.9},
+    ],
+    ids=["runs", "short runs", "decimated", "large", "masked"],
+)
+def test_the_exact_search_skips_nothing_that_the_reference_takes(cl_device, how, gibbs, options):
+    p = problem(2, shape=(12, 13), count=24, **how)
+    how = {"exact": True, "dear": 0.1, "gibbs": gibbs}
+    assert_same_bits(apart(opencl(cl_device, **options), p, **how), apart(REFERENCE, p, **how))
+
+
+def flat(p, levels):
+    """The problem with only so many grey levels, so that most distances have equals."""
+    few = (p.sample.levels[0] // (256 // levels)).astype(np.uint16)
+    p.sample._lay([few], p.sample.margin)
+    return p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+@pytest.mark.parametrize("temperatures", ["mixed", "zero", "one"])
+@pytest.mark.parametrize("coherence", [0.0, 1.0])
+def test_icm_takes_the_first_of_the_least_costs(machine, levels, temperatures, coherence):
+    p = flat(problem(4, order=2, sample_shape=(19, 24), shape=(10, 9), temperatures=temperatures), levels)
+    found, cost = p.candidates(REFERENCE), p.cost(coherence=coherence)
+    for m in (REFERENCE, machine):
+        choice, values, *_ = apart(m, p, exact=True, coherence=coherence)
+        assert_same_bits(choice, found.positions[cost.argmin(0)])
+        assert_same_bits(values, p.sample.working[:, choice])
+
+
+@pytest.mark.parametrize("rank", [1, 4])
+def test_a_candidate_just_within_the_bound_is_found(machine, rank):
+    """Every site's source is the second nearest, which is the bound; or the fifth, and the second becomes the bound."""
+    p = problem(1, order=2, channels=2, sample_shape=(30, 31), shape=(12, 13), temperatures="zero")
+    cost, candidates = p.cost(), p.candidates(REFERENCE)
+    first, second, last = np.argsort(cost, 0, kind="stable")[[0, 1, rank]]
+    near, bound = (np.take_along_axis(cost, which[None], 0)[0] for which in (first, second))
+    assert np.count_nonzero((near < bound) & (near > 0.95 * bound)) > 10
+    source = p.field.source.copy()
+    source.ravel()[p.sites] = candidates.positions[last]
+    p = p._replace(field=p.field._replace(source=source))
+    assert_same_bits(apart(machine, p, exact=True, coherence=0.0)[0], candidates.positions[first])
+
+
+@pytest.mark.parametrize("gibbs", [False, True], ids=["icm", "gibbs"])
+def test_what_is_skipped_is_counted(cl_device, gibbs):
+    p = problem(5, order=8, sample_shape=(40, 48), shape=(16, 16), temperatures="zero")
+    machine, candidates = opencl(cl_device), p.candidates(REFERENCE).size
+    before = machine.spared
+    apart(machine, p, exact=True, gibbs=gibbs, bandwidth=0.15)
+    fma = 2 * p.sites.size * candidates * len(p.offsets)
+    assert fma // 4 < machine.spared - before < fma
+    assert REFERENCE.spared == 0
+
+
+@pytest.mark.parametrize("order", [1, 8, 18, 50])
+def test_the_order_in_which_neighbours_are_looked_at(order):
+    p = problem(1, order=order, sample_shape=(31, 32))
+    square, offsets = p.square(REFERENCE), p.offsets
+    radius, columns = int(offsets.max()), square.disc.shape[-1]
+    place = np.stack(np.divmod(square.looks[:, 0], columns), 1) - radius
+    assert sorted(map(tuple, place)) == sorted([(0, 0), *map(tuple, offsets)])
+    assert place[-1].tolist() == [0, 0]
+    assert square.looks[:, 1].tolist() == (place @ [square.down, 1]).tolist()
+    if order >= 8:
+        gaps = [abs(a - b).sum() for i, a in enumerate(place[:4]) for b in place[:i]]
+        assert min(gaps) >= radius, "the first are far apart"
+
+
+DRAWS = 1000
+"""Rows, and columns, of sites that all see the same: a million draws."""
+
+
+def alike(p):
+    """The problem with so many sites, all of the first one's values, source and temperature."""
+    first = [np.ascontiguousarray(plane[..., :1, :1]) for plane in p.field]
+    field = Field(*(np.tile(plane, (1,) * (plane.ndim - 2) + (DRAWS, DRAWS)) for plane in first))
+    grid = Grid(DRAWS, DRAWS)
+    return p._replace(grid=grid, field=field, sites=grid.sites())
+
+
+@pytest.mark.parametrize("coherence", [0.0, 1.0])
+@pytest.mark.parametrize("bandwidth", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("density", [False, True], ids=["source", "density"])
+def test_a_million_draws_follow_the_lcpdf(any_device, bandwidth, coherence, density):
+    """Chi-square against equation (7) in float64; the draws are the reference's where a part is compared."""
+    machine, p = opencl(any_device), alike(problem(3, order=2, temperatures="zero", sample_shape=(8, 9)))
+    how = {"exact": True, "gibbs": True, "density": density, "bandwidth": bandwidth, "coherence": coherence}
+    choice, values, *_ = apart(machine, p, **how)
+    one = p._replace(sites=p.sites[:1])
+    d, h = one.cost(coherence=coherence)[:, 0].astype(np.float64), p.window(bandwidth)[1]
+    if density:
+        levels = p.sample.working[0, p.candidates(REFERENCE).positions]
+        probability, found = plain.mixture(d, levels, h, 256), np.bincount(values[0], minlength=256)
+    else:
+        probability = np.exp(-(d - d.min()) / (2 * h * h))
+        found = np.bincount(p.candidates(REFERENCE).index_of[choice], minlength=d.size)
+    check_chi_square(found, probability)
+    some = p._replace(sites=p.sites[:: DRAWS * 50])
+    assert_same_bits(apart(REFERENCE, some, **how)[:2], [choice[:: DRAWS * 50], values[:, :: DRAWS * 50]])
+
+
+def test_a_draw_from_a_list_follows_the_weights_of_the_list(machine):
+    """The sites' own source and their neighbours' are one pixel, so all have the same list without chance."""
+    p = alike(problem(5, order=2, temperatures="zero", sample_shape=(9, 9), edges="reflect"))
+    how = {"chance": 0, "gibbs": True, "coherence": 0.7, "bandwidth": 1.0}
+    choice, *_ = apart(machine, p, **how)
+    listed = p.relaxation(REFERENCE, **how).evaluate(p.sites[:1], p.field, 3)
+    numbers, d = (a[np.isfinite(listed.cost[:, 0]), 0] for a in listed)
+    h = p.window(1.0)[1]
+    found = np.bincount(p.candidates(REFERENCE).index_of[choice], minlength=numbers.max() + 1)[numbers]
+    assert found.sum() == DRAWS**2
+    check_chi_square(found, np.exp(-(d.astype(float) - d.min()) / (2 * h * h)))
+
+
+def test_a_site_that_nothing_suggests_for_evaluates_one_candidate_at_random():
     p = problem(12, order=2, temperatures="one", edges="whole", phases="all", sample_shape=(9, 9), shape=(12, 12))
-    choice, _, _, weighed = apart(REFERENCE, p, chance=0)
+    choice, _, _, evaluations = apart(REFERENCE, p, chance=0)
     lonely = [s for s, site in enumerate(p.where()) if tuple(p.source()[site]) not in p.positions()]
     assert lonely
-    assert all(weighed[p.where()[s]] == 1 for s in lonely)
+    assert all(evaluations[p.where()[s]] == 1 for s in lonely)
     assert len({int(choice[s]) for s in lonely}) > 1
 
 

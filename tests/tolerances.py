@@ -8,8 +8,12 @@ EXP32 = 2.5e-7
 |r| <= log(2) / 2 (about 1.2e-7 with its coefficients and steps rounded to float32) after a reduction in two parts."""
 
 LOG32 = 1.2e-6
-"""Absolute error of log32 from 1 to 2**24 against float64: the bound that kernels/common/log.h states. The result is
-below 17, where a float32 is rounded by half of 2**-19, about 1e-6."""
+"""Absolute error of log32 from 2**-33 to 2**24 against float64: the bound that kernels/common/log.h states. The size of
+the result is below 23, where a float32 is rounded by half of 2**-19, about 1e-6."""
+
+GUMBEL = 2e-6
+"""Absolute error of the noise of a draw, of at most 23, against float64: two logarithms, the second of a number whose
+relative error is about 3e-7. The odds of two candidates are off by twice that."""
 
 LCPDF = 1e-5
 """Absolute error of a probability of `simdtex.lcpdf` against equations (6) to (8) and (12) in float64, as its docstring

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What candidate p costs a site beside its distance, simdtex.ops.costs:
+// What candidate p costs a site, simdtex.ops.costs: the sum of these, in this order,
 //
-//   penalty_p + max(0, sum_c (certain (x_c - y_c))^2 - free) + sum_r (hard (x_r - y_r))^2 + sum_k dear_k[kind_k]
+//   factor d_p                                        equation (12), less where it continues a neighbour: coherence.h
+//   penalty_p                                         for its use
+//   max(0, sum_c (certain (x_c - y_c))^2 - free)      for its phases where the sample is regular, -D WAVES of them
+//   sum_r (hard (x_r - y_r))^2                        for data r between the sites of the level, -D SCATTERED channels
+//   sum_k dear_k[kind_k]                              for its kinds, as its category, -D KINDS of them
+//   novelty n_p                                       for each neighbour that it continues, or 4 for one that it repeats
 //
-// the penalty for its use; the difference of their phases where the sample is regular (-D WAVES: cosines and sines);
-// the differences from data r that lie between the sites of the level (-D SCATTERED: channels of each); and what its
-// kinds, as its category, cost at the site (-D KINDS: kinds of a candidate).
+// Only the first may be less than that of all candidates; none is below 0.
 #ifndef SIMDTEX_COSTS_H
 #define SIMDTEX_COSTS_H
-#include "common/confidence.h"
+#include "common/square.h"
 
 #ifndef WAVES
 #define WAVES 0
@@ -20,6 +23,8 @@
 #define KINDS 0
 #endif
 
+// at      (listed,)        place of each candidate in `levels`
+// levels  (C, plane)       grey levels of the sample, columns apart by the level's step side by side
 // penalty (listed,)        of each candidate
 // waves   (WAVES, listed)  of each candidate
 // kind_   (KINDS, listed)  row of `dear` that each candidate's kinds have
@@ -31,14 +36,15 @@
 // pixels_ (C, plane_)      the sample
 // at_     (listed,)        pixel index of each candidate
 #define COSTS                                                                                                          \
-    __global const float *restrict penalty, __global const float *restrict waves, const int listed,                    \
-        __global const ushort *restrict phases, const int area_, const float certain_, const float free_,              \
-        __global const int *restrict begin_, __global const int *restrict reach_, __global const ushort *restrict told, \
-        const float hard_, __global const float *restrict pixels_, const int plane_, __global const int *restrict at_, \
+    __global const int *restrict at, __global const float *restrict levels, __global const float *restrict penalty,    \
+        __global const float *restrict waves, const int listed, __global const ushort *restrict phases,                \
+        const int area_, const float certain_, const float free_, __global const int *restrict begin_,                 \
+        __global const int *restrict reach_, __global const ushort *restrict told, const float hard_,                  \
+        __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
         __global const ushort *restrict kind_, __global const float *restrict dear
-#define PLUS_COSTS(d, p, site)                                                                                         \
-    ((d) + penalty[p] + apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) +                 \
-     MISFIT(p, site) + OF_KIND(p, site))
+#define EVALUATED(p, factor, site)                                                                                     \
+    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.down, g.deep) * (factor) + penalty[p] +                       \
+     apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) + MISFIT(p, site) + OF_KIND(p, site))
 #if KINDS
 #define OF_KIND(p, site) of_kind(kind_ + (p), listed, dear + (site), area_)
 #else

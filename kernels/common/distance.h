@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Equation (12): d = sum over neighbours r of ((x_r - y_r)(1 - t_r))^2, each term two fused multiply-adds. The terms are
-// summed in one of two orders (docs/concepts/same-bits.rst): the canonical one of the neighbours wherever all candidates
-// are weighed, and columns of a square side by side where a list of them is.
+// Equation (12): d = sum over neighbours r of ((x_r - y_r)(1 - t_r))^2, each term two fused multiply-adds.
 #ifndef SIMDTEX_DISTANCE_H
 #define SIMDTEX_DISTANCE_H
 

@@ -15,21 +15,15 @@ typedef struct {
     int candidates;               // of the level
     int chance;                   // candidates at random
     int plane, down, deep;        // of the sample with its columns side by side: pixels to a channel, a row, a layer
-    int first, pitch, size;       // of the strip: the first candidate, pixels to a row, and to a channel
-    int strip_rows, strip_cols;   // rows and columns of candidates
-    int strip_high, thick;        // rows of candidates to a layer, and pixels of the strip to a layer
-    float discount;                 // 1 / (1 + coherence)
-    float scale;                  // 1 / 2h^2 of equation (7)
+    int cols, runs;               // of candidates: columns, and runs of a row whose columns lie side by side in `levels`
+    float discount;               // 1 / (1 + coherence)
+    float scale, spread;          // 1 / 2h^2 of equation (7), and 2h^2 where a site draws, else 0
     int radius;                   // of its kernel over grey levels; -1 where a pixel is the sample's own
     int top;                      // highest legal grey level
-    int draws;                    // whether a site draws or takes the mode
     int xi;                       // of equation (13), in 1/1024
     float novelty;                // what a candidate costs for each neighbour that it continues
     float centre;                 // confidence of a guide at the site itself
     float hard;                   // confidence of hard data
 } Level;
-
-// Where row i of candidates begins in the strip, after the first.
-#define STRIP_ROW(i, high, thick, pitch) ((i) / (high) * (thick) + (i) % (high) * (pitch))
 
 #endif

@@ -11,9 +11,6 @@
 #ifndef C
 #define C 1 // channels of a pixel
 #endif
-#ifndef LEVEL
-#define LEVEL float // in which a sample's working grey levels are stored
-#endif
 #define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
 
 // Whether a distance, or any of a vector of them, has a weight.
@@ -46,7 +43,7 @@ inline uint legal_mass(__global const uint *noise, const int radius, const int y
 
 // W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
 // levels. Dozens of saturated channels do not make it 0.
-inline ulong mass_of(const float d, const float smallest, const float scale, __global const LEVEL *sample,
+inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
                      const int plane, const int from, __global const uint *noise, const int radius, const int top)
 {
     ulong w = weight(d, smallest, scale);

@@ -6,21 +6,21 @@
 #ifndef SIMDTEX_PHILOX_H
 #define SIMDTEX_PHILOX_H
 
-inline uint4 philox(const uint4 counter, const uint2 key)
-{
-    uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
-#pragma unroll
-    for (int round = 0; round < 10; ++round) {
-        const ulong first = 0xD2511F53ul * a, second = 0xCD9E8D57ul * c; // PoCL's mul_hi is in halves
-        a = (uint)(second >> 32) ^ b ^ k0;
-        b = (uint)second;
-        c = (uint)(first >> 32) ^ d ^ k1;
-        d = (uint)first;
-        k0 += 0x9E3779B9u;
-        k1 += 0xBB67AE85u;
+// Ten rounds of words a, b, c, d, each a number or a vector of them; L, WIDEN and NARROW are their 64 bits.
+#define PHILOX(a, b, c, d, key, L, WIDEN, NARROW)                                                                      \
+    {                                                                                                                  \
+        uint k0_ = (key).x, k1_ = (key).y;                                                                             \
+        _Pragma("unroll") for (int round_ = 0; round_ < 10; ++round_)                                                  \
+        {                                                                                                              \
+            const L first_ = WIDEN(a) * 0xD2511F53ul, second_ = WIDEN(c) * 0xCD9E8D57ul; /* PoCL's mul_hi is in halves */ \
+            a = NARROW(second_ >> 32) ^ b ^ k0_;                                                                       \
+            b = NARROW(second_ & 0xfffffffful);                                                                        \
+            c = NARROW(first_ >> 32) ^ d ^ k1_;                                                                        \
+            d = NARROW(first_ & 0xfffffffful);                                                                         \
+            k0_ += 0x9E3779B9u;                                                                                        \
+            k1_ += 0xBB67AE85u;                                                                                        \
+        }                                                                                                              \
     }
-    return (uint4)(a, b, c, d);
-}
 
 // What a draw is for; the same numbers stand in simdtex/random.py.
 #define PURPOSE_START 1u
@@ -29,12 +29,22 @@ inline uint4 philox(const uint4 counter, const uint2 key)
 #define PURPOSE_SCHEDULE 4u
 #define PURPOSE_NOISE 5u
 #define PURPOSE_SEARCH 6u
+#define PURPOSE_GUMBEL 7u
+
+inline uint4 philox(const uint4 counter, const uint2 key)
+{
+    uint a = counter.x, b = counter.y, c = counter.z, d = counter.w;
+    PHILOX(a, b, c, d, key, ulong, convert_ulong, convert_uint)
+    return (uint4)(a, b, c, d);
+}
+
+#define KEY_OF(seed) (uint2)((uint)(seed), (uint)((seed) >> 32))
+#define WHAT_OF(level, site, purpose) ((uint)((site) >> 32) << 16 | (level) << 8 | (purpose))
 
 inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ulong site, const uint purpose,
                    const uint attempt)
 {
-    const uint what = (uint)(site >> 32) << 16 | level << 8 | purpose;
-    return philox((uint4)((uint)site, turn, what, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
+    return philox((uint4)((uint)site, turn, WHAT_OF(level, site, purpose), attempt), KEY_OF(seed));
 }
 
 // An integer 0 .. n-1 from 64 random bits; the bias is below n / 2^64.

@@ -6,9 +6,11 @@
 // and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
 #ifndef SIMDTEX_SQUARE_H
 #define SIMDTEX_SQUARE_H
+#include "common/coherence.h"
 #include "common/confidence.h"
 #include "common/distance.h"
-#include "common/lattice.h"
+#include "common/level.h"
+#include "common/vector.h"
 
 #ifndef RADIUS
 #define RADIUS 4 // of the neighbourhood
@@ -51,6 +53,19 @@ inline void rows_around(const Lattice g, const int i, __private int *row)
 #endif
 }
 
+// Pixel index of the neighbour in row a and column b of the square; -1 where there is none. -D TILES: see lattice.h.
+inline int in_square(const Lattice g, const int site, const int i, const int j, const __private int *row,
+                     const __private int *col, const int a, const int b)
+{
+    if (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site)
+        return -1;
+#ifdef TILES
+    if (row[a] / (g.width * g.spacing) / g.tile_rows != i / g.tile_rows || col[b] / g.spacing / g.tile_cols != j / g.tile_cols)
+        return row[a] + col[b] + g.elsewhere;
+#endif
+    return row[a] + col[b];
+}
+
 #if V == 1
 inline float folded(__private float *a)
 {
@@ -62,7 +77,7 @@ inline float folded(__private float *a)
 #define SQUARE float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16]
 #define U(cell, c, lane) u[((cell) * CONFIDENCES + CONFIDENT(c)) * 16 + (lane)]
 #define XU(cell, c, lane) xu[((cell) * C + (c)) * 16 + (lane)]
-#define SQUARE_ARG __private const float *u, __private const float *xu
+#define SQUARE_ARG(const) const __private float *u, const __private float *xu
 #else
 inline float folded(const float16 a)
 {
@@ -74,7 +89,7 @@ inline float folded(const float16 a)
 #define SQUARE float16 u[CELLS * CONFIDENCES], xu[CELLS * C]
 #define U(cell, c, lane) ((__private float *)(u + (cell) * CONFIDENCES + CONFIDENT(c)))[lane]
 #define XU(cell, c, lane) ((__private float *)(xu + (cell) * C + (c)))[lane]
-#define SQUARE_ARG __private const float16 *u, __private const float16 *xu
+#define SQUARE_ARG(const) const __private float16 *u, const __private float16 *xu
 
 // 1 in the lane of cell k of row a that is the site itself, 0 elsewhere.
 inline float16 middle(const int a, const int k)
@@ -104,6 +119,69 @@ inline int16 spread_int(__global const int *p, const int spacing)
 #endif
 #endif
 
+// The neighbourhood of a site: u = 1 - t_r and x_r u in the lane of each neighbour r, 0 in all others, and of guides in
+// that of the site too. Returns the sum of the temperatures of the neighbours on the lattice, and their number.
+//
+// disc (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
+// Vectors also read what is no neighbour, which others may be writing, and multiply it by 0.
+inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
+                   const __private int *col, __global const ushort *values, __global const int *source,
+                   __global const ushort *temperature, __global const int2 *restrict offsets,
+                   __global const float *restrict disc, SQUARE_ARG())
+{
+    const Lattice h = g.lattice;
+#if V > 1
+    if (h.spacing <= 2 && !h.tile_rows && h.high >= SIDE && j >= RADIUS &&
+        (j - RADIUS + 16 * CHUNKS) * h.spacing <= h.width) {
+        float16 heat = 0.0f, inside = 0.0f; // integers below 2^24, so in any order
+        for (int a = 0; a < ROWS; ++a)
+            for (int k = 0; k < CHUNKS; ++k) {
+                const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
+                const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
+                const float16 t = spread(temperature + from, h.spacing);
+                float16 certain = (1024.0f - t) * 0x1p-10f * in;
+#ifdef OWN
+                certain *= select((float16)1.0f, (float16)g.hard, spread_int(source + from, h.spacing) < 0);
+                const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
+#endif
+                for (int c = 0; c < C; ++c) {
+                    const float16 x = spread(values + c * g.area + from, h.spacing);
+                    const float16 uc = CONFIDENCES_OF(c < MADE, x, certain, guide);
+                    u[cell * CONFIDENCES + CONFIDENT(c)] = uc;
+                    xu[cell * C + c] = x * uc;
+                }
+                heat += t * in;
+                inside += in;
+            }
+        return (int2)((int)folded(heat), (int)folded(inside));
+    }
+#endif
+    for (int cell = 0; cell < CELLS; ++cell)
+        for (int n = 0; n < 16; ++n) {
+            for (int c = 0; c < CONFIDENCES; ++c)
+                U(cell, c, n) = 0.0f;
+            for (int c = 0; c < C; ++c)
+                XU(cell, c, n) = 0.0f;
+        }
+    int2 found = 0;
+    for (int k = 0; k < g.neighbours + (G > 0); ++k) {
+        const int self = k == g.neighbours, a = self ? ROW(0) : ROW(offsets[k].x), b = self ? RADIUS : offsets[k].y + RADIUS;
+        const int r = self ? site : in_square(h, site, i, j, row, col, a, b), cell = a * CHUNKS + b / 16;
+        if (r < 0)
+            continue;
+        const int t = self ? UNTOUCHED : temperature[r];
+        found += self ? (int2)0 : (int2)(t, 1);
+        const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
+        for (int c = 0; c < C; ++c) {
+            const ushort x = values[c * g.area + r];
+            const float uc = CONFIDENCE_OF(c < MADE, x, certain, self ? g.centre : 1.0f);
+            U(cell, c, b % 16) = uc;
+            XU(cell, c, b % 16) = (float)x * uc;
+        }
+    }
+    return found;
+}
+
 // Where row a of the square around a candidate begins in `levels`, from the candidate.
 #ifdef CUBE
 #define ROW_AT(a, down, deep) (((a) / SIDE - RADIUS) * (deep) + ((a) % SIDE - RADIUS) * (down) - RADIUS)
@@ -111,11 +189,10 @@ inline int16 spread_int(__global const int *p, const int spacing)
 #define ROW_AT(a, down, deep) (((a) - RADIUS) * (down) - RADIUS)
 #endif
 
-// Equation (12): d of the candidate at place q of `levels`, the sample whose rows are `down` apart, and layers `deep`.
-inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *restrict levels, const int plane,
-                               const int down, const int deep)
+// Equation (12): d of the candidate whose grey levels are at y, in a sample whose rows are `down` apart, layers `deep`.
+inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane, const int down,
+                               const int deep)
 {
-    __global const ushort *y = levels + q;
 #if V == 1
     float d[16];
     for (int n = 0; n < 16; ++n)
@@ -126,7 +203,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
                 const float un = U(cell, c, n);
                 if (un == 0.0f) // would add 0
                     continue;
-                const float yn = (float)y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
+                const float yn = y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
                 const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
                 d[n] = fma(e, e, d[n]);
             }
@@ -136,7 +213,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
     for (int cell = 0; cell < CELLS; ++cell)
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float16 yn = convert_float16(vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16));
+            const float16 yn = vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16);
             const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
             d = fma(e, e, d);
         }

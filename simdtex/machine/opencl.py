@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from simdtex.machine import devices
 from simdtex.machine.devices import DeviceError, DeviceInfo
 from simdtex.machine.reference import Log
-from simdtex.model.sample import BLOCK
 
 SMALL_COPY = 2**16
 """The most bytes that are copied to a device without waiting."""
@@ -102,13 +101,11 @@ class OpenCL:
     work_group : int, optional
         Forces the work-group size of every launch. This and the other options change no bit of any result.
     scratch : int, optional
-        Bytes available for distances at a time.
+        Bytes available for neighbourhoods and tables of densities at a time.
     vector : int, optional
         Sites or candidates in a vector: 1, 4, 8 or 16.
     step : int, optional
-        Vectors kept in registers at a time, a divisor of 64.
-    split : int, optional
-        Work-items that share a site's candidates.
+        Vectors kept in registers at a time: 1, 2, 4 or 8.
     profile : bool
         Whether to measure the time of every kernel.
     """
@@ -121,7 +118,6 @@ class OpenCL:
         scratch: int | None = None,
         vector: int | None = None,
         step: int | None = None,
-        split: int | None = None,
         profile: bool = False,
     ) -> None:
         devices.check_fork()
@@ -134,15 +130,11 @@ class OpenCL:
         on_gpu = info.kind == "gpu"
         # PoCL compiles once for each work-group size, so there is only one.
         self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None
-        self.tile = (self._group, 1) if on_gpu else (1, 8)
         self.vector = vector or (1 if on_gpu else 16)
         self.step = step or 4
-        if BLOCK % self.step:
-            raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
+        if self.step not in (1, 2, 4, 8):
+            raise ValueError(f"step is {self.step}; give 1, 2, 4 or 8")
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        self._split = split
-        self._occupied = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
-        self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample
         self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
@@ -270,22 +262,13 @@ class OpenCL:
                 f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
             ) from error
 
-    def split(self, items: int, most: int) -> int:
-        """Return the number of work-items, at most ``most``, for each of ``items`` items, to keep the device busy."""
-        wanted = self._split or -(-self._occupied // (items * self._abreast)) * self._abreast
-        return max(1, min(wanted, most))
-
-    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
+    def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
         """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
 
-        The number is a multiple of the vector width.
+        ``table`` is the number of bytes that each site has in a table, in addition to its neighbourhood.
         """
-        padded = -(-candidates // BLOCK) * BLOCK
-        per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
-        if not stored:
-            per_site = 4 * (12 * self.split(1, padded) + neighbours * (4 + 3 * channels))
-        fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
-        return max(1, fit // self.vector) * self.vector
+        fit = self.scratch // (table + 8 * neighbours * (1 + channels))
+        return max(1, min(fit, int(4e9) // (2 * candidates * neighbours * channels)))
 
     def kernel(self, function: str, defines: Mapping[str, int | str] = NONE) -> Any:
         """Return a kernel, compiled once for these -D constants.

@@ -122,6 +122,6 @@ class Reference:
     def profile(self) -> None:
         """Return None: nothing is timed."""
 
-    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
+    def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
         """Return the number of sites whose distances and neighbourhoods fit the scratch memory."""
         return max(1, self.scratch // (8 * (candidates + neighbours * (1 + channels))))

@@ -16,9 +16,6 @@ from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest, structure
 
-BLOCK = 64
-"""Candidates in a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
-
 STEPS = 1023
 """Highest level of the structure channel of 8-bit samples, which may vary more than the pixels."""
 
@@ -70,8 +67,8 @@ class Places(NamedTuple):
 class Candidates(NamedTuple):
     """The sample positions p that a site may take, at one level.
 
-    ``pixels`` (C, rows * cols) float32, the working grey levels including the margin; ``positions`` (n rounded up to
-    blocks,) int32, the pixel index of each p, row by row; ``size``, n; ``reach`` (N,) int32, the pixel offset of each
+    ``pixels`` (C, rows * cols) float32, the working grey levels including the margin; ``positions`` (n,) int32, the
+    pixel index of each p, row by row; ``size``, n; ``reach`` (N,) int32, the pixel offset of each
     neighbour; ``index_of`` (rows * cols,) int32, the index of a pixel in ``positions`` or -1; ``guides``, the number of
     guide channels, which are the last.
     """
@@ -87,6 +84,11 @@ class Candidates(NamedTuple):
     def plane(self) -> int:
         """Number of pixels of the sample with its margin."""
         return int(self.index_of.size)
+
+    def number_of(self, source: NDArray[np.integer]) -> NDArray[np.int32]:
+        """Return the number of the candidate at each pixel index, on the host; -1 at none, or for a negative index."""
+        found: NDArray[np.int32] = np.where(source < 0, np.int32(-1), self.index_of[source])
+        return found
 
     @property
     def made(self) -> int:
@@ -388,10 +390,9 @@ class Sample:
         if every and places.allowed is not None:
             index_of[positions] = np.flatnonzero(places.allowed)
             positions = places.everywhere
-        padding = np.full(-positions.size % BLOCK, positions[0], np.int32)
         return Candidates(
             self.planes(machine) if planes is None else planes,
-            machine.put(np.concatenate([positions, padding])),
+            machine.put(positions),
             positions.size,
             machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # the site itself, for guides
             machine.put(index_of),

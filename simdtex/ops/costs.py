@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The costs of a candidate in addition to its distance: use, phase on a lattice, data between the sites, and kind."""
+"""The cost of a candidate: distance, coherence, use, phase on a lattice, data between the sites, kind, and novelty.
+
+`Costs.evaluate` is the only sum of them on the host, as ``kernels/common/costs.h`` is on devices.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import prod
 from typing import Any, NamedTuple
 
@@ -14,6 +16,11 @@ from simdtex.machine.interface import Array, Launcher
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.sample import Candidates
 from simdtex.ops.arithmetic import fma32
+from simdtex.ops.neighbourhood import Near
+from simdtex.ops.square import Square
+
+AGAIN = 4
+"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/relax.cl."""
 
 
 class Phased(NamedTuple):
@@ -89,9 +96,17 @@ class Kinds(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """All costs: the ``penalty`` (n or more,) float32 of `simdtex.ops.use`, ``phased``, ``scattered`` and ``kinds``."""
+    """All costs of a candidate.
+
+    ``penalty`` (n + `simdtex.ops.square.TAIL` or more,) float32, of `simdtex.ops.use`; ``discount``, 1 / (1 +
+    coherence), the factor of the distance of candidates that continue a neighbour's source; ``novelty``, the penalty
+    for each neighbour whose source a candidate continues, and `AGAIN` times that for each whose source it is, if all
+    candidates are proposed; ``phased``, ``scattered`` and ``kinds``.
+    """
 
     penalty: Array
+    discount: np.float32 = np.float32(1)
+    novelty: np.float32 = np.float32(0)
     phased: Phased | None = None
     scattered: Scattered | None = None
     kinds: Kinds | None = None
@@ -104,7 +119,7 @@ class Costs(NamedTuple):
         return waves | kinds | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})
 
     def arguments(self, machine: Launcher, candidates: Candidates) -> tuple[Any, ...]:
-        """Return the arguments ``COSTS`` of kernels."""
+        """Return the arguments ``COSTS`` of kernels after ``at`` and ``levels``."""
         nothing = machine.constant(np.zeros((1, 1), np.int32))
         phased = self.phased or Phased(nothing, nothing, np.float32(0), np.float32(0))
         scattered = self.scattered or Scattered(nothing, nothing, nothing, np.float32(0))
@@ -118,26 +133,56 @@ class Costs(NamedTuple):
             *kinds,
         )
 
-    def terms(
-        self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
-    ) -> Iterator[tuple[str, NDArray[np.float32]]]:
-        """Yield each cost of candidates ``numbers`` (slots, S or 1) by its name, in NumPy."""
-        yield "use", self.penalty[np.maximum(numbers, 0)]
-        if self.phased:
-            yield "lattice", self.phased.cost(numbers, sites)
-        if self.scattered:
-            yield "data", self.scattered.cost(numbers, sites, candidates)
-        if self.kinds:
-            yield "soft", self.kinds.cost(numbers, sites)
-
-    def added(
+    def evaluate(
         self,
-        d: NDArray[np.float32],
         numbers: NDArray[np.integer],
-        sites: NDArray[np.int32],
+        coherent: NDArray[np.bool_],
+        around: Near,
         candidates: Candidates,
+        square: Square,
+        offsets: NDArray[np.int32],
+        terms: dict[str, NDArray[np.float32]] | None = None,
     ) -> NDArray[np.float32]:
-        """Return distances (slots, S) plus all costs of candidates ``numbers`` (slots, S or 1), in NumPy."""
-        for _, cost in self.terms(numbers, sites, candidates):
-            d = d + cost
-        return d
+        """Return the cost (slots, S) of candidates ``numbers`` (slots, S or 1), infinity in empty slots, in NumPy.
+
+        ``coherent`` (slots, S) are those that continue a neighbour's source. ``terms`` receives the distance of
+        equation (12) without guides, and each term that is added to it, by name and in the order of the sum.
+        """
+        sites, x, u, *_ = around
+        cost = whole = square.distance(numbers, x, u, offsets)
+        if self.discount != 1:
+            cost = np.where(coherent, cost * self.discount, cost)
+        if terms is not None:
+            there, distance = np.isfinite(whole), whole  # an empty slot is infinitely far
+            if candidates.guides:
+                distance = square.distance(numbers, x[:, : -candidates.guides], u[:, : -candidates.guides], offsets)
+                terms["guide"] = np.subtract(whole, distance, where=there, out=np.zeros_like(whole))
+            if self.discount != 1:
+                terms["coherence"] = np.subtract(cost, whole, where=there, out=np.zeros_like(whole))
+            terms["distance"] = distance
+        more = {"use": self.penalty[np.maximum(numbers, 0)]}
+        if self.phased:
+            more["lattice"] = self.phased.cost(numbers, sites)
+        if self.scattered:
+            more["data"] = self.scattered.cost(numbers, sites, candidates)
+        if self.kinds:
+            more["soft"] = self.kinds.cost(numbers, sites)
+        if self.novelty:
+            times = np.zeros(cost.shape, np.float32)
+            pairs = (continuing(candidates, around.source), 1), (candidates.number_of(around.source), AGAIN)
+            for number, often in pairs:
+                k, s = np.nonzero(number >= 0)
+                np.add.at(times, (number[k, s], s), np.float32(often))
+            more["novelty"] = self.novelty * times
+        for term in more.values():
+            cost = cost + term
+        if terms is not None:
+            terms |= more
+        return cost
+
+
+def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the number of the candidate that continues the source of each neighbour, (N, S); -1 if there is none."""
+    p = source - candidates.reach[: len(source), None]
+    inside = (source >= 0) & (p >= 0) & (p < candidates.index_of.size)
+    return candidates.number_of(np.where(inside, p, np.int32(-1)))

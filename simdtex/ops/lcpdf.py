@@ -1,35 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The local conditional probability density function, equations (6) to (8) and (12), on the machine.
+"""The local conditional probability density function, equations (4) to (8) and (12), on the machine.
 
-`distance` returns d_p for every site and candidate, `take` what a site takes, `density` the function.
+`density` and `histogram` return the function, `taken` is the choice of a site among its candidates.
 """
 
 from __future__ import annotations
 
 from itertools import accumulate
 from math import exp, log, pow, sqrt
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid
-from simdtex.model.sample import BLOCK, Candidates
+from simdtex.model.sample import Candidates
 from simdtex.ops.arithmetic import exp32, fma32
-from simdtex.ops.neighbourhood import Neighbourhoods
+from simdtex.ops.neighbourhood import Field
+
+if TYPE_CHECKING:
+    from simdtex.ops.relax import Relaxation
 
 NO_WEIGHT = np.float32(28)
 """The exponent from which a weight is 0: exp(-28) 2**40 < 1."""
-
-
-class Distances(NamedTuple):
-    """``distance`` (candidates, P), d_p of equation (12); ``nearest`` (blocks, P), on devices only; ``sites``, S."""
-
-    distance: Array
-    nearest: Array
-    sites: int
 
 
 class Relaxed(NamedTuple):
@@ -63,6 +57,11 @@ class Choice(NamedTuple):
     draws: bool
     density: bool
     window: Window
+
+    @property
+    def spread(self) -> np.float32:
+        """2 h^2 if a site draws, the factor of its noise; otherwise 0."""
+        return np.float32(1) / self.window.scale if self.draws else np.float32(0)
 
     @property
     def mode(self) -> bool:
@@ -106,37 +105,6 @@ def window(bandwidth: float, top: int) -> Window:
     return Window(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
 
 
-@Operation
-def distance(machine: Launcher | None, near: Neighbourhoods, candidates: Candidates) -> Distances:
-    """Return d_p of equation (12) for each site and candidate."""
-    if machine is None:
-        confidence, weighted, sites = near
-        position = candidates.positions[: candidates.size]
-        d = np.zeros((position.size, sites), np.float32)
-        for k, offset in enumerate(candidates.reach):
-            certain = confidence[k].astype(np.float64)
-            for c, y in enumerate(candidates.pixels):
-                u = certain if certain.ndim == 1 else certain[c]
-                e = weighted[k, c] - u * y[position + offset][:, None].astype(np.float64)
-                d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
-        return Distances(d, None, sites)
-    terms, _, padded = near.weighted.shape
-    blocks = candidates.positions.size // BLOCK
-    distance = machine.empty((blocks * BLOCK, padded), np.float32)
-    nearest = machine.empty((blocks, padded), np.float32)
-    own = {"OWN": 1} if len(near.confidence.shape) > 2 else {}
-    machine.launch(
-        "lcpdf_distance",
-        (padded // machine.vector, blocks),
-        *(near.confidence, near.weighted, terms, padded),
-        *(candidates.pixels, candidates.plane, candidates.positions, candidates.size),
-        *(candidates.reach, blocks, distance, nearest),
-        local=machine.tile,
-        defines=_defines(machine, candidates) | own,
-    )
-    return Distances(distance, nearest, near.sites)
-
-
 def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint64]:
     """Return W_p = floor(2^40 exp(-(d_p - min d) / 2h^2)), (candidates, S)."""
     a = (distance - distance.min(0)) * scale
@@ -154,23 +122,6 @@ def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: Choice) -> NDArr
         mass = np.broadcast_to(mass, w.shape)
         w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w), 1), 0)
     return w
-
-
-def drawn(
-    w: NDArray[np.uint64],
-    pixels: NDArray[Any],
-    places: NDArray[np.int64],
-    choice: Choice,
-    key: Key,
-) -> NDArray[np.intp]:
-    """Return the slot (S,) that each site draws, with a probability proportional to its mass (`masses`).
-
-    ``places`` (S,) are the sites' pixel indices in the whole picture.
-    """
-    cumulative = np.cumsum(masses(w, pixels, choice), 0, dtype=np.uint64)
-    lo, hi, *_ = random.draw4(*key, places, random.DRAW, 0)
-    taken: NDArray[np.intp] = (cumulative > random.below(lo, hi, cumulative[-1])).argmax(0)
-    return taken
 
 
 def stepped(x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: Window, key: Key) -> NDArray[np.uint16]:
@@ -192,25 +143,28 @@ def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.
 
 def taken(
     numbers: NDArray[np.int64],
-    distances: Distances,
+    cost: NDArray[np.float32],
+    noise: NDArray[np.float32] | np.float32,
     candidates: Candidates,
     places: NDArray[np.int64],
     choice: Choice,
     key: Key,
 ) -> Relaxed:
-    """Return the choice of each site among the candidates ``numbers`` (slots, S or 1), in NumPy."""
-    d = distances.distance
-    if choice.draws:
-        pixels = candidates.pixels[:, candidates.positions[np.maximum(numbers, 0)]]
-        slot = drawn(weights(d, choice.window.scale), pixels, places, choice, key)
-        chosen = np.broadcast_to(numbers, d.shape)[slot, np.arange(d.shape[1])]
-    else:
-        chosen = np.where(d == d.min(0), numbers, candidates.size).min(0)
+    """Return the choice of each site among the candidates ``numbers`` (slots, S or 1), in NumPy.
+
+    That is the first of the least cost (slots, S), of a draw plus 2 h^2 times ``noise``, see `simdtex.ops.relax`.
+    """
+    total = cost
+    if choice.draws:  # an empty slot stays empty
+        total = np.where(
+            np.isinf(cost), cost, fma32(choice.spread, noise, np.where(np.isinf(cost), np.float32(0), cost))
+        )
+    chosen = np.where(total == total.min(0), numbers, candidates.size).min(0)
     source = candidates.positions[chosen]
     values = candidates.pixels[: candidates.made, source].astype(np.uint16)
     if choice.mode:  # of all candidates
         pixels = candidates.pixels[: candidates.made, candidates.positions[: candidates.size]].astype(np.int64)
-        source = candidates.positions[to_mode(values, weights(d, choice.window.scale), pixels, choice.window)]
+        source = candidates.positions[to_mode(values, weights(cost, choice.window.scale), pixels, choice.window)]
     elif choice.density:
         values = np.stack([stepped(x, c, places, choice.window, key) for c, x in enumerate(values)])
     return Relaxed(source, values)
@@ -243,40 +197,6 @@ def weighed(
     return w
 
 
-@Operation
-def take(
-    machine: Launcher | None,
-    distances: Distances,
-    candidates: Candidates,
-    sites: Array,
-    grid: Grid,
-    choice: Choice,
-    key: Key,
-) -> Relaxed:
-    """Return for each site a draw from the LCPDF, the first of its nearest candidates, or the mode of the density."""
-    if machine is None:
-        numbers = np.arange(candidates.size)[:, None]
-        return taken(numbers, distances, candidates, grid.places(sites), choice, key)
-    out = Relaxed(
-        machine.empty((distances.sites,), np.int32), machine.empty((candidates.made, distances.sites), np.uint16)
-    )
-    own: tuple[Any, ...] = ()
-    if choice.draws:
-        window = choice.window
-        own = (sites, grid.struct, np.uint64(key.seed), np.uint32(key.level), np.uint32(key.turn))
-        own += (machine.constant(window.noise), window.radius if choice.density else -1, window.top)
-    machine.launch(
-        "lcpdf_draw" if choice.draws else "lcpdf_least",
-        (distances.sites,),
-        *_weighing(distances, choice.window),
-        *(candidates.pixels, candidates.plane, candidates.positions, *own, *out),
-        defines=_defines(machine, candidates),
-    )
-    if choice.mode:
-        _density(machine, distances, candidates, choice.window, out)
-    return out
-
-
 def smoothed(y: NDArray[np.int64], w: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
     """Return f(x) = sum over p of w_p exp(-(x - y_p)^2 / 2h^2), (greys, S), of y (slots,) and w (slots, S)."""
     mass = np.zeros((win.top + 1, w.shape[1]), np.uint64)
@@ -295,37 +215,65 @@ def spread(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
 
 
 @Operation
-def density(machine: Launcher | None, distances: Distances, candidates: Candidates, win: Window) -> Array:
-    """Return the density of one channel at each grey level, up to a factor, (S, greys) float32."""
+def density(
+    machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None
+) -> Array:
+    """Return the density of one channel at each grey level, up to a factor, (S, greys) float32.
+
+    ``relaxation`` proposes all candidates, and its random numbers are not read. ``own`` (1, plane) float32 is the grey
+    level of each candidate at its place in the square's ``levels``; None: these.
+    """
     if machine is None:
-        grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
-        return smoothed(grey, weights(distances.distance, win.scale), win).T
-    unused = Relaxed(machine.empty((distances.sites,), np.int32), machine.empty((1, distances.sites), np.uint16))
-    return _density(machine, distances, candidates, win, unused)
+        cost = relaxation.evaluate(sites, field, 0).cost
+        return smoothed(
+            _greys(relaxation, own), weights(cost, relaxation.choice.window.scale), relaxation.choice.window
+        ).T
+    return density_and_mode(machine, sites, field, relaxation, own)[0]
 
 
-def _density(machine: Launcher, distances: Distances, candidates: Candidates, win: Window, near: Relaxed) -> Array:
-    """Return the density of the last channel, (S, greys), and move ``near``, the nearest candidates, to the mode."""
-    shape = (distances.sites, win.top + 1)
+def density_and_mode(
+    machine: Launcher, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None
+) -> tuple[Array, Relaxed]:
+    """Return the density of the last channel, (S, greys), and the mode that each site takes, on a device."""
+    made, win = len(field.values) - relaxation.confidences.guides, relaxation.choice.window
+    shape = (sites.size, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
-    machine.launch(
-        "lcpdf_density",
-        (distances.sites,),
-        *_weighing(distances, win),
-        *(candidates.pixels, candidates.plane, candidates.positions, machine.constant(win.gauss)),
-        *(win.radius, win.top + 1, mass, table, *near),
-        defines=_defines(machine, candidates),
-    )
-    return table
+    mode = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
+    arguments = (machine.constant(win.gauss), mass, table, *mode)
+    _table(machine, "lcpdf_density", sites, field, relaxation, own, shape[1], *arguments)
+    return table, mode
 
 
-def _defines(machine: Launcher, candidates: Candidates) -> dict[str, int]:
-    shape = {"V": machine.vector, "C": candidates.pixels.shape[0], "BLOCK": BLOCK, "STEP": machine.step}
-    return shape | ({"G": candidates.guides} if candidates.guides else {})
+@Operation
+def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, greys: int) -> Array:
+    """Return the number of candidates of each grey level that match a site exactly, (S, greys) uint32: (4) and (5)."""
+    if machine is None:
+        cost, found = relaxation.evaluate(sites, field, 0).cost, np.zeros((sites.size, greys), np.uint32)
+        p, s = np.nonzero(cost == 0)
+        np.add.at(found, (s, _greys(relaxation, None)[p]), 1)
+        return found
+    counts = machine.empty((sites.size, greys), np.uint32)
+    _table(machine, "lcpdf_histogram", sites, field, relaxation, None, greys, counts)
+    return counts
 
 
-def _weighing(distances: Distances, win: Window) -> list[Any]:
-    """Return the first arguments of every kernel on distances."""
-    blocks, padded = distances.nearest.shape
-    shape = [blocks, distances.sites, padded]
-    return [distances.distance, distances.nearest, *shape, win.scale]
+def _greys(relaxation: Relaxation, own: NDArray[np.float32] | None) -> NDArray[np.int64]:
+    """Return the grey level of each candidate in the first channel."""
+    square = relaxation.proposal.square
+    greys: NDArray[np.int64] = (square.levels if own is None else own)[0][square.at].astype(np.int64)
+    return greys
+
+
+def _table(
+    machine: Launcher,
+    kernel: str,
+    sites: Array,
+    field: Field,
+    relaxation: Relaxation,
+    own: Array | None,
+    greys: int,
+    *results: Array,
+) -> None:
+    defines, arguments = relaxation.arguments(machine, sites, field)
+    levels = relaxation.proposal.square.levels if own is None else own
+    machine.launch(kernel, (sites.size,), *arguments, levels, greys, *results, defines=defines)

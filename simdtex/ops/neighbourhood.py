@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The neighbourhoods of the sites to relax, weighted by confidence: the left half of equation (12)."""
+"""The arrays over sites, the confidences of their values, and neighbourhoods: the left half of equation (12)."""
 
 from __future__ import annotations
 
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.machine.interface import Array
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 
@@ -48,25 +47,31 @@ class Confidences(NamedTuple):
 USUAL = Confidences()
 
 
-class Neighbourhoods(NamedTuple):
-    """Neighbourhoods: ``confidence`` (N, P), u = 1 - t_r; ``weighted`` (N, C, P), x_r u; ``sites``, S of the P columns.
+class Near(NamedTuple):
+    """The neighbourhoods of ``sites`` (S,), in NumPy.
 
-    If each value has its own confidence, ``confidence`` is (N, C, P); with guides, the site itself is the last of
-    N + 1.
+    ``values`` (terms, C, S) uint16 and ``confidence`` (terms, C or 1, S) of the N neighbours, and of the site itself if
+    there are guides; ``source`` (N, S), the pixel index of each neighbour's source, -1 without a neighbour or if no
+    relaxation has touched it; ``own`` (S,), the source of each site.
     """
 
-    confidence: Array
-    weighted: Array
-    sites: int
+    sites: NDArray[np.int32]
+    values: NDArray[np.uint16]
+    confidence: NDArray[np.float32]
+    source: NDArray[np.int32]
+    own: NDArray[np.int32]
 
 
-def gathered(
-    sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, confidences: Confidences
-) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Return values (terms, C, S) and confidences (terms, C or 1, S) of neighbours r (N, S), and of guides at sites."""
-    u = (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024)
+def near(
+    sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32], grid: Grid, confidences: Confidences
+) -> Near:
+    """Return the neighbourhoods of sites."""
+    r = grid.neighbours(sites, offsets)
+    source, t = field.source.ravel(), field.temperature.ravel()[r]
+    touched = np.where((r >= 0) & (t < 1024), source[r], np.int32(-1))
+    u = (1024 - t.astype(np.float32)) / np.float32(1024)
     if confidences.own:
-        u = np.where((r >= 0) & (field.source.ravel()[r] < 0), u * confidences.hard, u)
+        u = np.where((r >= 0) & (source[r] < 0), u * confidences.hard, u)
     u = np.where(r < 0, np.float32(0), u)[:, None]
     channels = len(field.values)
     if confidences.guides:
@@ -79,27 +84,4 @@ def gathered(
             u[:, -confidences.guides :] = (r >= 0)[:, None]
             u[-1, -confidences.guides :] = confidences.centre
         u = np.where(x == UNKNOWN, np.float32(0), u)
-    return x, u
-
-
-@Operation
-def neighbourhood(
-    machine: Launcher | None, sites: Array, field: Field, offsets: Array, grid: Grid, confidences: Confidences = USUAL
-) -> Neighbourhoods:
-    """Return the neighbourhoods of sites."""
-    if machine is None:
-        x, u = gathered(sites, grid.neighbours(sites, offsets), field, confidences)
-        return Neighbourhoods(u if confidences.own else u[:, 0], x.astype(np.float32) * u, sites.size)
-    count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
-    padded, terms = -(-count // machine.vector) * machine.vector, neighbours + bool(confidences.guides)
-    confidence = machine.empty((terms, channels, padded) if confidences.own else (terms, padded), np.float32)
-    weighted = machine.empty((terms, channels, padded), np.float32)
-    machine.launch(
-        "neighbourhood",
-        (padded, terms),
-        *(sites, count, padded, field.values, field.temperature, field.source, confidences.hard),
-        *(channels, channels - confidences.guides, prod(field.values.shape[1:]), offsets),
-        *(neighbours, terms, confidences.centre, grid.struct, confidence, weighted),
-        defines={"OWN": 1} if confidences.own else {},
-    )
-    return Neighbourhoods(confidence, weighted, count)
+    return Near(sites, x, u, touched, source[sites])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,19 +12,24 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Machine
 from simdtex.model.lattice import parts_of
 from simdtex.model.sample import Places, Sample
-from simdtex.ops.arithmetic import fma32
 
 LANES = 16
 """Number of partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
+
+TAIL = 64
+"""Values after the last one that vectors may read, without an effect."""
 
 
 class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
-    ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
+    ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) float32, the sample's working levels with the
     columns that are a level's step apart side by side; ``down`` is the distance there from one row of the lattice to
     the next, ``deep`` from one layer to the next; ``disc`` (side, columns) float32, for a volume (side, side, columns),
-    is 1 on the neighbourhood.
+    is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of each neighbour in ``disc`` and its offset in
+    ``levels``, in an order in which each is far from earlier ones, since close ones differ alike; the site itself is
+    the last. If ``at`` has all places of a level, they have ``cols`` columns, and every ``runs``-th of a row is side by
+    side in ``levels``.
     """
 
     at: Array
@@ -31,6 +37,9 @@ class Square(NamedTuple):
     down: int
     deep: int
     disc: Array
+    looks: Array
+    cols: int
+    runs: int
 
     def distance(
         self,
@@ -41,43 +50,71 @@ class Square(NamedTuple):
     ) -> NDArray[np.float32]:
         """Return equation (12) for each candidate, (slots, S), infinity in empty slots, summed as on a device.
 
-        ``numbers`` (slots, S) are -1 in empty slots; ``x`` (N, C, S) are grey levels of the neighbours, and ``u`` (N, C
-        or 1, S) their confidences; both have one more if the site itself is among ``offsets``.
+        ``numbers`` (slots, S or 1) are -1 in empty slots; ``x`` (N, C, S) are grey levels of the neighbours, and ``u``
+        (N, C or 1, S) their confidences; both have one more, the site itself, if there are guides.
         """
+        if len(x) > len(offsets):
+            offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
         radius = int(offsets[:, 1].max())
         layer, line, _ = parts_of(offsets)
-        d = np.zeros((LANES, *numbers.shape), np.float32)
-        for k in np.lexsort((offsets[:, 1], offsets[:, 0])):
-            col = offsets[k, 1]
-            apart = layer[k] * self.deep + line[k] * self.down + col
-            for c, y in enumerate(self.levels):
-                certain = u[k, c if u.shape[1] > 1 else 0]
-                e = (x[k, c] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * certain
-                lane = (col + radius) % LANES
-                d[lane] = fma32(e, e, d[lane])
-        while len(d) > 1:
-            d = d[: len(d) // 2] + d[len(d) // 2 :]
-        return np.where(numbers < 0, np.float32(np.inf), d[0])
+        there, columns = self.at[np.maximum(numbers, 0)], (offsets[:, 1] + radius) % LANES
+        lanes = []
+        for lane in range(LANES):
+            d = np.zeros((len(numbers), x.shape[-1]), np.float32)
+            inside = np.flatnonzero(columns == lane)
+            for k in inside[np.lexsort((offsets[inside, 1], offsets[inside, 0]))]:
+                apart = layer[k] * self.deep + line[k] * self.down + offsets[k, 1]
+                for c, y in enumerate(self.levels[: x.shape[1]]):
+                    e = ((x[k, c] - y[there + apart]) * u[k, c if u.shape[1] > 1 else 0]).astype(np.float64)
+                    d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
+            lanes.append(d)
+        while len(lanes) > 1:
+            half = len(lanes) // 2
+            lanes = [a + b for a, b in zip(lanes[:half], lanes[half:], strict=True)]
+        return np.where(numbers < 0, np.float32(np.inf), lanes[0])
 
 
-def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
-    """Return the candidates of a level in this layout."""
+def square_of(machine: Machine, sample: Sample, places: Places, every: bool = False) -> Square:
+    """Return the candidates of a level in this layout, or with ``every`` all its places."""
     offsets, step = places.offsets, places.spacing
     radius, rows, cols = int(offsets[:, 1].max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
+    layer, line, col = parts_of(offsets)
     disc = np.zeros((side, side, columns), np.float32)
-    disc[tuple(part + radius for part in parts_of(offsets))] = 1
+    disc[layer + radius, line + radius, col + radius] = 1
     disc = disc if sample.layer else disc[radius]
     wide = -(-cols // step)
     around = ((0, 0), (0, 0), (0, wide * step - cols))
     working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
-    levels = working.swapaxes(2, 3).reshape(len(working), -1)
-    row, col = np.divmod(places.positions, np.int32(cols))
-    at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
+    levels = working.swapaxes(2, 3).reshape(len(working), -1).astype(np.float32)
+    positions = places.everywhere if every else places.positions
+    row, at = np.divmod(positions, np.int32(cols))
+    at = (row * np.int32(step) + at % np.int32(step)) * np.int32(wide) + at // np.int32(step)
+    down, deep = step * step * wide, sample.layer * step * step * wide
+    lane = ((layer + radius) * bool(sample.layer) * side + line + radius) * columns + col + radius
+    looks = np.stack([lane, layer * deep + line * down + col], 1)[_spread(offsets.tobytes())]
+    itself = lane[0] - col[0] - line[0] * columns - layer[0] * side * columns
+    across = places.col.size if every else positions.size
     return Square(
         machine.put(at),
-        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read, even at the end
-        step * step * wide,
-        sample.layer * step * step * wide,
+        machine.put(np.pad(levels, ((0, 0), (0, columns + TAIL)))),
+        down,
+        deep,
         machine.put(disc),
+        machine.put(np.concatenate([looks, [[itself, 0]]]).astype(np.int32)),
+        across,
+        min(step // places.step, across) if every else 1,
     )
+
+
+@lru_cache(maxsize=16)
+def _spread(offsets: bytes) -> NDArray[np.int32]:
+    """Return an order of neighbours in which each is far from earlier ones."""
+    place = np.stack(parts_of(np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)), 1)
+    gap = np.full(len(place), np.iinfo(np.int64).max)
+    order = []
+    for _ in place:
+        order.append(int(gap.argmax()))
+        gap = np.minimum(gap, ((place - place[order[-1]]) ** 2).sum(1))
+        gap[order] = -1
+    return np.array(order, np.int32)

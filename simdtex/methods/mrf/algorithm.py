@@ -22,7 +22,7 @@ from simdtex.model.lattice import Grid
 from simdtex.ops.commit import commit
 from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Relaxation, relax, relax_apart
+from simdtex.ops.relax import Relaxation, relax, relax_out_of_place
 from simdtex.ops.sites import survey
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
@@ -151,7 +151,7 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
         sites, before = chosen.sites, 0
         sites = machine.put(sites) if isinstance(sites, np.ndarray) else sites
         for ranges, begun, last in parts(chosen.ranges, level.at_once):
-            field = relax(machine, sites, ranges, field, level.weighed, relaxation, chosen.turn)
+            field = relax(machine, sites, ranges, field, level.evaluations, relaxation, chosen.turn)
             done = int((ranges[:, 1] - ranges[:, 0]).sum())
             machine.sync(level.work * done)
             yield Part(begun - before, done, last and chosen.last, chosen.turn, field)
@@ -163,7 +163,9 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
             if outcomes:
                 yield Part(len(outcomes) == 1, outcomes[-1][0].size, False, chosen.turn, field)
             here = machine.put(step.sites[first : first + level.at_once])
-            outcomes.append((here, *relax_apart(machine, here, field, level.weighed, relaxation, chosen.turn)))
+            outcomes.append(
+                (here, *relax_out_of_place(machine, here, field, level.evaluations, relaxation, chosen.turn))
+            )
             machine.sync(level.work * here.size)
         for here, taken, cooled in outcomes:
             field = commit(machine, field, here, taken, cooled)

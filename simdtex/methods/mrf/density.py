@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import BLOCK, Sample
+from simdtex.model.sample import Places, Sample
 from simdtex.ops import lcpdf
-from simdtex.ops.charge import charge
 from simdtex.ops.costs import Costs, Scattered
-from simdtex.ops.histogram import histogram
-from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.relax import AllCandidates, Relaxation
+from simdtex.ops.square import TAIL, square_of
 
 AT_ONCE = 4096
 """The most sites whose tables are made together."""
@@ -42,24 +42,29 @@ def lcpdf_at(
     is ``"parzen"``, equations (6) to (8), or ``"histogram"``, counts of exact matches, (4) and (5). Raises ValueError
     if no neighbourhood of the sample matches that of a site.
     """
-    greys = sample.top + 1
-    candidates = sample.candidates(machine, sample.places(offsets, 1))
-    h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, len(offsets) + 1)
-    window = lcpdf.window(h, sample.top)
-    device_offsets = machine.put(offsets)
+    greys, places = sample.top + 1, sample.places(offsets, 1)
+    h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, places.positions.size, len(offsets) + 1)
+    relaxation = _all(machine, sample, places, grid, lcpdf.window(h, sample.top))
     rows = [np.zeros((0, greys))]
-    step = min(machine.chunk(candidates.size, len(offsets), 1), AT_ONCE)
+    step = min(machine.chunk(3 * places.positions.size, len(offsets), 1, 12 * greys), AT_ONCE)
     for first in range(0, len(sites), step):
         here = machine.put(sites[first : first + step])
-        near = neighbourhood(machine, here, field, device_offsets, grid)
-        distances = lcpdf.distance(machine, near, candidates)
         if estimator == "parzen":
-            density = machine.get(lcpdf.density(machine, distances, candidates, window)).astype(np.float64)
+            density = machine.get(lcpdf.density(machine, here, field, relaxation)).astype(np.float64)
             rows.append(density / np.cumsum(density, 1)[:, -1:])
         else:
-            counts = machine.get(histogram(machine, distances, candidates, greys))
+            counts = machine.get(lcpdf.histogram(machine, here, field, relaxation, greys))
             rows.append(_shares(counts, sites[first : first + step], grid))
     return np.concatenate(rows)
+
+
+def _all(machine: Machine, sample: Sample, places: Places, grid: Grid, window: lcpdf.Window) -> Relaxation:
+    """Return the relaxation whose density is the LCPDF of all candidates, without costs."""
+    candidates = sample.candidates(machine, places)
+    free = Costs(machine.put(np.zeros(candidates.size + TAIL, np.float32)))
+    proposal = AllCandidates(candidates, square_of(machine, sample, places))
+    choice = lcpdf.Choice(False, True, window)
+    return Relaxation(grid, machine.put(places.offsets), proposal, free, choice, xi=-1, seed=0, level=0)
 
 
 def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) -> NDArray[np.float64]:
@@ -112,22 +117,22 @@ def given_data(
     probability of each kind and adds up to 1. ``sites`` (S, 2) are rows and columns; ``bandwidth`` is h in units of
     h_opt, equation (8), for the number of data of the site.
     """
-    places = sample.places(np.zeros((1, 2), np.int32), 1)
-    candidates = sample.candidates(machine, places)
-    kinds, size = int(of.max()) + 1, candidates.size
-    kind = np.zeros((1, sample.rows * sample.cols), np.float32)
-    kind[0, places.positions] = of
-    counted = candidates._replace(pixels=machine.put(kind))
-    free = machine.put(np.zeros(candidates.positions.shape[0] + BLOCK, np.float32))
-    itself = machine.put(np.zeros((1, 2), np.int32))  # the offset of no neighbour
-    step = max(1, min(machine.chunk(size, 1, sample.channels), AT_ONCE, PAIRS // kinds))
+    places = sample.places(np.zeros((1, 2), np.int32), 1)  # the offset of no neighbour
+    kinds, size = int(of.max()) + 1, places.positions.size
+    window = lcpdf.window(1, sample.top)._replace(gauss=np.ones(1, np.float32), radius=0, top=kinds - 1)
+    relaxation = _all(machine, sample, places, Grid(1, 1), window)
+    square = relaxation.proposal.square
+    kind = np.zeros(square.levels.shape[1], np.float32)
+    kind[machine.get(square.at)] = of
+    own = machine.put(kind[None])
+    step = max(1, min(machine.chunk(3 * size, 1, sample.channels, 12 * kinds), AT_ONCE, PAIRS // kinds))
     together = max(1, PAIRS // max(1, len(data.place)))
     for first in range(0, len(sites), together):
         part = sites[first : first + together]
         numbers, counts = near(part, data.place, nearest, sample.margin)
         for count in np.unique(counts).tolist():
             h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, size, sample.channels * (count + 1))
-            window = lcpdf.window(h, sample.top)._replace(gauss=np.ones(1, np.float32), radius=0, top=kinds - 1)
+            scale = lcpdf.window(h, sample.top).scale
             those = np.flatnonzero(counts == count)
             for begin in range(0, those.size, step):
                 here = those[begin : begin + step]
@@ -139,11 +144,13 @@ def given_data(
                     machine.put(np.append(data.values[told.ravel()], data.values[:1], 0)),
                     np.float32(1),
                 )
+                planes = ((sample.channels, 1, here.size), 0, np.uint16), ((1, here.size), -1, np.int32)
+                field = Field(*(machine.put(np.full(*plane)) for plane in (*planes, ((1, here.size), 1024, np.uint16))))
+                rule = relaxation._replace(
+                    grid=Grid(1, here.size, 1, torus=False),
+                    costs=relaxation.costs._replace(scattered=scattered),
+                    choice=relaxation.choice._replace(window=window._replace(scale=scale)),
+                )
                 numbered = machine.put(np.arange(here.size, dtype=np.int32))
-                values, plane = np.zeros((sample.channels, 1, here.size), np.uint16), np.zeros((1, here.size), np.int32)
-                field = Field(machine.put(values), machine.put(plane), machine.put(plane.astype(np.uint16)))
-                unknown = neighbourhood(machine, numbered, field, itself, Grid(1, here.size, 1, torus=False))
-                distances = lcpdf.distance(machine, unknown, candidates)  # all are 0
-                distances = charge(machine, distances, candidates, numbered, Costs(free, scattered=scattered))
-                mass = machine.get(lcpdf.density(machine, distances, counted, window)).astype(np.float64)
+                mass = machine.get(lcpdf.density(machine, numbered, field, rule, own)).astype(np.float64)
                 yield first + here, mass / np.cumsum(mass, 1)[:, -1:]

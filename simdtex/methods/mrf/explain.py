@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 
 from simdtex.methods.mrf.level import Lattices, rule
 from simdtex.model.explanation import Explanation, Neighbours, Ranked
-from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import parts_of
 from simdtex.ops import lcpdf
-from simdtex.ops.coherence import continuing, sources
-from simdtex.ops.costs import Costs
-from simdtex.ops.neighbourhood import Field, gathered
-from simdtex.ops.relax import SUGGESTING, Everything, Relaxation, relax_apart
+from simdtex.ops.costs import continuing
+from simdtex.ops.neighbourhood import Field, near
+from simdtex.ops.relax import SUGGESTING, AllCandidates, Relaxation, relax_out_of_place
 
 MOST = 100
 """The most candidates whose terms are returned, the first by rank."""
@@ -44,17 +42,19 @@ class Moment(NamedTuple):
 def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanation:
     """Return an explanation of the relaxation of a site, (row, column) or (layer, row, column), at a moment.
 
-    ``twin`` is the run's plan on the reference. Cost: about three relaxations by the twins.
+    ``twin`` is the run's plan on the reference. Cost: about two relaxations by the twins.
     """
     level = twin.level(moment.level)
     pixel = np.array([pixel_of(twin, moment.level, site)], np.int32)
     field, relaxation = moment.field, rule(level, moment.penalty)
     choice, candidates = relaxation.choice, relaxation.proposal.candidates
 
-    listed, found = relaxation.proposal.weighed(pixel, field, relaxation, moment.turn)
-    weighed = np.flatnonzero(np.isfinite(found.distance[:, 0]))  # the other slots have no candidate
-    total, numbers = found.distance[weighed, 0], listed[weighed, 0]
-    relaxed, cooled = relax_apart.reference(
+    terms: dict[str, NDArray[np.float32]] = {}
+    found = relaxation.evaluate(pixel, field, moment.turn, terms)
+    evaluated = np.flatnonzero(np.isfinite(found.cost[:, 0]))  # the other slots have no candidate
+    total, numbers = found.cost[evaluated, 0], found.numbers[evaluated, 0]
+    costs = {name: np.broadcast_to(term, found.cost.shape)[evaluated, 0] for name, term in terms.items()}
+    relaxed, cooled = relax_out_of_place.reference(
         pixel, field, np.zeros(field.source.shape, np.int32), relaxation, moment.turn
     )
     pixels = candidates.pixels[:, candidates.positions[numbers], None]
@@ -66,7 +66,6 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     is_taken = candidates.positions[numbers[ranked]] == relaxed.choice
     rank = np.union1d(rank, np.flatnonzero(is_taken))
     first = ranked[rank]
-    distance, costs = _terms(relaxation, pixel, field, moment.turn)
     neighbours, continued = _neighbours(twin, relaxation, pixel, field)
     position = candidates.positions[numbers[first]]
     around = position[:, None] + candidates.reach
@@ -75,7 +74,7 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
         level=moment.level,
         sweep=moment.sweep,
         drawn=choice.draws,
-        exact=isinstance(relaxation.proposal, Everything),
+        exact=isinstance(relaxation.proposal, AllCandidates),
         weighed=total.size,
         bandwidth=float(np.sqrt(0.5 / np.float64(choice.window.scale))),
         temperature=float(field.temperature.ravel()[pixel[0]]) / 1024,
@@ -87,8 +86,8 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
             values=candidates.pixels[:, position].T.astype(np.uint16),
             around=np.moveaxis(candidates.pixels[:, around], 0, -1).astype(np.uint16),
             continues=(continued == numbers[first][:, None]).sum(1),
-            distance=distance[weighed][first],
-            costs={name: cost[weighed][first] for name, cost in costs.items()},
+            distance=costs.pop("distance")[first],
+            costs={name: cost[first] for name, cost in costs.items()},
             total=total[first],
             probability=mass[first] / mass.sum(),
             pixels=twin.sample.around(position, np.append(np.int32(0), candidates.reach)),
@@ -108,44 +107,14 @@ def pixel_of(run: Lattices, number: int, site: tuple[int, ...]) -> int:
     return int(run.grid(number).pixel_of([np.array(n) for n in site]))
 
 
-def _terms(
-    relaxation: Relaxation, pixel: NDArray[np.int32], field: Field, turn: int
-) -> tuple[NDArray[np.float32], dict[str, NDArray[np.float32]]]:
-    """Return equation (12) without guides, and each cost by its name, of all proposed candidates, (slots,)."""
-    proposal, costs = relaxation.proposal, relaxation.costs
-    bare = relaxation._replace(novelty=np.float32(0), costs=Costs(np.zeros_like(costs.penalty)))
-
-    def weighed(field: Field, discount: np.float32) -> NDArray[np.float32]:
-        found: NDArray[np.float32] = proposal.weighed(pixel, field, bare._replace(discount=discount), turn)[1].distance
-        return found
-
-    whole = distance = weighed(field, np.float32(1))
-    numbers, _ = proposal.weighed(pixel, field, bare, turn)
-    terms = {}
-    with np.errstate(invalid="ignore"):  # a slot without a candidate is infinitely far
-        if guides := relaxation.confidences.guides:
-            values = field.values.copy()
-            values[-guides:] = UNKNOWN  # so that guides count for nothing
-            distance = weighed(field._replace(values=values), np.float32(1))
-            terms["guide"] = whole - distance
-        if relaxation.discount != 1:
-            terms["coherence"] = weighed(field, relaxation.discount) - whole
-    terms |= costs.terms(numbers, pixel, proposal.candidates)
-    if relaxation.novelty and isinstance(proposal, Everything):
-        terms["novelty"] = np.zeros_like(whole)
-        proposal.add_novelty(terms["novelty"], pixel, field, relaxation)
-    return distance[:, 0], {name: np.broadcast_to(cost, whole.shape)[:, 0] for name, cost in terms.items()}
-
-
 def _neighbours(
     twin: Lattices, relaxation: Relaxation, pixel: NDArray[np.int32], field: Field
 ) -> tuple[Neighbours, NDArray[np.int32]]:
     """Return the neighbourhood of a site, and the candidate that continues the source of each evaluated neighbour."""
     grid, sample, given = relaxation.grid, twin.sample, twin.plan.given
-    r = grid.neighbours(pixel, relaxation.offsets)
-    values, certain = gathered(pixel, r, field, relaxation.confidences)
-    source, proposal = sources(r, field), relaxation.proposal
-    looked_at = len(r) if isinstance(proposal, Everything) else SUGGESTING
+    r, proposal = grid.neighbours(pixel, relaxation.offsets), relaxation.proposal
+    _, values, certain, source, _ = near(pixel, field, relaxation.offsets, grid, relaxation.confidences)
+    looked_at = len(r) if isinstance(proposal, AllCandidates) else SUGGESTING
     continued = continuing(proposal.candidates, source)[:looked_at, 0]
     offsets = np.stack(parts_of(relaxation.offsets), 1)[:, -len(grid.shape) :]
     if relaxation.confidences.guides:
@@ -157,14 +126,14 @@ def _neighbours(
         own = r[:, 0] % grid.plane
         known, told = (one.reshape(grid.plane, -1)[own] for one in (given.known, given.values))
         pixels = np.where(known, told, pixels)
-    near = Neighbours(
+    neighbours = Neighbours(
         offsets=offsets.astype(np.int32),
         values=np.where(there, values[..., 0], 0).astype(np.uint16),
         confidence=np.ascontiguousarray(np.broadcast_to(certain, values.shape)[..., 0]),
         source=sample.place(source[:, 0]),
         pixels=np.where(there, pixels, np.zeros((), pixels.dtype)),
     )
-    return near, continued
+    return neighbours, continued
 
 
 def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.Choice) -> NDArray[np.float64]:

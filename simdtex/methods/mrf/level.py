@@ -19,15 +19,14 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import around
 from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES
-from simdtex.model.sample import BLOCK, Candidates, Places
+from simdtex.model.sample import Candidates, Places
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
-from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed, Relaxation
+from simdtex.ops.relax import EXHAUSTIVE, AllCandidates, CandidateList, Relaxation
 from simdtex.ops.sites import among, stretches
-from simdtex.ops.square import square_of
+from simdtex.ops.square import TAIL, square_of
 from simdtex.ops.use import FairUse
 from simdtex.schedules import Setting
 
@@ -120,15 +119,15 @@ class Lattices:
     """A plan on a machine: the constants of the run, and its levels.
 
     ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
-    plan. ``planes`` are the sample's working levels on the machine, and ``weighed`` (H, W) counts the candidates that
-    each site of the whole has evaluated.
+    plan. ``planes`` are the sample's working levels on the machine, and ``evaluations`` (H, W) counts the candidates
+    that each site of the whole has evaluated.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
         self.plan, self.machine, self.seed, self.levels = plan, machine, seed, plan.levels
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
-        self.weighed = machine.put(np.zeros(plan.shape if conditions is None else (1, 1), np.int32))
+        self.evaluations = machine.put(np.zeros(plan.shape if conditions is None else (1, 1), np.int32))
         self.conditions = conditions or Conditioning(plan)
         self._last: Level | None = None
 
@@ -152,22 +151,24 @@ class Lattices:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid, places = self.grid(number), self.places(number)
         coarsest, count = number == self.levels - 1, places.positions.size
-        proposal: Everything | Listed
-        if self.exhaustive(number):
-            every = sample.candidates(machine, places, self.planes, every=True)
-            proposal = Everything(every, strip_of(machine, sample, places))
-        else:
-            listed = sample.candidates(machine, places, self.planes)
-            proposal = Listed(listed, square_of(machine, sample, places), len(offsets), options.chance_at(number))
-        freedom = min(1.0, WHOLE / count, (count / SMALL) ** 2)
-        novelty = options.novelty * freedom if coarsest and proposal.slots <= KEPT else 0.0
+        every = self.exhaustive(number)
+        candidates = sample.candidates(machine, places, self.planes, every)
+        square = square_of(machine, sample, places, every)
+        proposal: AllCandidates | CandidateList = AllCandidates(candidates, square)
+        if not every:
+            proposal = CandidateList(candidates, square, len(offsets), options.chance_at(number))
+        novelty = options.novelty * min(1.0, WHOLE / count, (count / SMALL) ** 2) if coarsest else 0.0
         relaxation = Relaxation(
             grid=grid,
             offsets=machine.put(offsets),
             proposal=proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
-            discount=np.float32(1 / (1 + options.coherence)),
-            novelty=np.float32(novelty * sample.channels * sample.variance),
-            costs=Costs(None, self._phased(number, proposal.candidates), None, self._kinds(proposal.candidates)),
+            costs=Costs(
+                penalty=None,
+                discount=np.float32(1 / (1 + options.coherence)),
+                novelty=np.float32(novelty * sample.channels * sample.variance),
+                phased=self._phased(number, candidates),
+                kinds=self._kinds(candidates),
+            ),
             choice=self.choice(number),  # 6.2.2.2
             xi=min(-1, round(options.xi * 1024)),  # 6.2.2.3 the temperature, equation (13)
             seed=self.seed,
@@ -198,7 +199,7 @@ class Lattices:
             setting=level.setting._replace(grid=grid),
             relaxation=level.relaxation._replace(grid=replace(grid, tile=schedule.tile), costs=costs),
             in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
-            weighed=machine.put(np.zeros(grid.pixels, np.int32)) if grid.part else self.weighed,
+            evaluations=machine.put(np.zeros(grid.pixels, np.int32)) if grid.part else self.evaluations,
             movable=self.conditions.movable(machine, number, grid),
             lists={},
         )
@@ -227,7 +228,7 @@ class Lattices:
         step = 1 if self.options.phases == "all" else 2**number
         free = np.float32(round(float(certain) ** 2 * waves.half(step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
-        those = np.pad(those, ((0, 0), (0, TAIL)))  # whole vectors are read at the end, too
+        those = np.pad(those, ((0, 0), (0, TAIL)))
         return Phased(self.machine.put(those), None, certain, free)
 
     def _phases(self, grid: Grid) -> Array:
@@ -295,7 +296,7 @@ class Level:
         The positions of the candidates, and the fair use of each.
     in_place : bool
         Whether sites of a step may be written while other sites of it are read: no two are neighbours.
-    weighed : (H, W) int32 array of the machine
+    evaluations : (H, W) int32 array of the machine
         The number of candidates that each site has evaluated.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites with given values, which free sweeps do not change. None: every site may relax.
@@ -309,7 +310,7 @@ class Level:
     rate: float
     fair_use: FairUse
     in_place: bool = False
-    weighed: Array = None
+    evaluations: Array = None
     movable: Array | None = None
     lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
 
@@ -324,7 +325,7 @@ class Level:
         return self.relaxation.grid
 
     @property
-    def proposal(self) -> Everything | Listed:
+    def proposal(self) -> AllCandidates | CandidateList:
         """The candidates that a site evaluates."""
         return self.relaxation.proposal
 
@@ -343,18 +344,17 @@ class Level:
     def at_once(self) -> int:
         """The most sites that are relaxed between two checks of the clock; scratch memory limits it."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        choice, slots = self.relaxation.choice, self.proposal.slots
-        stores = choice.draws or choice.mode or self.relaxation.confidences.own
-        stores = stores and isinstance(self.proposal, Everything)
-        if choice.mode:  # as many candidates more as its scratch memory and its time are worth
-            slots += (choice.window.top + 1) * (3 + slots // neighbours)
-        most = self.machine.chunk(slots, neighbours, channels, stores)
-        return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
+        choice, slots, greys = self.relaxation.choice, self.proposal.slots, 0
+        if choice.mode:  # passes over candidates and grey levels
+            greys = choice.window.top + 1
+            slots = (2 * channels + 2) * (slots + greys * greys // neighbours)
+        most = self.machine.chunk(slots, neighbours, channels, 12 * greys)
+        return max(most, TOGETHER) if isinstance(self.proposal, CandidateList) and self.in_place else most
 
 
 def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     """Return the relaxation of the level in a sweep, with the penalty (n,) of each candidate."""
-    padded = level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK)))
+    padded = level.machine.put(np.pad(penalty, (0, TAIL)))  # whole vectors are read, even at the end
     return level.relaxation._replace(costs=level.relaxation.costs._replace(penalty=padded))
 
 

@@ -20,7 +20,7 @@ from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid
 from simdtex.model.source_map import effective_use
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Listed, most_listed
+from simdtex.ops.relax import CandidateList, most_listed
 from simdtex.run import Callback, OutputWithSource, Relaxing, Stage
 
 STEP, LISTED = 200_000, 16
@@ -128,13 +128,13 @@ class Record:
         """Return the number of candidates that all sites have evaluated so far, if the level lists candidates."""
         if not self._listed:
             return self._weighed
-        weighed = self._run.grid(self.reports[-1]["level"]).view(self._run.machine.get(self._run.weighed))
+        weighed = self._run.grid(self.reports[-1]["level"]).view(self._run.machine.get(self._run.evaluations))
         return int(weighed.sum(dtype=np.int64))
 
     def _begin(self, level: Level) -> None:
         """Start the report of a level."""
         self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
-        self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, Listed)
+        self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, CandidateList)
         grid, candidates = level.grid, level.proposal.candidates.size
         names = ("layers", "rows", "cols")[-len(grid.shape) :]
         sizes = {"level": level.number, **dict(zip(names, grid.shape, strict=True)), "candidates": candidates}
