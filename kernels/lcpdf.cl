@@ -56,7 +56,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
 // mass    (S, greys)      scratch: sum of the weights per grey level
 // table   (S, greys)      out: f(x) of the last channel, up to a factor: devices may round a division as they like
-// choice  (S,), mode (C, S)   out: pixel index in the sample, and grey levels
+// choice  (S,), mode (CHANNELS, S)   out: pixel index in the sample, and grey levels
 __kernel void lcpdf_density(FIELD, __global const float *restrict window, __global ulong *restrict mass,
                             __global float *restrict table, __global int *restrict choice, __global ushort *restrict mode)
 {
