@@ -14,12 +14,15 @@
 #ifndef N
 #define N 64 // most neighbours
 #endif
+#ifndef CHANNELS
+#define CHANNELS MADE // of what candidates count for
+#endif
 
 // W_p times the kernel of equation (7) around y_p, at grey levels x_c in all channels but one.
 inline ulong weight_at(ulong w, __global const float *y, const int plane, const __private int *x, const int but,
                        __global const float *window, const int radius)
 {
-    for (int c = 0; c < MADE && w; ++c)
+    for (int c = 0; c < CHANNELS && w; ++c)
         if (c != but)
             w = weight_near(w, abs((int)y[c * plane] - x[c]), window, radius);
     return w;
@@ -27,7 +30,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
 
 // The arguments of both kernels, as in relax.cl, and
 //
-// own      (C, plane)     what a candidate counts for, at its place in `levels`: its grey levels
+// own  (CHANNELS, plane)  what a candidate counts for, at its place in `levels`: its grey levels
 // greys                   number of grey levels
 #define FIELD                                                                                                          \
     __global const int *restrict sites, const int first, const int S, __global const ushort *values,                   \
@@ -53,7 +56,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
 // mass    (S, greys)      scratch: sum of the weights per grey level
 // table   (S, greys)      out: f(x) of the last channel, up to a factor: devices may round a division as they like
-// choice  (S,), mode (C, S)   out: pixel index in the sample, and grey levels
+// choice  (S,), mode (CHANNELS, S)   out: pixel index in the sample, and grey levels
 __kernel void lcpdf_density(FIELD, __global const float *restrict window, __global ulong *restrict mass,
                             __global float *restrict table, __global int *restrict choice, __global ushort *restrict mode)
 {
@@ -88,10 +91,10 @@ __kernel void lcpdf_density(FIELD, __global const float *restrict window, __glob
 #define OWN_LEVEL(p, c) (int)own[(c) * g.plane + at[p]]
 
     int x[C];
-    for (int c = 0; c < MADE; ++c)
+    for (int c = 0; c < CHANNELS; ++c)
         x[c] = OWN_LEVEL(nearest, c);
-    for (int n = 0; n < (MADE > 1 ? 2 * MADE : 1); ++n) {
-        const int c = n % MADE;
+    for (int n = 0; n < (CHANNELS > 1 ? 2 * CHANNELS : 1); ++n) {
+        const int c = n % CHANNELS;
         for (int v = 0; v < greys; ++v) {
             m[v] = 0;
             f[v] = 0.0f;
@@ -119,7 +122,7 @@ __kernel void lcpdf_density(FIELD, __global const float *restrict window, __glob
         most = max(w, most);
     }
     choice[s] = positions[nearest];
-    for (int c = 0; c < MADE; ++c)
+    for (int c = 0; c < CHANNELS; ++c)
         mode[c * S + s] = (ushort)x[c];
 }
 

@@ -138,10 +138,10 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     const float most = MOST_GUMBEL * g.spread;
     float best = INFINITY;
     int best_at = 0x7fffffff;
+    ulong seen = 0;
 #ifndef EXACT
 #define REPEATED(p) 0.0f
     int list[SLOTS], m = 0;
-    ulong seen = 0;
     for (int k = 0; k < min(SUGGESTING, g.neighbours); ++k) {
         const int r = NEIGHBOUR(k);
         if (r >= 0 && temperature[r] < UNTOUCHED)
@@ -168,13 +168,12 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     }
     next[g.neighbours] = number_of(index_of, source[site]);
 #define REPEATED(p) (g.novelty > 0.0f ? g.novelty * repeated(p, next, same, g.neighbours) : 0.0f)
-    for (int k = 0, last = -1, before = -1; k <= g.neighbours; ++k) {
-        const int p = next[k];
-        if (p < 0 || p == last || p == before)
-            continue;
-        before = last;
-        last = p;
-        CONSIDER(p, k < g.neighbours ? g.discount : 1.0f)
+    int list[N + 1], known = 0;
+    for (int k = 0; k <= g.neighbours; ++k) {
+        const int before = known;
+        known = proposed(next[k], list, known, &seen);
+        if (known > before)
+            CONSIDER(next[k], k < g.neighbours ? g.discount : 1.0f)
     }
 
     // The terms of a sum, the most certain first.
@@ -195,7 +194,8 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
                 txu[m * C + c] = XU(cell, c, lane);
             ++m;
         }
-    const float slack = SLACK(m * C + WAVES);
+    const int terms = m;
+    const float slack = SLACK(terms * C + WAVES);
     for (; m % CHECK; ++m) {
         to[m] = 0;
         for (int c = 0; c < CONFIDENCES; ++c)
@@ -207,7 +207,8 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     // All candidates against the bound, V x STEP side by side. Three facts make that exact: partial sums never fall, no
     // cost is below 0, and a sum in another order differs by less than the slack. What survives is evaluated.
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs;
-    ulong done = 0;
+    const int blocks = (runs * wide + STEP - 1) / STEP;
+    ulong looked = 0;
     for (int b = 0; b < runs * wide; b += STEP) {
         __global const float *y[STEP];
         vec d[STEP];
@@ -263,7 +264,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
                 low = fmin(low, d[q]);
             alive = ANY(BITS(low) < limit);
         }
-        done += (ulong)(2 * C * V * STEP) * k;
+        looked += min(k, terms);
         for (int q = 0; alive && q < STEP; ++q) {
             if (!ANY(BITS(d[q]) < limit))
                 continue;
@@ -294,7 +295,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     NEW(source)[out] = positions[best_at];
     NEW(temperature)[out] = cooled_to(g.xi + heat.x, heat.y); // 6.2.2.3
 #ifdef EXACT
-    work[s] += done;
+    work[s] += looked * (2 * C) * g.candidates / blocks;
 #else
     work[site] += m;
 #endif

@@ -473,7 +473,7 @@ def drawn(level, d, numbers, s, turn):
     """The Gibbs sampler: the candidate of least d_p - 2h^2 G_p and, of a density, a step from its grey levels."""
     density = level.o.pixel == "density"
     spread = float32(1) / level.scale
-    total = [fma(spread, np.atleast_1d(noise(level, p, s, turn)), d_p)[0] for d_p, p in zip(d, numbers, strict=True)]
+    total = fma(spread, noise(level, numbers, s, turn), d)
     p = min(zip(total, numbers, strict=True))[1]
     values = level.own[:, p].tolist()
     for c, y in enumerate(values if density else []):
@@ -484,22 +484,27 @@ def drawn(level, d, numbers, s, turn):
     return values, p
 
 
-def noise(level, p, s, turn):
-    """-G_p, less the logarithms of the shares of the kernels around y_p that are legal.
+def noise(level, numbers, s, turn):
+    """-G_p of candidates, less the logarithms of the shares of the kernels around y_p that are legal.
 
     Candidates of a row that are a neighbour's distance apart are a run, and have their words by sixteens: four sixteens
     share one draw.
     """
-    row, col, cols, runs = 0, p, len(level.places), 1
-    if level.all:
-        row, col = (level.lines[axis].index(level.at[p][axis]) for axis in (0, 1))
-        cols = len(level.lines[1])
-        runs = min(level.spacing // level.step, cols)
-    unit = (row * runs + col % runs) * -(-cols // (runs * UNIT)) + col // runs // UNIT
-    attempt, which = unit // 4 * UNIT + col // runs % UNIT, unit % 4
-    found = minus_gumbel(words(level.seed, level.number, turn, level.index(s), random.GUMBEL, attempt)[which])
-    for y in level.own[:, p].tolist() if level.o.pixel == "density" else []:
-        found = found - (logarithm(mass(level, y)[1])[0] - float32(22.1807098))
+    found, drawn = [], {}
+    for p in numbers:
+        row, col, cols, runs = 0, p, len(level.places), 1
+        if level.all:
+            row, col = (level.lines[axis].index(level.at[p][axis]) for axis in (0, 1))
+            cols = len(level.lines[1])
+            runs = min(level.spacing // level.step, cols)
+        unit = (row * runs + col % runs) * -(-cols // (runs * UNIT)) + col // runs // UNIT
+        attempt = unit // 4 * UNIT + col // runs % UNIT
+        if attempt not in drawn:
+            drawn[attempt] = words(level.seed, level.number, turn, level.index(s), random.GUMBEL, attempt)
+        found.append(drawn[attempt][unit % 4])
+    found = minus_gumbel(found)
+    for y in level.own[:, numbers] if level.o.pixel == "density" else []:
+        found = found - (logarithm([mass(level, y_p)[1] for y_p in y]) - float32(22.1807098))
     return found
 
 

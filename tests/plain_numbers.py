@@ -58,24 +58,22 @@ def exponential(x):
 
 def logarithm(x):
     """log(x) of float32 x > 0, as the polynomial that the devices' logarithm is."""
-    m, e = np.frexp(np.atleast_1d(float32(x)))
+    m, e = np.frexp(np.asarray(x, float32))
     small = m < float32(0.5**0.5)
     return log_of(e - small, np.where(small, 2 * m, m) - float32(1))
 
 
 def log_of(e, r):
     """log(2^e (1 + r))."""
-    p, e = float32(0.0873511881), np.asarray(e, float32)
+    p = float32(0.0873511881)
     for coefficient in (-0.144429281, 0.14979136, -0.165521428, 0.199536145, -0.250025034, 0.333342254, -0.499999821):
         p = fma(p, r, float32(coefficient))
     return fma(e, float32(0.693145752), fma(p, r * r, fma(e, float32(1.42860677e-6), r)))
 
 
-def minus_gumbel(word):
-    """log(-log u), u = (word + 1/2) / 2^32, of a random word; near 1 from 1 - u."""
-    unit, rest = float32(2.0**-32), 2**32 - 1 - word
-    if rest < 0x4AFB0CCD:
-        log = log_of(0, -fma(np.atleast_1d(float32(rest)), unit, unit / 2))
-    else:
-        log = logarithm(fma(np.atleast_1d(float32(word)), unit, unit / 2)[0])
-    return logarithm(-log[0])[0]
+def minus_gumbel(words):
+    """log(-log u), u = (word + 1/2) / 2^32, of random words; near 1 from 1 - u."""
+    words, unit = np.array(words, float), float32(2.0**-32)
+    rest = 2.0**32 - 1 - words
+    u, below_1 = (fma(n.astype(float32), unit, unit / 2) for n in (words, rest))
+    return logarithm(-np.where(rest < 0x4AFB0CCD, log_of(0, -below_1), logarithm(u)))

@@ -138,7 +138,7 @@ def test_the_memory_that_is_asked_for(monkeypatch):
     laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
     laid_out(REFERENCE, texture((24, 25), 1, np.float64), (20, 23), mrf.Options(order=2, levels=1, structure=0), 5)
     coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
-    each = 14, 159  # for every channel and pixel of the sample; the structure channel is one
+    each = 14, 80  # for every channel and pixel of the sample; the structure channel is one
     assert asked == [
         (460 * (12 + 10) + coarse * (2 * each[0] + each[1]), 460 * (84 + 2 * 11) + 64 * coarse),
         (460 * (12 + 16) + fine * (each[0] + each[1]), 460 * (100 + 11) + 64 * fine),

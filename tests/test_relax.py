@@ -265,12 +265,19 @@ def test_a_candidate_just_within_the_bound_is_found(machine, rank):
 
 @pytest.mark.parametrize("gibbs", [False, True], ids=["icm", "gibbs"])
 def test_what_is_skipped_is_counted(cl_device, gibbs):
+    """A piece of the sample has a good bound, and of a site whose neighbours are at temperature 1 no sum has a term."""
     p = problem(5, order=8, sample_shape=(40, 48), shape=(16, 16), temperatures="zero")
+    row, col = np.indices((16, 16)) + p.sample.margin + 3
+    source = (row * p.sample.cols + col).astype(np.int32)
+    p = p._replace(field=p.field._replace(source=source, values=p.sample.working[:, source]))
     machine, candidates = opencl(cl_device), p.candidates(REFERENCE).size
-    before = machine.spared
-    apart(machine, p, exact=True, gibbs=gibbs, bandwidth=0.15)
-    fma = 2 * p.sites.size * candidates * len(p.offsets)
-    assert fma // 4 < machine.spared - before < fma
+    fma, spared = 2 * p.sites.size * candidates * len(p.offsets), []
+    for t in (0, 1024):
+        before = machine.spared
+        field = p.field._replace(temperature=np.full((16, 16), t, np.uint16))
+        apart(machine, p._replace(field=field), exact=True, gibbs=gibbs, bandwidth=0.15)
+        spared.append(machine.spared - before)
+    assert fma // 4 < spared[0] < fma == spared[1]
     assert REFERENCE.spared == 0
 
 

@@ -276,4 +276,5 @@ def _table(
 ) -> None:
     defines, arguments = relaxation.arguments(machine, sites, field)
     levels = relaxation.proposal.square.levels if own is None else own
+    defines |= {} if own is None else {"CHANNELS": len(own)}
     machine.launch(kernel, (sites.size,), *arguments, levels, greys, *results, defines=defines)
