@@ -66,7 +66,8 @@ def by_lane(offsets: NDArray[np.int32]) -> NDArray[np.intp]:
 
 def lane_of(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return the lane (N,) of each offset: its column in the square around the neighbourhood, modulo `LANES`."""
-    return np.mod(offsets[:, 1] + offsets[:, 1].max(), LANES, dtype=np.int32)
+    columns: NDArray[np.int32] = offsets[:, 1] + offsets[:, 1].max()
+    return columns % np.int32(LANES)
 
 
 class Program:

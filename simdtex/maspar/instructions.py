@@ -109,8 +109,8 @@ class Broadcast(NamedTuple):
     """Candidates, which the ACU broadcasts one after another.
 
     ``sample`` (N, C, n or more) float32 are the values of their neighbours, those of lane k from ``lanes[k]`` to
-    ``lanes[k + 1]`` - 1; ``own`` (C, n) float32 the values of the candidates; ``share`` (C, n) float32 logarithms of the
-    legal shares of their kernels, 0 unless a density is drawn; and ``noise`` (n,) int32 the numbers of their noise.
+    ``lanes[k + 1]`` - 1; ``own`` (C, n) float32 the values of the candidates; ``share`` (C, n) float32 logarithms of
+    the legal shares of their kernels, 0 unless a density is drawn; ``noise`` (n,) int32 the numbers of their noise.
     """
 
     sample: Any
