@@ -15,7 +15,8 @@ from simdtex.maspar.array import DIRECTIONS, MAPPINGS, ProcessorArray, path
 from simdtex.maspar.costs import CLOCK, COSTS, FULL
 from simdtex.maspar.ising import ising
 from simdtex.maspar.machine import MP1
-from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.maspar.walk import Walk
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Key
 
 TYPES = ("int32", "uint64", "float32")
@@ -163,6 +164,30 @@ def test_one_path_of_unit_moves_leads_through_all_offsets(order, moves):
             met.append(number)
     assert sorted(met) == list(range(len(offsets)))
     assert len(steps) == moves
+
+
+@given(
+    SHAPES,
+    st.tuples(st.integers(1, 17), st.integers(1, 17)),
+    st.sampled_from(MAPPINGS),
+    st.booleans(),
+    st.sampled_from([1, 2, 4, 8]),
+    st.sampled_from([1, 2, 4]),
+)
+def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, order, spacing):
+    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
+    offsets, radius, number = neighbourhood_offsets(order), 4, 1 + np.arange(shape[0] * shape[1]).reshape(shape)
+    walk, x, found = Walk(mp1, grid, offsets), filled(mp1, number), np.zeros((len(offsets), grid.rows, grid.cols), int)
+    for k, there in walk.neighbours(x):
+        kept = mp1.plural()
+        kept.set(there)
+        found[k] = grid.view(seen(kept))
+    around = np.pad(grid.view(number), radius, mode="wrap" if torus else "constant")
+    for (down, right), got in zip(offsets.tolist(), found, strict=True):
+        itself = torus and not (down % grid.rows or right % grid.cols)
+        wanted = around[radius + down :, radius + right :][: grid.rows, : grid.cols]
+        assert (got == wanted * (not itself)).all()
+    assert (grid.view(seen(walk.members)) == np.maximum((found > 0).sum(0), 1)).all()
 
 
 @pytest.mark.parametrize("mapping", MAPPINGS)
