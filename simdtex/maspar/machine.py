@@ -23,7 +23,7 @@ from simdtex.machine.interface import Array, Launcher, Machine
 from simdtex.maspar import instructions
 from simdtex.maspar.array import Layout, ProcessorArray
 from simdtex.maspar.costs import COSTS, PHILOX
-from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, Broadcast, On
+from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, On
 from simdtex.ops.lcpdf import Key
 
 TYPES = {"int32": "int", "float32": "float", "uint64": "ulong"}
@@ -305,8 +305,6 @@ class MP1:
 
 def _viewed(arg: Any) -> Any:
     """Return an argument of an instruction in NumPy."""
-    if isinstance(arg, Broadcast):
-        return Broadcast(*map(_viewed, arg))
     return arg.data[..., arg.word :] if isinstance(arg, Plural) else arg
 
 
