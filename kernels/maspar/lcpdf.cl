@@ -1,30 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Step 6.2.2 of Algorithm 1 on the array: the ACU broadcasts the sample candidate by candidate, and the PEs of a layer
-// accumulate distances (12), weights (7) and the draw. A launch takes `count` candidates, beginning with `first`.
+// Step 6.2.2 of Algorithm 1 on the array: the ACU broadcasts the sample candidate by candidate, and each PE keeps the best
+// one so far. No distance is stored.
 //
 // near      (layers, PEs, N (C + 1))  of each neighbour the weighted values x_r u of the channels, and u = 1 - t_r
-// distance  (1, PEs, size)            of all candidates, or of this launch's, as many as a PE keeps
 // sample    (N, C, size)              neighbourhoods of the candidates, those of a neighbour and channel side by side
+// lanes     (LANES + 1,)              where the neighbours of each lane begin
 // own       (C, n)                    values of the candidates themselves
+// share     (C, n)                    logarithms of the legal shares of the kernels around them
+// number    (n,)                      of each candidate's noise: 16 times its unit, and its lane
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/vector.h"
 #include "common/distance.h"
 #include "common/parzen.h"
-#include "common/philox.h"
+#include "common/gumbel.h"
 #include "maspar/layout.h"
 
 #define STEP 4 // vectors of candidates in registers together
+#define TOGETHER (STEP * V)
 
-// simdtex.ops.lcpdf.Choice; `noise` and `gauss` are the tables of its window.
-#define CHOICE                                                                                                  \
-    const int draws, const int density, const float scale, TABLE(uint, noise), TABLE(float, gauss), const int radius, \
-        const int top
+// simdtex.ops.lcpdf.Window
+#define WINDOW const float scale, TABLE(uint, noise), TABLE(float, gauss), const int radius, const int top
 
-// simdtex.maspar.instructions.Broadcast
-#define BROADCAST                                                                                               \
-    const int first, const int count, TABLE(float, sample), TABLE(float, own), CHOICE, PLURAL(float, distance), \
-        PLURAL(float, least), PLURAL(int, chosen)
-#define DISTANCE(pe) (distance + (size_t)(pe) * distance_size + first % distance_size)
+// simdtex.maspar.instructions.Broadcast, a neighbourhood, and the best candidate so far
+#define BROADCAST                                                                                                \
+    TABLE(float, sample), TABLE(int, lanes), TABLE(float, own), TABLE(float, share), TABLE(int, number),         \
+        PLURAL(const float, near), PLURAL(float, least), PLURAL(int, chosen)
 
 // Keeps what has arrived from neighbour n, and adds its temperature to `heat`.
 __kernel void maspar_lcpdf_keep(ARRAY, PLURAL(float, near), const int n, PLURAL(const int, arrived), PLURAL(int, heat))
@@ -39,85 +38,92 @@ __kernel void maspar_lcpdf_keep(ARRAY, PLURAL(float, near), const int n, PLURAL(
     }
 }
 
-// Equation (12): neighbours in canonical order, each term two fused multiply-adds. And the `least` so far and its
-// candidate, of several the first, `chosen` by ICM.
-__kernel void maspar_lcpdf_distance(ARRAY, BROADCAST, PLURAL(const float, near))
+// Equation (12): each term two fused multiply-adds, the neighbours of a lane row by row; then lanes n and n + 8 are
+// added, n and n + 4, n and n + 2, n and n + 1.
+inline void distances(__global const float *restrict y, const int size, __global const int *restrict lanes,
+                      __global const float *z, __private float *d)
 {
-    WHERE_ACTIVE(pe, k) {
-        __global const float *z = &OF(near, k);
-        __global float *d = DISTANCE(pe);
-        for (int p = 0; p < count; p += STEP * V) {
-            vec sum[STEP];
-            for (int q = 0; q < STEP; ++q)
-                sum[q] = 0.0f;
-            for (int r = 0; r < near_size / (C + 1); ++r)
-                for (int c = 0; c < C; ++c)
+    vec sum[LANES][STEP];
+    for (int n = 0; n < LANES; ++n) {
+        vec here[STEP];
+        for (int q = 0; q < STEP; ++q)
+            here[q] = 0.0f;
+        for (int r = lanes[n] * C; r < lanes[n + 1] * C; ++r)
 #pragma unroll
-                    for (int q = 0; q < STEP; ++q) {
-                        const vec y = LOAD(sample + (r * C + c) * sample_size + first + p + q * V);
-                        const vec e = GAP(y, (vec)z[r * (C + 1) + C], (vec)z[r * (C + 1) + c]);
-                        sum[q] = fma(e, e, sum[q]);
-                    }
-            for (int q = 0; q < STEP; ++q)
-                STORE(sum[q], d + p + q * V);
-        }
-        float found = OF(least, k);
-        for (int p = 0; p < count; ++p)
-            if (d[p] < found) {
-                found = d[p];
-                OF(chosen, k) = first + p;
+            for (int q = 0; q < STEP; ++q) {
+                const vec e = GAP(LOAD(y + r * size + q * V), (vec)z[r / C * (C + 1) + C], (vec)z[r / C + r]);
+                here[q] = fma(e, e, here[q]);
             }
-        OF(least, k) = found;
+        for (int q = 0; q < STEP; ++q)
+            sum[n][q] = here[q];
     }
+    for (int half_ = LANES / 2; half_; half_ /= 2)
+        for (int n = 0; n < half_; ++n)
+            for (int q = 0; q < STEP; ++q)
+                sum[n][q] += sum[n + half_][q];
+    for (int q = 0; q < STEP; ++q)
+        STORE(sum[0][q], d + q * V);
 }
 
-// The weights of equation (7), added to `sum`. With `choose`, the first candidate at which that exceeds the target is
-// `chosen`, if none was.
-__kernel void maspar_lcpdf_weigh(ARRAY, BROADCAST, PLURAL(ulong, sum), PLURAL(const ulong, target),
-                                 const int choose)
+// The candidate of least distance; of a draw, with 2h^2 times its noise, which takes MOST_GUMBEL times that away at most.
+__kernel void maspar_lcpdf_choose(ARRAY, BROADCAST, const float spread, PLURAL(const int, place), const ulong seed,
+                                  const uint level, const uint turn)
 {
     WHERE_ACTIVE(pe, k) {
-        __global const float *d = DISTANCE(pe);
-        const float smallest = OF(least, k);
-        ulong total = OF(sum, k);
-        int taken = choose ? OF(chosen, k) : -1;
-        for (int p = 0; p < count && taken < 0; ++p) {
-            if (WEIGHS(d[p], smallest, scale))
-                total += mass_of(d[p], smallest, scale, own, own_size, first + p, noise, density ? radius : -1, top);
-            taken = choose && total > OF(target, k) ? first + p : -1;
+        float best = INFINITY;
+        for (int first = 0; first < own_size; first += TOGETHER) {
+            float d[TOGETHER];
+            distances(sample + first, sample_size, lanes, &OF(near, k), d);
+            for (int n = 0; n < TOGETHER && first + n < own_size; ++n) {
+                const int p = first + n, q = number[p];
+                float total = d[n];
+                if (spread > 0.0f && total - MOST_GUMBEL * spread <= best) {
+                    float noise = minus_gumbel_of(seed, level, turn, (ulong)OF(place, k), q / LANES, q % LANES);
+                    for (int c = 0; c < C; ++c)
+                        noise -= share[c * share_size + p];
+                    total = fma(spread, noise, total);
+                }
+                if (total < best) {
+                    best = total;
+                    OF(chosen, k) = p;
+                }
+            }
         }
-        OF(sum, k) = total;
-        if (choose)
-            OF(chosen, k) = taken;
+        OF(least, k) = best;
     }
 }
 
-// The weights of equation (7) given the grey levels x of all channels but c, added to the `mass` of each grey level,
-// which the first launch clears. With c = -1, the candidate that gives most is `chosen`; `most` is its weight so far.
-__kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, PLURAL(ulong, mass), PLURAL(ulong, most),
-                                PLURAL(const int, x), const int c)
+// The weights of equation (7) given the grey levels x of all channels but c, added up for each grey level. With c = -1,
+// the candidate that gives most is `chosen`.
+__kernel void maspar_lcpdf_mode(ARRAY, BROADCAST, WINDOW, PLURAL(ulong, mass), PLURAL(const int, x), const int c)
 {
     WHERE_ACTIVE(pe, k) {
         __global ulong *m = mass + (size_t)pe * mass_size;
-        for (int v = 0; !first && v <= top; ++v)
+        ulong most = 0;
+        for (int v = 0; v <= top; ++v)
             m[v] = 0;
-        for (int p = 0; p < count; ++p) {
-            ulong w = weight(DISTANCE(pe)[p], OF(least, k), scale);
-            for (int b = 0; b < C; ++b)
-                if (b != c)
-                    w = weight_near(w, abs((int)own[b * own_size + first + p] - (&OF(x, k))[b]), gauss, radius);
-            if (c >= 0)
-                m[(int)own[c * own_size + first + p]] += w;
-            else if (w > OF(most, k)) {
-                OF(most, k) = w;
-                OF(chosen, k) = first + p;
+        for (int first = 0; first < own_size; first += TOGETHER) {
+            float d[TOGETHER];
+            distances(sample + first, sample_size, lanes, &OF(near, k), d);
+            for (int n = 0; n < TOGETHER && first + n < own_size; ++n) {
+                const int p = first + n;
+                ulong w = weight(d[n], OF(least, k), scale);
+                for (int b = 0; b < C; ++b)
+                    if (b != c)
+                        w = weight_near(w, abs((int)own[b * own_size + p] - (&OF(x, k))[b]), gauss, radius);
+                if (c >= 0)
+                    m[(int)own[c * own_size + p]] += w;
+                else if (w > most) {
+                    most = w;
+                    OF(chosen, k) = p;
+                }
             }
         }
     }
 }
 
 // The grey level x with the highest density, of several the lowest: the `mass` of all levels, smoothed by the kernel.
-__kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), CHOICE, PLURAL(int, x))
+__kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), WINDOW, PLURAL(int, x))
 {
     WHERE_ACTIVE(pe, k) {
         float best = -1.0f;
@@ -134,7 +140,7 @@ __kernel void maspar_lcpdf_highest(ARRAY, PLURAL(const ulong, mass), CHOICE, PLU
 }
 
 // A grey level of channel c, drawn from the kernel of equation (7) around that of the chosen candidate.
-__kernel void maspar_lcpdf_step(ARRAY, PLURAL(int, x), CHOICE, PLURAL(const int, place), const ulong seed,
+__kernel void maspar_lcpdf_step(ARRAY, PLURAL(int, x), WINDOW, PLURAL(const int, place), const ulong seed,
                                 const uint level, const uint turn, const int c)
 {
     WHERE_ACTIVE(pe, k) {

@@ -44,7 +44,7 @@ from simdtex.maspar import EXECUTED
     default="64K",
     show_default=True,
     words=("16K", "64K"),
-    help="Give each PE this memory; where it does not hold all distances, they are computed three times.",
+    help="Give each PE this memory; what does not fit is refused.",
 )
 @paper_options(*EXECUTED)
 @option(

@@ -18,14 +18,14 @@ from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
 from simdtex.maspar import EXECUTED
-from simdtex.maspar.algorithm import Level, Problem, Program
+from simdtex.maspar.algorithm import Level, Problem, Program, by_lane
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
-from simdtex.maspar.instructions import AT_ONCE, STEPPED
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.level import Lattices
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
+from simdtex.ops.square import LANES
 from simdtex.options import one_of, resolve
 from simdtex.run import Callback, Output, Progress, Stage
 
@@ -102,7 +102,7 @@ def synthesize(
     mapping : {"cut-and-stack", "hierarchical"}
         The places of pixels if the picture is larger than the array, see `simdtex.maspar.array.ProcessorArray`.
     memory : {"64K", "16K"}
-        The memory of a PE. If it does not hold the distances of all candidates, they are computed three times.
+        The memory of a PE. A picture or neighbourhood too large for it is refused.
     channel_axis, rng, device
         As in `simdtex.synthesize`.
     callback : callable, optional
@@ -163,15 +163,19 @@ def problem(run: Lattices) -> Problem:
     source = run.sample.places(np.zeros((1, 2), np.int32), 1).positions
     first = np.concatenate([source[None], run.sample.working[:, source].astype(np.int32)])
     xi = min(-1, round(run.options.xi * 1024))
-    return Problem(first, run.offsets, run.options.order, xi, run.seed)
+    return Problem(first, run.offsets[by_lane(run.offsets)], run.options.order, xi, run.seed)
 
 
 def level_of(run: Lattices, number: int) -> Level:
     """Return the input of the program for a level."""
     places, working = run.places(number), run.sample.working.astype(np.float32)
-    around = np.moveaxis(working[:, places.reach[:, None] + places.positions], 1, 0)
-    own = working[:, places.positions]
-    return Level(number, run.grid(number), run.choice(number), places.positions, own, around)
+    reach, own = places.reach[by_lane(run.offsets)], working[:, places.positions]
+    around = np.moveaxis(working[:, reach[:, None] + places.positions], 1, 0)
+    cols = places.col.size
+    runs = min(places.spacing // places.step, cols)  # as in simdtex.ops.square.Square
+    row, col = np.divmod(np.arange(places.positions.size, dtype=np.int32), cols)
+    noise = (row * runs + col % runs) * -(-cols // (runs * LANES)) * LANES + col // runs
+    return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise)
 
 
 def _run(
@@ -193,9 +197,8 @@ def _run(
             f'{memory}; give more memory, pixel="source" or relaxation="gibbs"'
         )
     n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
-    held = min(memory, need + 4 * n + mp1.layers * (8 * terms + 160)) + 4 * STEPPED * AT_ONCE
-    remedy = 'give a smaller array or sample, or memory="16K"'
-    require(machine, array.size * held + 4 * terms * n, 4 * terms * n, remedy)
+    held = min(memory, need + mp1.layers * (8 * terms + 160))
+    require(machine, array.size * held + 4 * terms * n, 4 * terms * n, "give a smaller array or sample")
     program, steps, stages = Program(mp1, problem(run)), [], []
 
     def values(of: Any) -> NDArray[Any]:

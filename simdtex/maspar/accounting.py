@@ -39,8 +39,8 @@ class Account:
     Notes
     -----
     Per step, all neighbourhoods are fetched by one walk; then there is one pass for each virtual layer with an active
-    site, which takes the same time for any number of active PEs. The PEs keep all distances. The account leaves out
-    the start and the schedule.
+    site, which takes the same time for any number of active PEs. The account leaves out the start and the
+    schedule.
     """
 
     def __init__(self, array: ProcessorArray, offsets: NDArray[np.int32], channels: int) -> None:
@@ -52,7 +52,8 @@ class Account:
         self._grid, self._flop = grid, FLOP * len(self._offsets) * self._channels * candidates
         mp1 = MP1(None, self.array, (grid.height, grid.width), inf)
         any_value = np.broadcast_to(np.float32(0), (len(self._offsets), self._channels, candidates))
-        level = Level(0, grid, choice, any_value[0, 0], any_value[0], any_value)
+        number = any_value[0, 0].astype(np.int32)
+        level = Level(0, grid, choice, number, any_value[0], any_value, number)
         program = Program(mp1, Problem(np.zeros((1 + self._channels, 1), np.int32), self._offsets, 1, -1, 0))
         relaxation = Pass(program, level, Walk(mp1, grid, self._offsets))
 

@@ -16,20 +16,23 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.maspar import instructions
-from simdtex.maspar.coloring import coloring
-from simdtex.maspar.costs import EXP, PHILOX, WIDE
-from simdtex.maspar.instructions import Broadcast
+from simdtex.maspar.costs import EXP, NOISE, PHILOX
+from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import MP1, Mask
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
-from simdtex.ops.lcpdf import Choice, Key, turns
+from simdtex.ops.arithmetic import log32
+from simdtex.ops.lcpdf import Choice, Key, legal, turns
+from simdtex.ops.sites import coloring
+from simdtex.ops.square import LANES
 
 
 class Level(NamedTuple):
     """The constants of a level on the ACU.
 
     ``number`` is l, ``grid`` S^l, and ``choice`` the Gaussian of (7) and what is drawn from it; ``source`` (n,) are the
-    pixel indices of the candidates, ``own`` (C, n) their values, and ``sample`` (N, C, n) those of their neighbours.
+    pixel indices of the candidates, ``own`` (C, n) their values, ``sample`` (N, C, n) those of their neighbours, and
+    ``noise`` (n,) int32 the numbers of their Gumbel noise: 16 times the unit, and the lane (kernels/common/gumbel.h).
     """
 
     number: int
@@ -38,13 +41,15 @@ class Level(NamedTuple):
     source: NDArray[np.int32]
     own: NDArray[np.float32]
     sample: NDArray[np.float32]
+    noise: NDArray[np.int32]
 
 
 class Problem(NamedTuple):
     """The input on the ACU.
 
     ``first`` has the pixel indices and the values (C + 1, n) that sites begin with, ``offsets`` (N, 2) are those of the
-    neighbourhood of ``order``, ``xi`` of (13) is in 1/1024, and ``seed`` keys all random numbers.
+    neighbourhood of ``order``, lane by lane (`by_lane`), ``xi`` of (13) is in 1/1024, and ``seed`` keys all random
+    numbers.
     """
 
     first: NDArray[np.int32]
@@ -52,6 +57,17 @@ class Problem(NamedTuple):
     order: int
     xi: int
     seed: int
+
+
+def by_lane(offsets: NDArray[np.int32]) -> NDArray[np.intp]:
+    """Return the order (N,) of a neighbourhood's offsets in the sum (12): lane by lane, and row by row in each."""
+    return np.lexsort((offsets[:, 1], offsets[:, 0], lane_of(offsets)))
+
+
+def lane_of(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the lane (N,) of each offset: its column in the square around the neighbourhood, modulo `LANES`."""
+    columns: NDArray[np.int32] = offsets[:, 1] + offsets[:, 1].max()
+    return columns % np.int32(LANES)
 
 
 class Program:
@@ -79,13 +95,15 @@ class Program:
         with mp1.frame():
             with mp1.section("colouring"):
                 walk = Walk(mp1, level.grid, self.problem.offsets)  # 3, 4, 6.1
-                color, colors = coloring(mp1, walk, self.problem.order, seed)
+                color, colors = mp1.plural(), np.zeros(mp1.shape, np.int32)
+                level.grid.view(colors)[:] = coloring(level.grid, self.problem.order, seed)  # (14)
+                mp1.table(color, colors.ravel(), self.place)
             relaxation = Pass(self, level, walk)
             for sweep in count(1):
                 with mp1.section("schedule"), mp1.where(walk.sites):
                     if not mp1.any(t > 0):  # 6.2
                         break
-                bits = random.draw4(seed, level.number, sweep, np.arange(colors), random.SCHEDULE)[0]
+                bits = random.draw4(seed, level.number, sweep, np.arange(colors.max() + 1), random.SCHEDULE)[0]
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
                         mp1.count(reduction=1)  # which layers have a site to relax
@@ -98,18 +116,18 @@ class Pass:
     """The relaxation of all chosen sites of a level in parallel, 6.2.2."""
 
     def __init__(self, program: Program, level: Level, walk: Walk) -> None:
-        mp1, (neighbours, channels, n) = program.mp1, level.sample.shape
+        mp1, (neighbours, channels, _), choice = program.mp1, level.sample.shape, level.choice
         self.mp1, self.program, self.level, self.walk, self.channels = mp1, program, level, walk, channels
-        draws, mode = int(level.choice.draws), int(level.choice.mode)
         self.near, self.heat = mp1.plural("float32", neighbours * (channels + 1)), mp1.plural()
         self.least, self.chosen = mp1.plural("float32"), mp1.plural()
         mp1.reserve(4 * (channels + 1) * mp1.layers)  # what walks through the neighbourhoods
-        self.sum = mp1.plural("uint64", draws or mode)
-        self.bits, self.target = mp1.plural("uint64", draws), mp1.plural("uint64", draws)
-        self.mass = mp1.plural("uint64", (level.choice.window.top + 1) * mode, shared=True)
-        self.keeps = bool(draws or mode) and mp1.fits(4 * n)  # else each use computes all distances
-        mp1.reserve(4 * n if self.keeps else 4)
-        self.blocks = Broadcast.blocks(mp1, level, self.keeps, self.least, self.chosen)
+        self.mass = mp1.plural("uint64", (choice.window.top + 1) * choice.mode, shared=True)
+        self.shares = channels * (choice.draws and choice.density)  # legal shares of kernels
+        share = np.zeros_like(level.own)
+        if self.shares:  # logarithms, as in simdtex.ops.relax
+            share = log32(legal(level.own, choice.window)[1].astype(np.float32)) - np.float32(22.1807098)
+        lanes = np.searchsorted(lane_of(program.problem.offsets), np.arange(LANES + 1)).astype(np.int32)
+        self.sample = Broadcast(mp1.put(level.sample, STEPPED), lanes, *map(mp1.put, (level.own, share, level.noise)))
 
     def relax(self, chosen: Mask, sweep: int) -> None:
         """Relax the chosen sites."""
@@ -118,16 +136,16 @@ class Pass:
         with mp1.section("neighbourhood"):
             self._gather()
         with mp1.where(chosen), mp1.section("draw"):
-            self.least.set(np.inf)
-            if choice.draws:
-                self.bits.set(mp1.random(program.place, key, random.DRAW))
             for layer in chosen.layers:
-                with mp1.where(layer):
-                    for block in self.blocks:  # 6.2.2.1
-                        self._distances(block)
-                    if choice.draws:  # 6.2.2.2, the Gibbs sampler; ICM takes the nearest candidate, or the mode
-                        self._draw()
-                    elif choice.mode:
+                with mp1.where(layer):  # 6.2.2.1, and 6.2.2.2: the Gibbs sampler with noise, ICM without, or the mode
+                    self._broadcast(float=1, integer=2)  # comparison, and what is the best so far
+                    if choice.draws:
+                        noise = {"integer": NOISE["integer"], "float": NOISE["float"] + self.shares}
+                        self._each(**noise, broadcast=1 + self.shares)
+                    best = (self.near, self.least, self.chosen)
+                    given = (choice.spread, program.place, key)
+                    mp1.execute(instructions.lcpdf_choose, self.sample, *best, *given, C=self.channels)
+                    if choice.mode:
                         self._mode()
             self._take(key)
             with mp1.section("cooling"):  # 6.2.2.3
@@ -142,52 +160,31 @@ class Pass:
             mp1.count(float=1 + self.channels, integer=1)
             mp1.execute(instructions.lcpdf_keep, self.near, number, there, self.heat, C=self.channels)
 
-    def _distances(self, block: Broadcast) -> None:
-        """Accumulate the distances (12) of a block of candidates, and find the least one, to which weights relate."""
-        mp1, terms = self.mp1, block.size * self.level.sample[..., 0].size
-        with mp1.section("distance"):
-            number = block.size * (not self.level.choice.draws)  # of the least one
-            mp1.count(broadcast=terms, float=4 * terms + block.size, integer=number)
-            mp1.execute(instructions.lcpdf_distance, block, self.near, C=self.channels)
+    def _broadcast(self, **each: int) -> None:
+        """Count the broadcast of all candidates, the distances (12), summed by lane, and instructions for each."""
+        terms = self.level.sample[..., 0].size
+        with self.mp1.section("distance"):
+            self._each(broadcast=terms, float=4 * terms + LANES - 1)
+        self._each(**each)
 
-    def _again(self) -> Iterator[Broadcast]:
-        """Yield the blocks with their distances, which are computed again unless a PE keeps them."""
-        for block in self.blocks:
-            if not self.keeps:
-                self._distances(block)
-            yield block
-
-    def _draw(self) -> None:
-        """Add up the weights (7) of all candidates and, to choose one, once more as far as a share of the sum."""
-        mp1, shares = self.mp1, self.channels * self.level.choice.density  # legal shares of kernels
-        for choose in (False, True):
-            if choose:
-                self.target.set(self.bits.share(self.sum))
-                self.chosen.set(-1)
-            self.sum.set(0)
-            for block in self._again():
-                with mp1.section("draw" if choose else "weights"):
-                    each = (2 + 2 * choose + WIDE * shares) * block.size
-                    mp1.count(float=EXP * block.size, broadcast=shares * block.size, integer=each)
-                    mp1.execute(instructions.lcpdf_weigh, block, self.sum, self.target, choose, C=self.channels)
+    def _each(self, **numbers: int) -> None:
+        self.mp1.count(**{kind: number * self.level.own.shape[1] for kind, number in numbers.items()})
 
     def _mode(self) -> None:
         """Move from the nearest candidates to the mode, channel by channel, and choose those that give most."""
-        mp1, x, choice = self.mp1, self.program.state, self.level.choice
-        greys, width = choice.window.top + 1, 2 * choice.window.radius + 1
+        mp1, x, window = self.mp1, self.program.state, self.level.choice.window
+        greys, width = window.top + 1, 2 * window.radius + 1
         for c in range(self.channels):
             mp1.table(x[c], self.level.own[c], self.chosen)
-        self.sum.set(0)
         for c in [*turns(self.channels), -1]:
             others = self.channels - (c >= 0)
-            for block in self._again():
-                with mp1.section("weights"):
-                    real, each = (EXP + 2 * others) * block.size, (2 + 2 * others) * block.size  # converted, times (7)
-                    mp1.count(float=real, broadcast=self.channels * block.size, integer=each)
-                    mp1.execute(instructions.lcpdf_mode, block, self.mass, self.sum, x, c, C=self.channels)
+            with mp1.section("weights"):  # converted, times (7)
+                self._broadcast(float=EXP + 2 * others, broadcast=self.channels, integer=2 + 2 * others)
+                best = (self.near, self.least, self.chosen)
+                mp1.execute(instructions.lcpdf_mode, self.sample, *best, window, self.mass, x, c, C=self.channels)
             if c >= 0:
                 mp1.count(broadcast=greys * width, integer=3 * greys, float=(2 * width + 1) * greys)
-                mp1.execute(instructions.lcpdf_highest, self.mass, choice, x[c], C=self.channels)
+                mp1.execute(instructions.lcpdf_highest, self.mass, window, x[c], C=self.channels)
 
     def _take(self, key: Key) -> None:
         """Take the chosen candidates, or a grey level around each of them."""
@@ -195,6 +192,6 @@ class Pass:
         mp1.table(program.source, self.level.source, self.chosen)
         for c in range(0 if choice.mode else self.channels):
             mp1.table(program.state[c], self.level.own[c], self.chosen)
-            if choice.density and choice.draws:
+            if self.shares:
                 mp1.count(broadcast=len(choice.window.noise), integer=PHILOX + len(choice.window.noise))
-                mp1.execute(instructions.lcpdf_step, program.state[c], choice, program.place, key, c, C=self.channels)
+                mp1.execute(instructions.lcpdf_step, program.state[c], choice.window, program.place, key, c)

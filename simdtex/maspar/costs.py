@@ -38,8 +38,12 @@ COSTS = {
 PHILOX = 10 * 12
 """Integer instructions of four random words: ten rounds of 2 wide multiplications, in halves, and 4 exclusive ors."""
 
-WIDE = 8
-"""Integer instructions of the high half of a product of 64 bits."""
+NOISE = {"integer": PHILOX + 12, "float": 54}
+"""Instructions of the Gumbel noise of a candidate, added to its distance: a random word and two logarithms.
+
+Each logarithm has 23 float (10 fma, a product, a difference and a conversion) and 4 integer; the uniform number has two
+forms, one for near 1, of 3 float each, and 4 integer for the choice; and the sum is an fma.
+"""
 
 EXP = 26
 """Float instructions of a weight (7): a difference, its scale, exp by 9 fma, and the conversion."""

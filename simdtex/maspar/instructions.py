@@ -7,23 +7,24 @@ layer after another uses them. Arguments are those of the kernels.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.maspar.array import Layout
-from simdtex.ops.lcpdf import Choice, Key, masses, spread, stepped, weighed, weights
-from simdtex.random import below, draw4
+from simdtex.ops.arithmetic import fma32, minus_gumbel
+from simdtex.ops.lcpdf import Key, Window, spread, stepped, weighed, weights
+from simdtex.ops.relax import PAIRS
+from simdtex.ops.square import LANES
+from simdtex.random import GUMBEL, below, draw4
 
 Array: TypeAlias = NDArray[Any]
 
 STEPPED = 64
 """Candidates in the memory of a device are a multiple of this: four vectors of the longest."""
-
-AT_ONCE = 16
-"""The most times `STEPPED` candidates of one launch; fewer on an array beyond the largest MP-1."""
 
 
 class On(NamedTuple):
@@ -37,11 +38,6 @@ def _share(x: Array, y: Array) -> Array:
     return below(x & np.uint64(2**32 - 1), x >> np.uint64(32), y)
 
 
-def _lowest(x: Array, _: Array) -> Array:
-    one, ones = x.dtype.type(1), x & ~(x + x.dtype.type(1))
-    return sum(((ones >> x.dtype.type(k)) & one for k in range(8 * x.itemsize)), np.zeros_like(x))
-
-
 COMPARISONS = {
     **{"lt": np.less, "le": np.less_equal, "eq": np.equal, "ne": np.not_equal},
     **{"gt": np.greater, "ge": np.greater_equal},
@@ -52,8 +48,7 @@ OPERATIONS: dict[str, Callable[[Array, Array], Array]] = {
     **COMPARISONS,
     "put": lambda x, y: np.broadcast_to(y, x.shape),
     **{"div": np.floor_divide, "mod": np.mod, "and": np.bitwise_and, "or": np.bitwise_or, "shr": np.right_shift},
-    "bit": lambda x, _: np.where(x < 64, np.left_shift(x.dtype.type(1), x), 0),
-    **{"lowest": _lowest, "share": _share},
+    "share": _share,
 }
 """The operations of the arithmetic unit, in the order of their numbers in kernels/maspar/alu.cl."""
 
@@ -78,10 +73,10 @@ def xnet_router(on: On, to: Array, source: Array, row: Array, col: Array) -> Non
     to[on.at] = source.reshape(-1, source.shape[-1])[address]
 
 
-def xnet_reduce(on: On, part: Array, a: Array, least: int) -> None:
-    """Set ``part`` to the sum or the minimum of a word over the layers of each PE."""
-    part[:] = np.iinfo(np.int32).max if least else 0
-    (np.minimum if least else np.add).at(part[0, :, 0], on.at[1], a[..., 0][on.at])
+def xnet_reduce(on: On, part: Array, a: Array) -> None:
+    """Set ``part`` to the sum of a word over the layers of each PE."""
+    part[:] = 0
+    np.add.at(part[0, :, 0], on.at[1], a[..., 0][on.at])
 
 
 def random(on: On, to: Array, place: Array, key: Key, purpose: int) -> None:
@@ -105,98 +100,84 @@ def lcpdf_keep(on: On, near: Array, number: int, arrived: Array, heat: Array) ->
 
 
 class Broadcast(NamedTuple):
-    """Candidates that the ACU broadcasts in a launch, and what the PEs compute of them.
+    """Candidates, which the ACU broadcasts one after another.
 
-    ``begin`` is the number of the first of ``size`` candidates; of all candidates ``own`` (C, n) float32 are the values
-    and ``sample`` (N, C, n or more) those of their neighbours. ``choice`` has the Gaussian (7). The layers share
-    ``distance``, float32; ``least``, the least one so far, and ``chosen``, a candidate, are plural.
+    ``sample`` (N, C, n or more) float32 are the values of their neighbours, those of lane k from ``lanes[k]`` to
+    ``lanes[k + 1]`` - 1; ``own`` (C, n) float32 the values of the candidates; ``share`` (C, n) float32 logarithms of
+    the legal shares of their kernels, 0 unless a density is drawn; ``noise`` (n,) int32 the numbers of their noise.
     """
 
-    begin: int
-    size: int
     sample: Any
+    lanes: Any
     own: Any
-    choice: Choice
-    distance: Any
-    least: Any
-    chosen: Any
-
-    @classmethod
-    def blocks(cls, mp1: Any, level: Any, keeps: bool, least: Any, chosen: Any) -> list[Broadcast]:
-        """Return the candidates in as few launches as an array allows; with ``keeps``, PEs keep all distances."""
-        n, most = level.own.shape[1], STEPPED * max(1, min(AT_ONCE, 2**18 // mp1.array.size))
-        held = n if keeps else min(n, most)
-        distance = mp1.expression("float32", held + -held % STEPPED, shared=True)
-        tables = (mp1.put(level.sample, STEPPED), mp1.put(level.own), level.choice)
-        return [cls(p, min(n - p, most), *tables, distance, least, chosen) for p in range(0, n, most)]
-
-    @property
-    def numbers(self) -> slice:
-        """The candidates."""
-        return slice(self.begin, self.begin + self.size)
-
-    @property
-    def kept(self) -> slice:
-        """Their places among the distances that a PE keeps."""
-        at = self.begin % self.distance.shape[-1]
-        return slice(at, at + self.size)
-
-    def weights(self, on: On) -> NDArray[np.uint64]:
-        """Return the weights (7) in the active PEs, (candidates, PEs)."""
-        d = np.concatenate([self.least[on.at].T, self.distance[0, on.at[1], self.kept].T])
-        return weights(d, self.choice.window.scale)[1:]
+    share: Any
+    noise: Any
 
 
-def lcpdf_distance(on: On, of: Broadcast, near: Array) -> None:
-    """Set the distances (12), and ``least`` and ``chosen`` to the nearest so far."""
-    neighbours, channels = of.sample.shape[:2]
-    z = near[on.at].reshape(-1, neighbours, channels + 1).astype(np.float64)
-    d = np.zeros((len(z), of.size), np.float32)
-    for k in range(neighbours):
-        for c in range(channels):
-            e = z[:, k, c, None] - z[:, k, channels, None] * of.sample[k, c, of.numbers].astype(np.float64)
-            d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
-    of.distance[0, on.at[1], of.kept] = d
-    old = of.least[on.at]
-    of.least[on.at] = np.minimum(d.min(1, keepdims=True), old)
-    nearest = of.begin + d.argmin(1, keepdims=True)
-    of.chosen[on.at] = np.where(d.min(1, keepdims=True) < old, nearest, of.chosen[on.at])
+def _distances(on: On, of: Broadcast, near: Array) -> Iterator[tuple[Any, NDArray[np.float32]]]:
+    """Yield some of the active PEs at a time, and the distances (12) there, (candidates, PEs), summed by lane."""
+    (_, channels, _), n = of.sample.shape, of.own.shape[1]
+    for pes in np.split(np.transpose(on.at), range(PAIRS // n or 1, on.at[0].size, PAIRS // n or 1)):
+        at, lanes = tuple(pes.T), []
+        z = near[at].reshape(len(pes), -1, channels + 1).astype(np.float64)
+        for begin, end in pairwise((of.lanes * channels).tolist()):
+            d = np.zeros((n, len(pes)), np.float32)
+            for k, c in (divmod(r, channels) for r in range(begin, end)):
+                e = z[:, k, c] - z[:, k, channels] * of.sample[k, c, :n, None].astype(np.float64)
+                d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
+            lanes.append(d)
+        while len(lanes) > 1:
+            half = len(lanes) // 2
+            lanes = [a + b for a, b in zip(lanes[:half], lanes[half:], strict=True)]
+        yield at, lanes[0]
 
 
-def lcpdf_weigh(on: On, of: Broadcast, total: Array, target: Array, choose: int) -> None:
-    """Add the weights (7) to ``total``; with ``choose``, the first to exceed the target is chosen, if none was."""
-    w = masses(of.weights(on), of.own[:, of.numbers, None], of.choice)
-    sums = np.cumsum(w, 0, dtype=np.uint64) + total[on.at].T
-    total[on.at] = sums[-1:].T
-    if choose:
-        beyond, old = sums > target[on.at].T, of.chosen[on.at]
-        found = np.where(beyond.any(0), of.begin + beyond.argmax(0), -1)
-        of.chosen[on.at] = np.where(old < 0, found[:, None], old)
+def lcpdf_choose(
+    on: On,
+    of: Broadcast,
+    near: Array,
+    least: Array,
+    chosen: Array,
+    spread: np.float32,
+    place: Array,
+    key: Key,
+) -> None:
+    """Choose the candidate of the ``least`` distance (12) or, of a draw, of that plus ``spread`` times its noise."""
+    for at, d in _distances(on, of, near):
+        if spread:
+            q = of.noise[:, None]
+            words = draw4(*key, place[..., 0][at], GUMBEL, q // 64 * LANES + q % LANES)
+            noise = minus_gumbel(np.choose(q // LANES % 4, words))
+            for share in of.share:
+                noise = noise - share[:, None]
+            d = fma32(spread, noise, d)
+        least[..., 0][at], chosen[..., 0][at] = d.min(0), d.argmin(0)
 
 
-def lcpdf_mode(on: On, of: Broadcast, mass: Array, most: Array, x: Array, c: int) -> None:
-    """Add the weights (7) given all channels of ``x`` but ``c`` to the ``mass`` of each grey level.
+def lcpdf_mode(
+    on: On, of: Broadcast, near: Array, least: Array, chosen: Array, window: Window, mass: Array, x: Array, c: int
+) -> None:
+    """Set ``mass`` to the sums of the weights (7), given all channels of ``x`` but ``c``, of each grey level.
 
-    With ``c`` -1, the candidate that gives most is chosen, and ``most`` is its weight.
+    With ``c`` -1, the candidate that gives most is chosen.
     """
-    grey = of.own[:, of.numbers].astype(np.int64)
-    w = weighed(x[on.at].T, of.weights(on), grey, of.choice.window, c)
-    if c < 0:
-        better = w.max(0) > most[on.at][:, 0]
-        of.chosen[on.at] = np.where(better, of.begin + w.argmax(0), of.chosen[on.at][:, 0])[:, None]
-        most[on.at] = np.maximum(w.max(0)[:, None], most[on.at])
-    else:
-        sums = mass[0, on.at[1]].T * np.uint64(of.begin > 0)
-        np.add.at(sums, grey[c], w)
-        mass[0, on.at[1]] = sums.T
+    grey = of.own.astype(np.int64)
+    for at, d in _distances(on, of, near):
+        w = weighed(x[at].T, weights(d, window.scale), grey, window, c)
+        if c < 0:
+            chosen[..., 0][at] = np.where(w.any(0), w.argmax(0), chosen[..., 0][at])
+        else:
+            sums = np.zeros((window.top + 1, w.shape[1]), np.uint64)
+            np.add.at(sums, grey[c], w)
+            mass[0, at[1]] = sums.T
 
 
-def lcpdf_highest(on: On, mass: Array, choice: Choice, x: Array) -> None:
+def lcpdf_highest(on: On, mass: Array, window: Window, x: Array) -> None:
     """Set a word to the grey level with the highest density, of several the lowest."""
-    x[..., 0][on.at] = spread(mass[0, on.at[1]].T, choice.window).argmax(0)
+    x[..., 0][on.at] = spread(mass[0, on.at[1]].T, window).argmax(0)
 
 
-def lcpdf_step(on: On, x: Array, choice: Choice, place: Array, key: Key, c: int) -> None:
+def lcpdf_step(on: On, x: Array, window: Window, place: Array, key: Key, c: int) -> None:
     """Add to the grey level of channel ``c`` a step drawn from the kernel of equation (7) around it."""
     grey = x[..., 0][on.at].astype(np.uint16)
-    x[..., 0][on.at] = stepped(grey, c, place[..., 0][on.at], choice.window, key)
+    x[..., 0][on.at] = stepped(grey, c, place[..., 0][on.at], window, key)
