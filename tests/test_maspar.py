@@ -12,12 +12,14 @@ from simdtex import random
 from simdtex.experiments.ising import Experiment
 from simdtex.experiments.ising import ising as experiment
 from simdtex.maspar.array import DIRECTIONS, MAPPINGS, ProcessorArray, path
+from simdtex.maspar.coloring import coloring
 from simdtex.maspar.costs import CLOCK, COSTS, FULL
 from simdtex.maspar.ising import ising
 from simdtex.maspar.machine import MP1
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Key
+from simdtex.ops.sites import coloring as engine
 
 TYPES = ("int32", "uint64", "float32")
 BINARY = ("add", "sub", "mul", "lt", "le", "gt", "ge", "eq", "ne")
@@ -64,6 +66,10 @@ def test_arithmetic_is_pythons(device, dtype):
     if dtype == "uint64":
         wide = np.full((5, 7), 2**63 + 5, np.uint64)
         z = filled(mp1, wide, dtype)
+        assert (seen(x.bit()) == 2**a).all() and not seen(z.bit()).any()
+        lowest = [[next(k for k in range(9) if not (2 * int(v) + 1) >> k & 1) for v in r] for r in a]
+        assert (seen((x * 2 + 1).lowest()) == lowest).all()
+        assert (seen(filled(mp1, ~np.zeros((5, 7), np.uint64), dtype).lowest()) == 64).all()
         assert (seen(z.share(10)) == 5).all() and (seen(z >> 60) == 8).all()
         assert (seen(z.as_type("int32")) == 5).all()
 
@@ -112,9 +118,9 @@ def test_communication_is_alike_on_every_machine(machine, mapping):
                     shifted = mp1.xnet(x, -1, 1, 2)
                     moved[1].set(shifted[1])
                     word = x[1].as_type("int32")
-                    found.append([seen(routed[1]), seen(moved[1]), mp1.sum(word), mp1.any(word < 0)])
+                    found.append([seen(routed[1]), seen(moved[1]), mp1.sum(word), mp1.min(word), mp1.any(word < 0)])
                 assert (found[-1][0] == np.where(np.arange(7)[:, None] % 2, 0, picture[1][row, col])).all()
-                assert found[-1][2:] == [picture[1][::2].sum(), False]
+                assert found[-1][2:] == [picture[1][::2].sum(), picture[1][::2].min(), False]
     finally:
         del machine.enqueue
     for one, other in zip(found[:2], found[2:], strict=True):
@@ -188,6 +194,29 @@ def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, orde
         wanted = around[radius + down :, radius + right :][: grid.rows, : grid.cols]
         assert (got == wanted * (not itself)).all()
     assert (grid.view(seen(walk.members)) == np.maximum((found > 0).sum(0), 1)).all()
+
+
+@given(
+    SHAPES,
+    st.tuples(st.integers(1, 17), st.integers(1, 17)),
+    st.sampled_from(MAPPINGS),
+    st.booleans(),
+    st.sampled_from([1, 2, 4, 8]),
+    st.sampled_from([1, 2, 4]),
+)
+def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, torus, order, spacing):
+    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
+    color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 5)
+    wanted = engine(grid, order, 5)
+    assert (grid.view(seen(color)) == wanted).all()
+    assert count == wanted.max() + 1
+
+
+def test_colours_beyond_a_word_and_on_a_device(machine):
+    for each, shape, order in ((machine, (13, 11), 8), (REFERENCE, (17, 19), 32)):
+        mp1, grid = MP1(each, ProcessorArray(8, 8), shape), Grid(*shape)
+        color, _ = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 7)
+        assert (seen(color) == engine(grid, order, 7)).all()
 
 
 @pytest.mark.parametrize("mapping", MAPPINGS)

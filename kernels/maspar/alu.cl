@@ -27,7 +27,9 @@ __kernel void maspar_alu(ARRAY, const int operation, PLURAL(TO, c), PLURAL(const
         case 13: z = (TO)(x & y); break;
         case 14: z = (TO)(x | y); break;
         case 15: z = (TO)(x >> y); break;
-        case 16: z = (TO)mul_hi(x, y); break; // x as a fraction of y
+        case 16: z = (TO)(x < 64 ? (T)1 << x : 0); break;
+        case 17: z = (TO)popcount(x & ~(x + 1)); break; // number of the lowest bit that is 0
+        case 18: z = (TO)mul_hi(x, y); break; // x as a fraction of y
 #endif
         }
         OF(c, k) = z;

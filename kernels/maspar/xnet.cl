@@ -27,12 +27,12 @@ __kernel void maspar_xnet_router(ARRAY, PLURAL(T, to), PLURAL(const T, from), PL
     }
 }
 
-// A reduction: the sum of a word over the layers of each PE; the ACU adds up those of all PEs.
-__kernel void maspar_xnet_reduce(ARRAY, PLURAL(long, part), PLURAL(const int, a))
+// A reduction: the sum or the minimum of a word over the layers of each PE; the ACU combines those of all PEs.
+__kernel void maspar_xnet_reduce(ARRAY, PLURAL(long, part), PLURAL(const int, a), const int least)
 {
-    long found = 0;
+    long found = least ? INT_MAX : 0;
     WHERE_ACTIVE(pe, k)
-        found += OF(a, k);
+        found = least ? min(found, (long)OF(a, k)) : found + OF(a, k);
     if (get_global_id(0) < PES(g))
         part[get_global_id(0)] = found;
 }

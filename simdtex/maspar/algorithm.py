@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.maspar import instructions
+from simdtex.maspar.coloring import coloring
 from simdtex.maspar.costs import EXP, NOISE, PHILOX
 from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import MP1, Mask
@@ -23,7 +24,6 @@ from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
 from simdtex.ops.arithmetic import log32
 from simdtex.ops.lcpdf import Choice, Key, legal, turns
-from simdtex.ops.sites import coloring
 from simdtex.ops.square import LANES
 
 
@@ -95,15 +95,13 @@ class Program:
         with mp1.frame():
             with mp1.section("colouring"):
                 walk = Walk(mp1, level.grid, self.problem.offsets)  # 3, 4, 6.1
-                color, colors = mp1.plural(), np.zeros(mp1.shape, np.int32)
-                level.grid.view(colors)[:] = coloring(level.grid, self.problem.order, seed)  # (14)
-                mp1.table(color, colors.ravel(), self.place)
+                color, colors = coloring(mp1, walk, self.problem.order, seed)
             relaxation = Pass(self, level, walk)
             for sweep in count(1):
                 with mp1.section("schedule"), mp1.where(walk.sites):
                     if not mp1.any(t > 0):  # 6.2
                         break
-                bits = random.draw4(seed, level.number, sweep, np.arange(colors.max() + 1), random.SCHEDULE)[0]
+                bits = random.draw4(seed, level.number, sweep, np.arange(colors), random.SCHEDULE)[0]
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
                     with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
                         mp1.count(reduction=1)  # which layers have a site to relax

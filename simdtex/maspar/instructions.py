@@ -38,6 +38,11 @@ def _share(x: Array, y: Array) -> Array:
     return below(x & np.uint64(2**32 - 1), x >> np.uint64(32), y)
 
 
+def _lowest(x: Array, _: Array) -> Array:
+    one, ones = x.dtype.type(1), x & ~(x + x.dtype.type(1))
+    return sum(((ones >> x.dtype.type(k)) & one for k in range(8 * x.itemsize)), np.zeros_like(x))
+
+
 COMPARISONS = {
     **{"lt": np.less, "le": np.less_equal, "eq": np.equal, "ne": np.not_equal},
     **{"gt": np.greater, "ge": np.greater_equal},
@@ -48,7 +53,8 @@ OPERATIONS: dict[str, Callable[[Array, Array], Array]] = {
     **COMPARISONS,
     "put": lambda x, y: np.broadcast_to(y, x.shape),
     **{"div": np.floor_divide, "mod": np.mod, "and": np.bitwise_and, "or": np.bitwise_or, "shr": np.right_shift},
-    "share": _share,
+    "bit": lambda x, _: np.where(x < 64, np.left_shift(x.dtype.type(1), x), 0),
+    **{"lowest": _lowest, "share": _share},
 }
 """The operations of the arithmetic unit, in the order of their numbers in kernels/maspar/alu.cl."""
 
@@ -73,10 +79,10 @@ def xnet_router(on: On, to: Array, source: Array, row: Array, col: Array) -> Non
     to[on.at] = source.reshape(-1, source.shape[-1])[address]
 
 
-def xnet_reduce(on: On, part: Array, a: Array) -> None:
-    """Set ``part`` to the sum of a word over the layers of each PE."""
-    part[:] = 0
-    np.add.at(part[0, :, 0], on.at[1], a[..., 0][on.at])
+def xnet_reduce(on: On, part: Array, a: Array, least: int) -> None:
+    """Set ``part`` to the sum or the minimum of a word over the layers of each PE."""
+    part[:] = np.iinfo(np.int32).max if least else 0
+    (np.minimum if least else np.add).at(part[0, :, 0], on.at[1], a[..., 0][on.at])
 
 
 def random(on: On, to: Array, place: Array, key: Key, purpose: int) -> None:

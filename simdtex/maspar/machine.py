@@ -105,6 +105,8 @@ class Plural:
     __eq__ = partialmethod(_with, "eq")  # type: ignore[assignment]
     __ne__ = partialmethod(_with, "ne")  # type: ignore[assignment]
     __hash__ = None  # type: ignore[assignment]
+    bit = partialmethod(_with, "bit")  # 2**x
+    lowest = partialmethod(_with, "lowest")  # the number of the lowest bit that is 0
     share = partialmethod(_with, "share")  # x / 2**64 of a number: of random bits, an integer below it
 
 
@@ -245,7 +247,7 @@ class MP1:
         kind, singular = a.data.dtype, not isinstance(b, Plural)
         real = kind.kind == "f"
         cost = {"float" if real and operation not in ("copy", "put") else "integer": kind.itemsize // 4}
-        self.count(**cost, broadcast=int(singular and operation != "copy"))
+        self.count(**cost, broadcast=int(singular and operation not in ("copy", "bit", "lowest")))
         number = kind.type(b if singular else 0)
         defines = {"T": TYPES[kind.name], "TO": TYPES[to.data.dtype.name]} | ({} if real else {"WHOLE": 1})
         code = [*OPERATIONS].index(operation)
@@ -273,14 +275,21 @@ class MP1:
 
     def sum(self, plural: Plural) -> int:
         """Return the sum of an int32 word over all active PEs, to the ACU."""
-        self.count(reduction=1)
-        part = self.expression("int64", shared=True)
-        self.execute(instructions.xnet_reduce, part, plural, T=TYPES[plural.data.dtype.name])
-        return int(np.asarray(self.machine.get(part.data) if self.machine else part.data).sum())
+        return int(self._reduced(plural, False).sum())
+
+    def min(self, plural: Plural) -> int:
+        """Return the least int32 word of all active PEs, to the ACU."""
+        return int(self._reduced(plural, True).min())
 
     def any(self, plural: Plural) -> bool:
         """Return whether an int32 word is not 0 in any active PE, to the ACU: the global OR."""
         return self.sum(plural != 0) > 0
+
+    def _reduced(self, plural: Plural, least: bool) -> NDArray[np.int64]:
+        self.count(reduction=1)
+        part = self.expression("int64", shared=True)
+        self.execute(instructions.xnet_reduce, part, plural, int(least), T=TYPES[plural.data.dtype.name])
+        return np.asarray(self.machine.get(part.data) if self.machine else part.data)
 
     def random(self, place: Plural, key: Key, purpose: int) -> Plural:
         """Return 64 random bits of each PE, keyed by ``key``, the place of its pixel and the purpose."""
