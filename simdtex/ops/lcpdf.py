@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from itertools import accumulate
 from math import exp, log, pow, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,7 @@ from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.sample import Candidates
 from simdtex.ops.arithmetic import exp32, fma32
-from simdtex.ops.neighbourhood import Field
-
-if TYPE_CHECKING:
-    from simdtex.ops.relax import Relaxation
+from simdtex.ops.neighbourhood import Confidences, Field
 
 NO_WEIGHT = np.float32(28)
 """The exponent from which a weight is 0: exp(-28) 2**40 < 1."""
@@ -67,6 +64,28 @@ class Choice(NamedTuple):
     def mode(self) -> bool:
         """Whether a site takes the mode of the density."""
         return self.density and not self.draws
+
+
+class Rule(Protocol):
+    """The part of `simdtex.ops.relax.Relaxation` that the density at a site depends on."""
+
+    @property
+    def choice(self) -> Choice:
+        """The choice, with the window of equation (7)."""
+
+    @property
+    def proposal(self) -> Any:
+        """The proposer, of all candidates."""
+
+    @property
+    def confidences(self) -> Confidences:
+        """The confidences of guides and data."""
+
+    def evaluate(self, sites: NDArray[np.int32], field: Field, turn: int) -> Any:
+        """Return the candidates of sites with their costs, in NumPy."""
+
+    def arguments(self, machine: Launcher, sites: Array, field: Field) -> tuple[dict[str, int], list[Any]]:
+        """Return the -D constants and the arguments of a kernel that evaluates candidates."""
 
 
 class Key(NamedTuple):
@@ -215,9 +234,7 @@ def spread(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
 
 
 @Operation
-def density(
-    machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None
-) -> Array:
+def density(machine: Launcher | None, sites: Array, field: Field, relaxation: Rule, own: Array | None = None) -> Array:
     """Return the density of one channel at each grey level, up to a factor, (S, greys) float32.
 
     ``relaxation`` proposes all candidates, and its random numbers are not read. ``own`` (1, plane) float32 is the grey
@@ -232,7 +249,7 @@ def density(
 
 
 def density_and_mode(
-    machine: Launcher, sites: Array, field: Field, relaxation: Relaxation, own: Array | None = None
+    machine: Launcher, sites: Array, field: Field, relaxation: Rule, own: Array | None = None
 ) -> tuple[Array, Relaxed]:
     """Return the density of the last channel, (S, greys), and the mode that each site takes, on a device."""
     made, win = len(field.values) - relaxation.confidences.guides, relaxation.choice.window
@@ -245,7 +262,7 @@ def density_and_mode(
 
 
 @Operation
-def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: Relaxation, greys: int) -> Array:
+def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: Rule, greys: int) -> Array:
     """Return the number of candidates of each grey level that match a site exactly, (S, greys) uint32: (4) and (5)."""
     if machine is None:
         cost, found = relaxation.evaluate(sites, field, 0).cost, np.zeros((sites.size, greys), np.uint32)
@@ -257,7 +274,7 @@ def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: 
     return counts
 
 
-def _greys(relaxation: Relaxation, own: NDArray[np.float32] | None) -> NDArray[np.int64]:
+def _greys(relaxation: Rule, own: NDArray[np.float32] | None) -> NDArray[np.int64]:
     """Return the grey level of each candidate in the first channel."""
     square = relaxation.proposal.square
     greys: NDArray[np.int64] = (square.levels if own is None else own)[0][square.at].astype(np.int64)
@@ -269,7 +286,7 @@ def _table(
     kernel: str,
     sites: Array,
     field: Field,
-    relaxation: Relaxation,
+    relaxation: Rule,
     own: Array | None,
     greys: int,
     *results: Array,
