@@ -16,9 +16,9 @@ from simdtex.schedules import SCHEDULES
 DTYPES = (np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64)
 
 
-def run(sample, shape, **options):
+def run(sample, shape, rng=3, **options):
     """Image and output on the reference."""
-    return simdtex.synthesize(sample, shape, rng=3, device=REFERENCE, full_output=True, **options)
+    return simdtex.synthesize(sample, shape, rng=rng, device=REFERENCE, full_output=True, **options)
 
 
 def anything(shape, dtype, seed):
@@ -221,9 +221,10 @@ def test_a_source_names_its_sample(search):
 def test_shares_are_about_kept(search):
     samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
     found = {}
-    for first in (1.0, 2.5, 4.0):
-        _, output = run(samples, (32, 32), search=search, order=4, shares=(first, 5.0 - first))
-        found[first] = (output.source[..., 2] == 0).mean()
+    for first in (1.0, 2.5, 4.0):  # of one run they vary by 0.15
+        options = {"search": search, "order": 4, "shares": (first, 5.0 - first)}
+        runs = [run(samples, (32, 32), rng, **options)[1] for rng in range(3)]
+        found[first] = np.mean([output.source[..., 2] == 0 for output in runs])
     assert abs(found[1.0] - 0.2) < 0.15
     assert abs(found[2.5] - 0.5) < 0.15
     assert abs(found[4.0] - 0.8) < 0.15
@@ -281,8 +282,8 @@ def test_proportions_are_about_kept():
     cells = (texture((24, 24), seed=4) > 150).astype(np.uint8)
     found = {}
     for share in (0.25, 0.75):
-        image, _ = run(cells, (32, 32), categorical=True, proportions=(1 - share, share), order=4)
-        found[share] = image.mean()
+        options = {"categorical": True, "proportions": (1 - share, share), "order": 4}
+        found[share] = np.mean([run(cells, (32, 32), rng, **options)[0] for rng in range(3)])
     assert abs(found[0.25] - 0.25) < 0.12
     assert abs(found[0.75] - 0.75) < 0.12
 
