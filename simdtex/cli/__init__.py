@@ -65,6 +65,7 @@ COMMAND_WORDS = {
     "simulate": ("simulation", "realisations", "realizations", "mps"),
     "estimate": ("krige", "kriging", "probabilities"),
     "classify": ("segment", "label"),
+    "schedules": ("ising",),
     "live": ("gui", "ui", "web", "serve", "app"),
     "devices": ("device", "gpus", "info", "list"),
     "bench": ("benchmark", "time", "speed"),
