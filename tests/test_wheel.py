@@ -22,7 +22,7 @@ from simdtex.machine.devices import _copy_icd_files, devices, intel_library
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
 ROOT = Path(__file__).resolve().parent.parent
-DATA = {".html", ".css", ".js", ".svg", ".png", ".ico", ".json"}
+DATA = {".html", ".css", ".js", ".svg", ".png", ".ico", ".json", ".pyi"}
 """Kinds of files that the package may read beside its modules and kernels."""
 QUIET = ("-q", "--disable-pip-version-check")
 
