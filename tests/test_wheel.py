@@ -42,8 +42,8 @@ def environment(folder):
 
 
 def extra():
-    """Return the extra of the CPU runtime if the tests use the one of the package index."""
-    return "[cpu]" if intel_library() else ""
+    """Return the extras: of reports, and of the CPU runtime if the tests use the one of the package index."""
+    return "[cpu,reports]" if intel_library() else "[reports]"
 
 
 @pytest.fixture(scope="module")
