@@ -10,6 +10,7 @@
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/costs.h"
 #include "common/parzen.h"
+#include "common/propose.h"
 
 #ifndef N
 #define N 64 // most neighbours
@@ -44,10 +45,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
     if (s >= S)                                                                                                        \
         return;                                                                                                        \
     const int site = sites[s], i = ROW_OF(g.lattice, site), j = COL_OF(g.lattice, site);                               \
-    int row[ROWS], col[SIDE];                                                                                          \
-    rows_around(g.lattice, i, row);                                                                                    \
-    lines_around(j, g.lattice.cols, g.lattice.around_cols, g.lattice.spacing, col);                                    \
-    SQUARE;                                                                                                            \
+    AROUND(g.lattice, i, j);                                                                                           \
     gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu)
 
 // The density over grey levels and its mode, of several levels the lowest. From the pixel of the nearest candidate on,
@@ -66,14 +64,11 @@ __kernel void lcpdf_density(FIELD, __global const float *restrict window, __glob
 
     // The candidates that continue a neighbour's source, each once, and the nearest of all.
     int next[N], coherent = 0, nearest = 0;
+    ulong seen = 0;
     for (int k = 0; k < g.neighbours && g.discount < 1.0f; ++k) {
-        const int r = in_square(g.lattice, site, i, j, row, col, ROW(offsets[k].x), offsets[k].y + RADIUS);
+        const int r = NEIGHBOUR(g.lattice, k);
         const int p = r < 0 || temperature[r] >= UNTOUCHED ? -1 : continuing(index_of, source[r], reach[k], g.pixels);
-        int n = 0;
-        while (n < coherent && next[n] != p)
-            ++n;
-        next[n] = p;
-        coherent += p >= 0 && n == coherent;
+        coherent = proposed(p, next, coherent, &seen);
     }
     float smallest = INFINITY;
     for (int p = 0; p < g.candidates; ++p) {

@@ -64,7 +64,7 @@ inline float noise_of(const Level g, const uint turn, const ulong place, const i
     const int row = p / g.cols, col = p % g.cols, run = row * g.runs + col % g.runs, n = col / g.runs;
     float found = minus_gumbel_of(g.seed, g.level, turn, place, run * WIDTH(g) + n / LANES, n % LANES);
     for (int c = 0; c < C && g.radius >= 0; ++c)
-        found -= log32((float)legal_mass(noise, g.radius, (int)y[c * g.plane], g.top)) - 22.1807098f;
+        found -= log32((float)legal_mass(noise, g.radius, (int)y[c * g.plane], g.top)) - LOG_ONE;
     return found;
 }
 
@@ -128,12 +128,8 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     const ulong place = place_of(h, i, j);
 
     // 6.2.2.1: the neighbourhood.
-    int row[ROWS], col[SIDE];
-    rows_around(h, i, row);
-    lines_around(j, h.cols, h.around_cols, h.spacing, col);
-    SQUARE;
+    AROUND(h, i, j);
     const int2 heat = gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu);
-#define NEIGHBOUR(k) in_square(h, site, i, j, row, col, ROW(offsets[k].x), offsets[k].y + RADIUS)
 
     const float most = MOST_GUMBEL * g.spread;
     float best = INFINITY;
@@ -143,7 +139,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
 #define REPEATED(p) 0.0f
     int list[SLOTS], m = 0;
     for (int k = 0; k < min(SUGGESTING, g.neighbours); ++k) {
-        const int r = NEIGHBOUR(k);
+        const int r = NEIGHBOUR(h, k);
         if (r >= 0 && temperature[r] < UNTOUCHED)
             m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
     }
@@ -162,7 +158,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     // Candidates that continue or are a neighbour's source.
     int next[N + 1], same[N];
     for (int k = 0; k < g.neighbours; ++k) {
-        const int r = NEIGHBOUR(k), from = r >= 0 && temperature[r] < UNTOUCHED ? source[r] : -1;
+        const int r = NEIGHBOUR(h, k), from = r >= 0 && temperature[r] < UNTOUCHED ? source[r] : -1;
         next[k] = continuing(index_of, from, reach[k], g.pixels);
         same[k] = number_of(index_of, from);
     }

@@ -1,7 +1,9 @@
 """Fixtures that run a test on usable OpenCL devices, and say in the end which ones did."""
 
 import functools
+import importlib
 import os
+from pathlib import Path
 
 import hypothesis
 import kept
@@ -85,7 +87,7 @@ def any_device() -> DeviceInfo:
 @pytest.fixture(scope="session")
 def results(request) -> kept.Kept:
     """Results of whole runs, each computed once; pytest's cache keeps them until the source changes."""
-    cache = getattr(request.config, "cache", None)  # none where the plugin is off, as for mutants of one source
+    cache = getattr(request.config, "cache", None)  # None with -p no:cacheprovider
     return kept.Kept(cache and cache.mkdir("runs"), SOURCE, kept.key)
 
 
@@ -140,3 +142,10 @@ def pytest_terminal_summary(terminalreporter, config):
             f"No OpenCL device ran a test{f', and {REQUIRE} is set' if failed else ''}.",
             red=bool(failed),
         )
+
+
+@pytest.fixture
+def script(monkeypatch):
+    """Return the function that imports a module of ``benchmarks/`` by its name."""
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parent.parent / "benchmarks"))
+    return importlib.import_module

@@ -116,23 +116,16 @@ def test_bad_input_is_one_sentence_before_anything_is_measured(monkeypatch, tmp_
 
 # -- The figures of benchmarks/classify.py, on labels whose fault is known, and its tables at a tiny size.
 NAMES = ("brick", "grass", "gravel")
-BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 
 
 @pytest.fixture
-def classify(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import classify
-
-    return classify
+def classify(script):
+    return script("classify")
 
 
 @pytest.fixture
-def mosaics(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import mosaics
-
-    return mosaics
+def mosaics(script):
+    return script("mosaics")
 
 
 @pytest.fixture
@@ -224,11 +217,8 @@ def test_missing_baselines_are_told(mosaics, monkeypatch):
 
 # -- The figures of benchmarks/fill.py, on fillings whose fault is known.
 @pytest.fixture
-def fill(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import fill
-
-    return fill
+def fill(script):
+    return script("fill")
 
 
 @pytest.fixture
@@ -295,11 +285,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture
-def front(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
-    import front
-
-    return front
+def front(script):
+    return script("front")
 
 
 def test_a_flat_height_map_has_flat_normals(front):

@@ -1,7 +1,6 @@
 """What an ensemble of realisations is judged by, on cases whose answers are known."""
 
 import hashlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -200,11 +199,8 @@ def test_summary_of_continuous_values():
 
 
 @pytest.fixture
-def make_channels(monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parent.parent / "benchmarks"))
-    from channels import channels
-
-    return channels
+def make_channels(script):
+    return script("channels").channels
 
 
 def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_channels):

@@ -510,7 +510,7 @@ def test_the_command_line_says_it_in_one_sentence(tmp_path, monkeypatch):
 
 
 def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
-    """Of 8 bits they are refused by Pillow; of 16 bits nobody looks at them but for the orientation."""
+    """Pillow refuses those of 8 bits; of those of 16 bits only the orientation is read."""
     bomb = zlib.compress(bytes(2**25), 9)
     texts = {"zTXt": b"Comment\0\0" + bomb, "iTXt": b"Comment\0\1\0\0\0" + bomb, "iCCP": b"profile\0\0" + bomb}
     for kind, data in texts.items():

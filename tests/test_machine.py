@@ -1,6 +1,7 @@
 """Machines: memory and its checks, caches, threads, forked processes, the pace of launches, and profiles."""
 
 import dataclasses
+import functools
 import importlib.util
 import os
 import shutil
@@ -173,6 +174,7 @@ def test_a_limit_of_counting_says_what_is_counted(shape, values):
         simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
 
 
+@functools.cache
 def benchmark():
     spec = importlib.util.spec_from_file_location("memory_benchmark", ROOT / "benchmarks" / "memory.py")
     module = importlib.util.module_from_spec(spec)

@@ -172,7 +172,7 @@ def test_one_path_of_unit_moves_leads_through_all_offsets(order, moves):
     assert len(steps) == moves
 
 
-@given(
+lattices = given(
     SHAPES,
     st.tuples(st.integers(1, 17), st.integers(1, 17)),
     st.sampled_from(MAPPINGS),
@@ -180,6 +180,10 @@ def test_one_path_of_unit_moves_leads_through_all_offsets(order, moves):
     st.sampled_from([1, 2, 4, 8]),
     st.sampled_from([1, 2, 4]),
 )
+"""Arrays, shapes of pictures, mappings, boundaries, orders and spacings."""
+
+
+@lattices
 def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
     offsets, radius, number = neighbourhood_offsets(order), 4, 1 + np.arange(shape[0] * shape[1]).reshape(shape)
@@ -196,14 +200,7 @@ def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, orde
     assert (grid.view(seen(walk.members)) == np.maximum((found > 0).sum(0), 1)).all()
 
 
-@given(
-    SHAPES,
-    st.tuples(st.integers(1, 17), st.integers(1, 17)),
-    st.sampled_from(MAPPINGS),
-    st.booleans(),
-    st.sampled_from([1, 2, 4, 8]),
-    st.sampled_from([1, 2, 4]),
-)
+@lattices
 def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
     color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 5)

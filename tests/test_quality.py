@@ -283,19 +283,13 @@ QUICK = "order=2"
 
 
 @pytest.fixture
-def study(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import study
-
-    return study
+def study(script):
+    return script("study")
 
 
 @pytest.fixture
-def figures_study(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import figures
-
-    return figures
+def figures_study(script):
+    return script("figures")
 
 
 @pytest.fixture

@@ -12,9 +12,7 @@
 #define C 1 // channels of a pixel
 #endif
 #define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
-
-// Whether a distance, or any of a vector of them, has a weight.
-#define WEIGHS(d, smallest, scale) (((d) - (smallest)) * (scale) < NO_WEIGHT)
+#define LOG_ONE 22.1807098f // log 2^32: all steps of a kernel are legal
 
 // W_p: Gaussian of equation (7) relative to the best candidate.
 inline ulong weight(const float d, const float smallest, const float scale)
@@ -39,17 +37,6 @@ inline uint legal_low(__global const uint *noise, const int radius, const int y)
 inline uint legal_mass(__global const uint *noise, const int radius, const int y, const int top)
 {
     return noise[min(2 * radius, radius + top - y)] - legal_low(noise, radius, y);
-}
-
-// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
-// levels. Dozens of saturated channels do not make it 0.
-inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
-                     const int plane, const int from, __global const uint *noise, const int radius, const int top)
-{
-    ulong w = weight(d, smallest, scale);
-    for (int c = 0; c < C && w && radius >= 0; ++c)
-        w = max(mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32), 1ul);
-    return w;
 }
 
 // The step that 32 random bits choose from the kernel around grey level y, cut off at the legal levels: the first whose

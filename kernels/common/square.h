@@ -119,6 +119,14 @@ inline int16 spread_int(__global const int *p, const int spacing)
 #endif
 #endif
 
+// The rows and columns of the square around site (i, j), and the lanes of u and x u; and neighbour k of `offsets` there.
+#define AROUND(g, i, j)                                                                                                \
+    int row[ROWS], col[SIDE];                                                                                          \
+    rows_around(g, i, row);                                                                                            \
+    lines_around(j, g.cols, g.around_cols, g.spacing, col);                                                            \
+    SQUARE
+#define NEIGHBOUR(g, k) in_square(g, site, i, j, row, col, ROW(offsets[k].x), offsets[k].y + RADIUS)
+
 // The neighbourhood of a site: u = 1 - t_r and x_r u in the lane of each neighbour r, 0 in all others, and of guides in
 // that of the site too. Returns the sum of the temperatures of the neighbours on the lattice, and their number.
 //

@@ -214,7 +214,7 @@ def continued(
 
 
 def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
-    """Return what is to be added on each side for an output of this size."""
+    """Return the number of pixels to add on each side for an output of a size."""
     from simdtex.io.image import parse_sides
 
     if any(sides.values()):
@@ -348,7 +348,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
     group=OUTPUTS,
     type=WRITE,
     metavar="PNG",
-    help="Write a picture of the block: a cube, a sphere and three slices.",
+    help="Write a picture of the block and of its three middle slices.",
 )
 @stages_option("the middle slice of every iteration")
 @PROFILE

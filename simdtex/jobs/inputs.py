@@ -44,7 +44,7 @@ output : simdtex.run.Output
     Only with ``full_output=True``.
 """
 
-SHARED = SimpleNamespace(channel_axis=None, rng=None, full_output=False, checkpoint=None, mask=None, known_source=None)
+ABSENT = SimpleNamespace(channel_axis=None, rng=None, full_output=False, checkpoint=None, mask=None, known_source=None)
 """The values of inputs that a job does not have."""
 
 
@@ -82,7 +82,7 @@ def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any
         def prepare(*args: Any, **given: Any) -> tuple[Any, Work]:
             bound = written.bind(*args, **given)
             bound.apply_defaults()
-            call = SimpleNamespace(**{**vars(SHARED), **bound.arguments})
+            call = SimpleNamespace(**{**vars(ABSENT), **bound.arguments})
             for name, one in own.items():
                 value = getattr(call, name)
                 one.check(name, value)
@@ -147,14 +147,16 @@ class Inputs(NamedTuple):
         """Whether there is one sample and no other array."""
         return self.pictures.clean and self.given is None and self.guide is None
 
-    def identity(self) -> dict[str, Any]:
-        """Return all arrays by the names of the arguments, as the identity of a run."""
+    def identity(self, name: str) -> Any:
+        """Return the arrays of an argument, as a part of the identity of a run."""
+        if name in ("sample", "training"):
+            return self.pictures.pixels, self.pictures.known
+        if name in ("mask", "guide"):
+            return self.pictures.usable if name == "mask" else self.guide
         given = self.given if self.given and self.given.told.any() else None
-        values = given and (np.where(given.told, given.values, 0), given.told)
-        return {
-            **{"sample": (self.pictures.pixels, self.pictures.known), "mask": self.pictures.usable, "known": values},
-            **{"known_source": given and given.place, "guide": self.guide},
-        }
+        if name == "known_source":
+            return given and given.place
+        return given and (np.where(given.told, given.values, 0), given.told)
 
 
 def check_inputs(
@@ -398,16 +400,17 @@ class Maps(NamedTuple):
         shapes = (np.shape(one)[-axes:] for one in self if one is not None and not isinstance(one, HardData))
         return next((shape for shape in shapes if len(shape) == axes), None)
 
+    def digest(self, name: str) -> str | None:
+        """Return the SHA-256 digest of a map; None if it is not given."""
+        one = getattr(self, name)
+        if one is None:
+            return None
+        table = isinstance(one, HardData)
+        return digest(*((one.points, one.values) if table else (np.ma.getdata(one), np.ma.getmaskarray(one))))
+
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 digest of each map, by name."""
-        arrays = {
-            name: (one.points, one.values)
-            if isinstance(one, HardData)
-            else (np.ma.getdata(one), np.ma.getmaskarray(one))
-            for name, one in self._asdict().items()
-            if one is not None
-        }
-        return {name: digest(*those) for name, those in arrays.items()}
+        return {name: found for name in self._fields if (found := self.digest(name))}
 
     def of_images(self, pictures: Pictures, shape: tuple[int, int]) -> Turned | None:
         """Return the copies of training images that the maps require; None without such maps."""
@@ -560,7 +563,7 @@ CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
 
 IDENTITIES: dict[bool | str, Callable[[Any, str], Any]] = {
     True: getattr,
-    "arrays": lambda call, name: call.inputs.identity()["sample" if name == "training" else name],
-    "maps": lambda call, name: call.maps.digests().get(name),
+    "arrays": lambda call, name: call.inputs.identity(name),
+    "maps": lambda call, name: call.maps.digest(name),
 }
 """What identifies a run, of inputs that the plan has placed in ``call.inputs`` and ``call.maps``."""

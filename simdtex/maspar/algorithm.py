@@ -22,8 +22,7 @@ from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import MP1, Mask
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid
-from simdtex.ops.arithmetic import log32
-from simdtex.ops.lcpdf import Choice, Key, legal, turns
+from simdtex.ops.lcpdf import Choice, Key, log_legal, turns
 from simdtex.ops.square import LANES
 
 
@@ -121,9 +120,7 @@ class Pass:
         mp1.reserve(4 * (channels + 1) * mp1.layers)  # what walks through the neighbourhoods
         self.mass = mp1.plural("uint64", (choice.window.top + 1) * choice.mode, shared=True)
         self.shares = channels * (choice.draws and choice.density)  # legal shares of kernels
-        share = np.zeros_like(level.own)
-        if self.shares:  # logarithms, as in simdtex.ops.relax
-            share = log32(legal(level.own, choice.window)[1].astype(np.float32)) - np.float32(22.1807098)
+        share = log_legal(level.own, choice.window) if self.shares else np.zeros_like(level.own)
         lanes = np.searchsorted(lane_of(program.problem.offsets), np.arange(LANES + 1)).astype(np.int32)
         self.sample = Broadcast(mp1.put(level.sample, STEPPED), lanes, *map(mp1.put, (level.own, share, level.noise)))
 

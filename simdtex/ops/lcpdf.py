@@ -16,11 +16,15 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.sample import Candidates
-from simdtex.ops.arithmetic import exp32, fma32
+from simdtex.ops.arithmetic import exp32, fma32, log32
 from simdtex.ops.neighbourhood import Confidences, Field
 
 NO_WEIGHT = np.float32(28)
 """The exponent from which a weight is 0: exp(-28) 2**40 < 1."""
+
+
+LOG_ONE = np.float32(22.1807098)
+"""log 2**32: the logarithm of the mass if all steps of a kernel are legal."""
 
 
 class Relaxed(NamedTuple):
@@ -158,6 +162,11 @@ def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.
     cumulative = np.concatenate([[0], win.noise]).astype(np.uint32)
     low = cumulative[np.maximum(0, win.radius - y)]
     return low, cumulative[np.minimum(2 * win.radius, win.radius + win.top - y) + 1] - low
+
+
+def log_legal(y: NDArray[Any], win: Window) -> NDArray[np.float32]:
+    """Return the logarithm of the legal share of the kernel around grey level y."""
+    return log32(legal(y, win)[1].astype(np.float32)) - LOG_ONE
 
 
 def taken(

@@ -20,7 +20,7 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
-from simdtex.ops.arithmetic import log32, minus_gumbel
+from simdtex.ops.arithmetic import minus_gumbel
 from simdtex.ops.commit import commit
 from simdtex.ops.costs import Costs, continuing
 from simdtex.ops.lcpdf import Choice, Key, Relaxed
@@ -48,6 +48,11 @@ class AllCandidates(NamedTuple):
     def slots(self) -> int:
         """Number of candidates that a site evaluates."""
         return self.candidates.size
+
+    @property
+    def chance(self) -> int:
+        """Number of random candidates: none."""
+        return 0
 
     def propose(self, around: Near, relaxation: Relaxation, turn: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the numbers (slots, 1) of the candidates, and a mask (slots, S) of those that are coherent."""
@@ -181,9 +186,7 @@ class Relaxation(NamedTuple):
         words = np.stack(random.draw4(self.seed, self.level, turn, places, random.GUMBEL, draws[:, None]))
         found = minus_gumbel(words[unit % 4, at, np.arange(places.size)])
         for plane in candidates.pixels if self.choice.density else ():
-            pixels = plane[candidates.positions[np.maximum(numbers, 0)]]
-            share = log32(lcpdf.legal(pixels, self.choice.window)[1].astype(np.float32)) - np.float32(22.1807098)
-            found = found - share
+            found = found - lcpdf.log_legal(plane[candidates.positions[np.maximum(numbers, 0)]], self.choice.window)
         return found
 
     def arguments(self, machine: Launcher, sites: Array, field: Field) -> tuple[dict[str, int], list[Any]]:
@@ -197,7 +200,7 @@ class Relaxation(NamedTuple):
             **{"cols": square.cols, "runs": square.runs, "discount": costs.discount, "novelty": costs.novelty},
             **{"scale": window.scale, "spread": choice.spread, "top": window.top},
             **{"radius": window.radius if choice.density else -1, "centre": confidences.centre},
-            **{"hard": confidences.hard, "chance": getattr(self.proposal, "chance", 0)},
+            **{"hard": confidences.hard, "chance": self.proposal.chance},
         }
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}
