@@ -14,10 +14,10 @@ __kernel void active_survey(const Lattice g, __global const ushort *restrict tem
     const int n = get_global_id(0);
     if (n >= stretches)
         return;
-    const int end = min(g.rows * g.cols, (n + 1) * chunk);
+    const int end = min(g.layers * g.rows * g.cols, (n + 1) * chunk);
     int count = 0, sum = 0;
     for (int at = n * chunk; at < end; ++at) {
-        const int t = temperature[SITE(g, at / g.cols, at % g.cols)];
+        const int t = temperature[at];
         count += t > 0 ? 1 : 0;
         sum += t;
     }
@@ -27,7 +27,7 @@ __kernel void active_survey(const Lattice g, __global const ushort *restrict tem
 
 // How many sites of each stretch of a list are active.
 //
-// sites  (S,)                 pixel indices
+// sites  (S,)                 their numbers
 // starts (stretches + 1,)     where each stretch begins in them
 // counts (stretches,)         out
 // One work-item per stretch.

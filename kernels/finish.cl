@@ -26,7 +26,7 @@ inline int within(const int row, const int col, const int pitch, const int margi
 }
 
 __kernel void finish(const Lattice g, const int first, const int count, __global const int *restrict source,
-                     __global const int2 *restrict offsets, __global const int *restrict weights, const int N,
+                     __global const int *restrict offsets, __global const int *restrict weights, const int N,
                      __global const float *restrict sample, const int plane, const int pitch, const int margin,
                      const int rows, const int cols, __global const uchar *restrict inside,
                      __global const uchar *restrict given, __global const ushort *restrict values, const int area,
@@ -36,14 +36,14 @@ __kernel void finish(const Lattice g, const int first, const int count, __global
     const int n = get_global_id(0);
     if (n >= count)
         return;
-    const int i = (first + n) / g.cols, j = (first + n) % g.cols, own = source[SITE(g, i, j)];
+    const int i = (first + n) / g.cols, j = (first + n) % g.cols, own = source[first + n];
     long sum[C];
     int total = 0;
     for (int c = 0; c < C; ++c)
         sum[c] = 0;
     for (int k = 0; k < N && own >= 0; ++k) {
-        const int a = offsets[k].x, b = offsets[k].y;
-        const int r = a == 0 && b == 0 ? SITE(g, i, j) : neighbour(g, i, j, a, b);
+        const int a = DOWN(offsets + AXES * k), b = RIGHT(offsets + AXES * k);
+        const int r = a == 0 && b == 0 ? first + n : neighbour(g, i, j, offsets + AXES * k);
         const int p = r < 0 || source[r] < 0 ? -1 : WITHIN(source[r] / pitch - a, source[r] % pitch - b);
         const int q = r < 0 || !given[r] ? -1 : WITHIN(own / pitch + a, own % pitch + b);
         if (p < 0 && q < 0)

@@ -11,13 +11,13 @@
 #include "common/philox.h"
 
 // What a site becomes.
-inline uchar heat_bath(__global const uchar *spins, const int site, __global const int2 *restrict offsets, const int N,
+inline uchar heat_bath(__global const uchar *spins, const int site, __global const int *restrict offsets, const int N,
                        const Lattice g, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
 {
-    const int i = ROW_OF(g, site), j = COL_OF(g, site);
+    const int i = site / g.cols, j = site % g.cols;
     int members = 0, up = 0;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
+        const int r = neighbour(g, i, j, offsets + AXES * k);
         if (r < 0)
             continue;
         ++members;
@@ -29,7 +29,7 @@ inline uchar heat_bath(__global const uchar *spins, const int site, __global con
 // One step: what its sites become, old values read.
 // sites (S,); relaxed (chains, S)  out. One work-item per (site, seed, temperature).
 __kernel void ising_relax(__global const int *restrict sites, const int S, __global const uchar *restrict spins,
-                          const int stride, const int seeds, __global const int2 *restrict offsets, const int N, const Lattice g,
+                          const int stride, const int seeds, __global const int *restrict offsets, const int N, const Lattice g,
                           __global const uint *restrict chances, const ulong seed, const uint turn,
                           __global uchar *restrict relaxed)
 {
@@ -56,7 +56,7 @@ __kernel void ising_commit(__global const int *restrict sites, const int S, __gl
 // A run of steps of one site each, one after another; each sees what the one before it has made.
 // queue (Q, 2) the site and the turn of every step. One work-item per (seed, temperature).
 __kernel void ising_sequence(__global const int2 *restrict queue, const int Q, __global uchar *spins, const int stride,
-                             const int seeds, __global const int2 *restrict offsets, const int N, const Lattice g,
+                             const int seeds, __global const int *restrict offsets, const int N, const Lattice g,
                              __global const uint *restrict chances, const ulong seed)
 {
     const int c = get_global_id(0), t = get_global_id(1);

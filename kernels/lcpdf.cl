@@ -36,7 +36,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
 #define FIELD                                                                                                          \
     __global const int *restrict sites, const int first, const int S, __global const ushort *values,                   \
         __global const int *source, __global const ushort *temperature, const Level g,                                 \
-        __global const int2 *restrict offsets, __global const int *restrict reach,                                     \
+        __global const int *restrict offsets, __global const int *restrict reach,                                     \
         __global const int *restrict index_of, __global const int *restrict positions,                                 \
         __global const float *restrict disc, __global const int2 *restrict looks, COSTS,                               \
         __global const float *restrict own, const int greys
@@ -44,7 +44,7 @@ inline ulong weight_at(ulong w, __global const float *y, const int plane, const 
     const int s = first + (int)get_global_id(0);                                                                       \
     if (s >= S)                                                                                                        \
         return;                                                                                                        \
-    const int site = sites[s], i = ROW_OF(g.lattice, site), j = COL_OF(g.lattice, site);                               \
+    const int site = sites[s], i = site / g.lattice.cols, j = site % g.lattice.cols;                                   \
     AROUND(g.lattice, i, j);                                                                                           \
     gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu)
 

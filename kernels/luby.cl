@@ -23,12 +23,12 @@ __kernel void luby_priority(const int sites, const ulong seed, const uint level,
 
 // One round; equal priorities are decided by the higher index. state (rows, cols) in; next (rows, cols) out.
 // One work-item per site.
-__kernel void luby_round(const Lattice g, __global const int2 *restrict offsets, const int N,
+__kernel void luby_round(const Lattice g, __global const int *restrict offsets, const int N,
                          __global const uint *restrict priority, __global const uchar *restrict state,
                          __global uchar *restrict next)
 {
     const int site = get_global_id(0);
-    if (site >= g.rows * g.cols)
+    if (site >= g.layers * g.rows * g.cols)
         return;
     next[site] = state[site];
     if (state[site] != UNDECIDED)
@@ -37,7 +37,7 @@ __kernel void luby_round(const Lattice g, __global const int2 *restrict offsets,
     const uint own = priority[site];
     bool highest = true;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
+        const int r = neighbour(g, i, j, offsets + AXES * k);
         if (r < 0 || state[r] == OUT)
             continue;
         if (state[r] == IN) {

@@ -92,19 +92,19 @@ inline float repeated(const int p, const __private int *next, const __private in
         }                                                                                                              \
     }
 
-// sites    (S,)         pixel index of each site
+// sites    (S,)         number of each site
 // values (C, area), source (area,), temperature (area,)   the field
-// offsets  (N, 2)       of the neighbours, canonical order
+// offsets  (N, AXES)     of the neighbours, canonical order
 // reach    (N,)         pixel offset of each in the sample
 // index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
 // positions (count,)    pixel index of each candidate
 // disc     (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
 // looks    (N, 2)       lane of each neighbour in the square and its offset in `levels`, close ones far apart
 // noise                 cumulative kernel of equation (7) over grey levels: common/parzen.h
-// work                  in and out: candidates that the site at each pixel has evaluated; EXACT: multiply-adds of site s
+// work                  in and out: candidates that each site has evaluated; EXACT: multiply-adds of site s
 __kernel void relax(__global const int *restrict sites, const int first, const int S, __global ushort *values,
                     __global int *source, __global ushort *temperature, const Level g,
-                    __global const int2 *restrict offsets, __global const int *restrict reach,
+                    __global const int *restrict offsets, __global const int *restrict reach,
                     __global const int *restrict index_of, __global const int *restrict positions,
                     __global const float *restrict disc, __global const int2 *restrict looks, COSTS,
                     __global const uint *restrict noise, const uint turn,
@@ -124,7 +124,7 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
         return;
 #endif
     const Lattice h = g.lattice;
-    const int site = sites[s], line = site / h.width, i = lattice_row(h, line), j = (site - line * h.width) / h.spacing;
+    const int site = sites[s], i = site / h.cols, j = site - i * h.cols;
     const ulong place = place_of(h, i, j);
 
     // 6.2.2.1: the neighbourhood.

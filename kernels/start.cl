@@ -2,21 +2,34 @@
 #include "common/lattice.h"
 #include "common/philox.h"
 
-// Algorithm 1, before the first level: every site takes a pixel of the sample at random, at temperature 1 (step 5).
+// Steps 2 and 5 of Algorithm 1, the beginning of a level: a site of the level above keeps what it is, every other site
+// takes a pixel of the sample at random, at temperature 1.
 //
 // sample (C, plane) working grey levels; pixels (count,) pixel indices in it to take from
+// above_values (C, above), above_source, above_temperature   the sites of the level above, `above_cols` to a row, without
+//                          older pictures; `above` from channel to channel; 0 columns: there is no level above
 // values (C, sites), source (sites,), temperature (sites,) in 1/1024  out
 // One work-item per site.
 __kernel void start(const ulong seed, __global const float *restrict sample, const int plane, const int channels,
                     __global const int *restrict pixels, const int count, const Lattice g,
-                    __global ushort *restrict values, __global int *restrict source,
+                    __global const ushort *restrict above_values, __global const int *restrict above_source,
+                    __global const ushort *restrict above_temperature, const int above, const int above_rows,
+                    const int above_cols, __global ushort *restrict values, __global int *restrict source,
                     __global ushort *restrict temperature)
 {
-    const int s = get_global_id(0);
-    const int sites = g.rows * g.cols;
+    const int s = get_global_id(0), sites = g.layers * g.rows * g.cols;
     if (s >= sites)
         return;
-    const uint4 bits = draw4(seed, 0, 0, place_of(g, s / g.cols, s % g.cols), PURPOSE_START, 0);
+    const int i = s / g.cols, j = s % g.cols, layer = AXES > 2 ? i / g.rows : 0, row = AXES > 2 ? i % g.rows : i;
+    if (above_cols > 0 && (g.front + layer) % 2 == 0 && (g.top + row) % 2 == 0 && (g.left + j) % 2 == 0) {
+        const int r = (layer / 2 * above_rows + row / 2) * above_cols + j / 2;
+        source[s] = above_source[r];
+        temperature[s] = above_temperature[r];
+        for (int c = 0; c < channels; ++c)
+            values[c * sites + s] = above_values[c * above + r];
+        return;
+    }
+    const uint4 bits = draw4(seed, 0, 0, place_of(g, i, j), PURPOSE_START, 0);
     const int from = pixels[below(bits.x, bits.y, count)];
     source[s] = from;
     temperature[s] = 1024;

@@ -43,7 +43,7 @@
         __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
         __global const ushort *restrict kind_, __global const float *restrict dear
 #define EVALUATED(p, factor, site)                                                                                     \
-    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.down, g.deep) * (factor) + penalty[p] +                       \
+    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride) * (factor) + penalty[p] +                       \
      apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) + MISFIT(p, site) + OF_KIND(p, site))
 #if KINDS
 #define OF_KIND(p, site) of_kind(kind_ + (p), listed, dear + (site), area_)

@@ -1,42 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The lattice of one level, equations (10) and (11): sites (spacing * i, spacing * j) of a picture that is `width`
-// pixels wide, 0 <= i < rows, 0 <= j < cols. Images stay at full size; a level only reads through it. Or a window of
-// such a lattice, which lies in a picture of its own, site by site. A volume is a stack of layers, one below another, and
-// so is its lattice: row i of it is row i % high of layer i / high. Volumes are open, and have no windows.
+// The lattice of one level, equations (10) and (11), or a window of it: an array of sites with a shape and an origin. Site
+// (i, j) has number i * cols + j. A volume (-D AXES=3) is a stack of layers, one below another, and so is its lattice: row
+// i of it is row i % rows of layer i / rows.
 #ifndef SIMDTEX_LATTICE_H
 #define SIMDTEX_LATTICE_H
 
+#ifndef AXES
+#define AXES 2
+#endif
+
 // simdtex.model.lattice.LATTICE is the same; tests/test_level.py holds the one against the other.
 typedef struct {
-    int rows, cols;               // sites
-    int spacing, width;           // pixels from site to site, and to a row
-    int around_rows, around_cols; // whether rows and columns wrap around
-    int tile_rows, tile_cols;     // where > 0, what lies in another tile is read
-    int elsewhere;                // so many pixels on, where an older picture stands
-    int top, left;                // the first site's row and column in the whole lattice
-    int whole_rows, whole_cols;   // sites of the whole lattice
-    int step, whole_width;        // pixels of the whole picture from site to site, and to a row
-    int layers, high, height;     // layers of sites, 1 of a picture; rows of sites to a layer, and of pixels
+    int layers, rows, cols;                      // sites; a picture has one layer
+    int around_layers, around_rows, around_cols; // whether the axis wraps around
+    int front, top, left;                        // the first site's place in the whole lattice
+    int whole_layers, whole_rows, whole_cols;    // sites of the whole lattice
+    int step;                                    // pixels of the whole picture from site to site
+    int picture_rows, picture_cols;              // pixels of the whole picture, or of a layer
+    int tile_rows, tile_cols;                    // where > 0, what lies in another tile is read
+    int elsewhere;                               // so many sites on, where an older picture stands
 } Lattice;
 
-// The row of pixels that row i of a lattice is, and back.
-inline int pixel_row(const Lattice g, const int i)
-{
-    return g.layers > 1 ? (i / g.high * g.height + i % g.high) * g.spacing : i * g.spacing;
-}
-
-inline int lattice_row(const Lattice g, const int row)
-{
-    return g.layers > 1 ? row / g.height / g.spacing * g.high + row % g.height / g.spacing : row / g.spacing;
-}
-
-// Pixel index of site (i, j), and back.
-#define SITE(g, i, j) (pixel_row(g, i) * (g).width + (j) * (g).spacing)
-#define ROW_OF(g, site) lattice_row(g, (site) / (g).width)
-#define COL_OF(g, site) ((site) % (g).width / (g).spacing)
-
-// Layers of an offset (layers * 2^16 + rows, columns).
-#define LAYERS(down) (((down) + 0x8000) >> 16)
+// An offset (AXES,) in layers, rows and columns.
+#define LAYERS(offset) (AXES > 2 ? (offset)[0] : 0)
+#define DOWN(offset) (offset)[AXES - 2]
+#define RIGHT(offset) (offset)[AXES - 1]
 
 inline int wrap(const int i, const int n)
 {
@@ -46,31 +34,27 @@ inline int wrap(const int i, const int n)
     return k < 0 ? k + n : k;
 }
 
-// The place of site (i, j) in the whole picture, as a pixel index: what keys its random numbers.
+// The pixel of the whole picture at site (i, j): what keys its random numbers.
 inline ulong place_of(const Lattice g, const int i, const int j)
 {
-    if (g.layers > 1)
-        return SITE(g, i, j);
-    const ulong row = wrap(g.top + i, g.whole_rows), col = wrap(g.left + j, g.whole_cols);
-    return (row * (ulong)g.whole_width + col) * (ulong)g.step;
+    const ulong layer = AXES > 2 ? wrap(g.front + i / g.rows, g.whole_layers) : 0;
+    const ulong row = wrap(g.top + (AXES > 2 ? i % g.rows : i), g.whole_rows), col = wrap(g.left + j, g.whole_cols);
+    return ((layer * g.picture_rows + row) * g.picture_cols + col) * g.step;
 }
 
-// Pixel index of the neighbour of site (i, j) at offset (di, dj), equation (3). -1 outside an open lattice or a window,
-// and where a small torus wraps the offset back onto the site itself.
-inline int neighbour(const Lattice g, const int i, const int j, const int di, const int dj)
+// Number of the neighbour of site (i, j) at an offset, equation (3). -1 outside an open lattice or a window, and where a
+// small torus wraps the offset back onto the site itself.
+inline int neighbour(const Lattice g, const int i, const int j, __global const int *offset)
 {
-    if (g.layers > 1) {
-        const int up = LAYERS(di), layer = i / g.high + up, row = i % g.high + di - (up << 16), col = j + dj;
-        return layer < 0 || layer >= g.layers || row < 0 || row >= g.high || col < 0 || col >= g.cols
-                   ? -1
-                   : SITE(g, layer * g.high + row, col);
-    }
-    const int k = g.around_rows ? wrap(i + di, g.rows) : i + di;
-    const int l = g.around_cols ? wrap(j + dj, g.cols) : j + dj;
-    if (k < 0 || k >= g.rows || l < 0 || l >= g.cols || (k == i && l == j))
+    const int layer = AXES > 2 ? i / g.rows : 0, row = AXES > 2 ? i % g.rows : i;
+    int n = layer + LAYERS(offset), k = row + DOWN(offset), l = j + RIGHT(offset);
+    n = g.around_layers ? wrap(n, g.layers) : n;
+    k = g.around_rows ? wrap(k, g.rows) : k;
+    l = g.around_cols ? wrap(l, g.cols) : l;
+    if (n < 0 || n >= g.layers || k < 0 || k >= g.rows || l < 0 || l >= g.cols || (n == layer && k == row && l == j))
         return -1;
-    const bool apart = g.tile_rows > 0 && (i / g.tile_rows != k / g.tile_rows || j / g.tile_cols != l / g.tile_cols);
-    return apart ? SITE(g, k, l) + g.elsewhere : SITE(g, k, l);
+    const bool apart = g.tile_rows > 0 && (row / g.tile_rows != k / g.tile_rows || j / g.tile_cols != l / g.tile_cols);
+    return (n * g.rows + k) * g.cols + l + (apart ? g.elsewhere : 0);
 }
 
 #endif

@@ -14,7 +14,7 @@ typedef struct {
     int pixels;                   // of the sample with its margin
     int candidates;               // of the level
     int chance;                   // candidates at random
-    int plane, down, deep;        // of the sample with its columns side by side: pixels to a channel, a row, a layer
+    int plane, row_stride, layer_stride; // of the sample with its columns side by side: pixels to a channel, a row, a layer
     int cols, runs;               // of candidates: columns, and runs of a row whose columns lie side by side in `levels`
     float discount;               // 1 / (1 + coherence)
     float scale, spread;          // 1 / 2h^2 of equation (7), and 2h^2 where a site draws, else 0

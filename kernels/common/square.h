@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The square around a neighbourhood, or the cube (-D CUBE), row by row in cells of 16 lanes, and the distance of one
+// The square around a neighbourhood, or the cube (-D AXES=3), row by row in cells of 16 lanes, and the distance of one
 // candidate summed over it.
 //
 // The sum has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels inside; then lanes n
@@ -17,16 +17,18 @@
 #endif
 #define SIDE (2 * RADIUS + 1)
 #define CHUNKS ((SIDE + 15) / 16)
-#ifdef CUBE
+#if AXES > 2
 #define ROWS (SIDE * SIDE)
-#define ROW(down) ((LAYERS(down) + RADIUS) * SIDE + (down) - (LAYERS(down) << 16) + RADIUS)
+#define MIDDLE (RADIUS * SIDE + RADIUS) // row of the site itself
+#define ROW(offset) ((LAYERS(offset) + RADIUS) * SIDE + DOWN(offset) + RADIUS)
 #else
 #define ROWS SIDE
-#define ROW(down) ((down) + RADIUS)
+#define MIDDLE RADIUS
+#define ROW(offset) (DOWN(offset) + RADIUS)
 #endif
 #define CELLS (ROWS * CHUNKS)
 
-// Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a pixel index; -1 beyond an end that does not wrap.
+// Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a site's number; -1 beyond an end that does not wrap.
 inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
 {
     for (int a = 0; a < SIDE; ++a) {
@@ -42,25 +44,25 @@ inline void lines_around(const int at, const int count, const int wraps, const i
 // The rows around row i of a lattice, likewise.
 inline void rows_around(const Lattice g, const int i, __private int *row)
 {
-#ifdef CUBE
+#if AXES > 2
     int layer[SIDE], line[SIDE];
-    lines_around(i / g.high, g.layers, 0, g.height * g.width * g.spacing, layer);
-    lines_around(i % g.high, g.high, 0, g.width * g.spacing, line);
+    lines_around(i / g.rows, g.layers, g.around_layers, g.rows * g.cols, layer);
+    lines_around(i % g.rows, g.rows, g.around_rows, g.cols, line);
     for (int a = 0; a < ROWS; ++a)
         row[a] = layer[a / SIDE] < 0 || line[a % SIDE] < 0 ? -1 : layer[a / SIDE] + line[a % SIDE];
 #else
-    lines_around(i, g.rows, g.around_rows, g.width * g.spacing, row);
+    lines_around(i, g.rows, g.around_rows, g.cols, row);
 #endif
 }
 
-// Pixel index of the neighbour in row a and column b of the square; -1 where there is none. -D TILES: see lattice.h.
+// Number of the neighbour in row a and column b of the square; -1 where there is none. -D TILES: see lattice.h.
 inline int in_square(const Lattice g, const int site, const int i, const int j, const __private int *row,
                      const __private int *col, const int a, const int b)
 {
     if (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site)
         return -1;
 #ifdef TILES
-    if (row[a] / (g.width * g.spacing) / g.tile_rows != i / g.tile_rows || col[b] / g.spacing / g.tile_cols != j / g.tile_cols)
+    if (row[a] / g.cols / g.tile_rows != i / g.tile_rows || col[b] / g.tile_cols != j / g.tile_cols)
         return row[a] + col[b] + g.elsewhere;
 #endif
     return row[a] + col[b];
@@ -95,27 +97,15 @@ inline float folded(const float16 a)
 inline float16 middle(const int a, const int k)
 {
     float16 lanes = 0.0f;
-    if (a == ROW(0) && k == RADIUS / 16)
+    if (a == MIDDLE && k == RADIUS / 16)
         ((__private float *)&lanes)[RADIUS % 16] = 1.0f;
     return lanes;
-}
-
-// Every first or second of what follows p, 16 of them.
-inline float16 spread(__global const ushort *p, const int spacing)
-{
-    return convert_float16(spacing == 1 ? vload16(0, p) : (ushort16)(vload16(0, p).even, vload16(1, p).even));
 }
 
 #ifndef OWN
 #define CONFIDENCES_OF(made, x, u, guide) (u)
 #else
 #define CONFIDENCES_OF(made, x, u, guide) select((made) ? (u) : (guide), (float16)0.0f, (x) == (float)UNKNOWN)
-
-// The same of whole numbers.
-inline int16 spread_int(__global const int *p, const int spacing)
-{
-    return spacing == 1 ? vload16(0, p) : (int16)(vload16(0, p).even, vload16(1, p).even);
-}
 #endif
 #endif
 
@@ -123,9 +113,9 @@ inline int16 spread_int(__global const int *p, const int spacing)
 #define AROUND(g, i, j)                                                                                                \
     int row[ROWS], col[SIDE];                                                                                          \
     rows_around(g, i, row);                                                                                            \
-    lines_around(j, g.cols, g.around_cols, g.spacing, col);                                                            \
+    lines_around(j, g.cols, g.around_cols, 1, col);                                                                    \
     SQUARE
-#define NEIGHBOUR(g, k) in_square(g, site, i, j, row, col, ROW(offsets[k].x), offsets[k].y + RADIUS)
+#define NEIGHBOUR(g, k) in_square(g, site, i, j, row, col, ROW(offsets + AXES * (k)), RIGHT(offsets + AXES * (k)) + RADIUS)
 
 // The neighbourhood of a site: u = 1 - t_r and x_r u in the lane of each neighbour r, 0 in all others, and of guides in
 // that of the site too. Returns the sum of the temperatures of the neighbours on the lattice, and their number.
@@ -134,26 +124,25 @@ inline int16 spread_int(__global const int *p, const int spacing)
 // Vectors also read what is no neighbour, which others may be writing, and multiply it by 0.
 inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
                    const __private int *col, __global const ushort *values, __global const int *source,
-                   __global const ushort *temperature, __global const int2 *restrict offsets,
+                   __global const ushort *temperature, __global const int *restrict offsets,
                    __global const float *restrict disc, SQUARE_ARG())
 {
     const Lattice h = g.lattice;
 #if V > 1
-    if (h.spacing <= 2 && !h.tile_rows && h.high >= SIDE && j >= RADIUS &&
-        (j - RADIUS + 16 * CHUNKS) * h.spacing <= h.width) {
+    if (!h.tile_rows && h.rows >= SIDE && j >= RADIUS && j - RADIUS + 16 * CHUNKS <= h.cols) {
         float16 heat = 0.0f, inside = 0.0f; // integers below 2^24, so in any order
         for (int a = 0; a < ROWS; ++a)
             for (int k = 0; k < CHUNKS; ++k) {
-                const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
+                const int cell = a * CHUNKS + k, from = max(row[a], 0) + j - RADIUS + 16 * k;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
-                const float16 t = spread(temperature + from, h.spacing);
+                const float16 t = convert_float16(vload16(0, temperature + from));
                 float16 certain = (1024.0f - t) * 0x1p-10f * in;
 #ifdef OWN
-                certain *= select((float16)1.0f, (float16)g.hard, spread_int(source + from, h.spacing) < 0);
+                certain *= select((float16)1.0f, (float16)g.hard, vload16(0, source + from) < 0);
                 const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
 #endif
                 for (int c = 0; c < C; ++c) {
-                    const float16 x = spread(values + c * g.area + from, h.spacing);
+                    const float16 x = convert_float16(vload16(0, values + c * g.area + from));
                     const float16 uc = CONFIDENCES_OF(c < MADE, x, certain, guide);
                     u[cell * CONFIDENCES + CONFIDENT(c)] = uc;
                     xu[cell * C + c] = x * uc;
@@ -173,7 +162,8 @@ inline int2 gather(const Level g, const int site, const int i, const int j, cons
         }
     int2 found = 0;
     for (int k = 0; k < g.neighbours + (G > 0); ++k) {
-        const int self = k == g.neighbours, a = self ? ROW(0) : ROW(offsets[k].x), b = self ? RADIUS : offsets[k].y + RADIUS;
+        const int self = k == g.neighbours, a = self ? MIDDLE : ROW(offsets + AXES * k);
+        const int b = (self ? 0 : RIGHT(offsets + AXES * k)) + RADIUS;
         const int r = self ? site : in_square(h, site, i, j, row, col, a, b), cell = a * CHUNKS + b / 16;
         if (r < 0)
             continue;
@@ -191,15 +181,16 @@ inline int2 gather(const Level g, const int site, const int i, const int j, cons
 }
 
 // Where row a of the square around a candidate begins in `levels`, from the candidate.
-#ifdef CUBE
-#define ROW_AT(a, down, deep) (((a) / SIDE - RADIUS) * (deep) + ((a) % SIDE - RADIUS) * (down) - RADIUS)
+#if AXES > 2
+#define ROW_AT(a, row_stride, layer_stride)                                                                            \
+    (((a) / SIDE - RADIUS) * (layer_stride) + ((a) % SIDE - RADIUS) * (row_stride) - RADIUS)
 #else
-#define ROW_AT(a, down, deep) (((a) - RADIUS) * (down) - RADIUS)
+#define ROW_AT(a, row_stride, layer_stride) (((a) - RADIUS) * (row_stride) - RADIUS)
 #endif
 
-// Equation (12): d of the candidate whose grey levels are at y, in a sample whose rows are `down` apart, layers `deep`.
-inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane, const int down,
-                               const int deep)
+// Equation (12): d of the candidate whose grey levels are at y, in a sample with these strides.
+inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane,
+                               const int row_stride, const int layer_stride)
 {
 #if V == 1
     float d[16];
@@ -211,7 +202,7 @@ inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(cons
                 const float un = U(cell, c, n);
                 if (un == 0.0f) // would add 0
                     continue;
-                const float yn = y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
+                const float yn = y[c * plane + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16 + n];
                 const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
                 d[n] = fma(e, e, d[n]);
             }
@@ -221,7 +212,7 @@ inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(cons
     for (int cell = 0; cell < CELLS; ++cell)
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float16 yn = vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16);
+            const float16 yn = vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16);
             const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
             d = fma(e, e, d);
         }

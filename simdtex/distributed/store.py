@@ -567,9 +567,9 @@ class Stored(Conditions):
 
     def at(self, number: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level's sites in a window; None if there are none."""
-        if not self._work.held or grid.part is None:
+        if not self._work.held or grid.origin is None:
             return None
-        window = Tile(*grid.within[:2], grid.rows, grid.cols)
+        window = Tile(*grid.origin, *grid.shape)
         return self._store.held(self._work.layout.levels[number], window)
 
     def scattered(self, number: int) -> Data | None:

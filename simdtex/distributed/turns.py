@@ -21,7 +21,7 @@ from simdtex.distributed.layout import LevelLayout
 from simdtex.distributed.store import Store, Stored, Turn, Work, phase_of
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import tiles
-from simdtex.methods.mrf.algorithm import Run, finished
+from simdtex.methods.mrf.algorithm import Run, finished_picture
 from simdtex.methods.mrf.level import Lattices
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.tiles import Tally, Tile, framed
@@ -67,13 +67,13 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: in
 
 
 def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field, tally = tiles.entered(here.run, turn.level, tile, _above(here, turn, tile))
+    field, tally = tiles.begin_tile(here.run, turn.level, tile, _above(here, turn, tile))
     here.store.write(turn, tile, field)
     return tally
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
-    here.store.write(turn, tile, tiles.whole(here.run, turn.level, _above(here, turn, tile)))
+    here.store.write(turn, tile, tiles.run_level(here.run, turn.level, _above(here, turn, tile)))
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
@@ -82,7 +82,7 @@ def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     frame = framed(level.lattice, tile, level.halo)
     before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
     done, free = turn.cooling + turn.free, not turn.active
-    field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, penalty, done, free)
+    field, tally = tiles.sweep_tile(here.run, turn.level, tile, frame, before, penalty, done, free)
     here.store.write(turn, tile, field)
     return tally
 
@@ -94,7 +94,7 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     state = here.store.read(level, turn.number - 1, frame.window)
     known = here.store.held(level, frame.window).known if work.held else None
     field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
-    shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
+    shown = finished_picture(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
     if here.work.given:
         values, given = here.store.given(tile)
         shown = np.where(given, values, shown)
@@ -197,7 +197,7 @@ class Turns:
         number = turn.number + 1
         if turn.phase != "whole" and (active or free < lattices.options.free_sweeps):
             before = store.penalty(turn) if turn.phase == "sweep" else None
-            rate = lattices.options.balance * lattices.usual
+            rate = lattices.options.balance * lattices.typical_distance
             after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
             return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
         if turn.level:

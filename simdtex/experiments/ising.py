@@ -241,7 +241,7 @@ class _Run:
 
     def __init__(self, machine: Machine, experiment: Experiment, schedule: schedules.Schedule, seed: int) -> None:
         self.machine, self.schedule, self.seed = machine, schedule, seed
-        self.grid, offsets = Grid(*experiment.size, torus=True), neighbourhood_offsets(1)
+        self.grid, offsets = Grid(experiment.size), neighbourhood_offsets(1)
         self.setting = schedules.Setting(machine, self.grid, offsets, 1, seed, 0)
         self.everywhere = schedules.Masked(self.grid)
         self.offsets = machine.put(offsets)
@@ -254,16 +254,15 @@ class _Run:
 
     def look(self) -> NDArray[np.uint8]:
         """Return the spins, (chains, H, W)."""
-        spins: NDArray[np.uint8] = self.machine.get(self.spins)[:, : self.grid.height]
+        spins: NDArray[np.uint8] = self.grid.latest(self.machine.get(self.spins))
         return spins
 
     def sweep(self) -> None:
         """Relax by the schedule until the end of a sweep."""
         if self.schedule.tile:  # tiles see one another as they were before the sweep
-            self.spins = snapshot(self.machine, self.spins, self.grid.height)
-        last = False
-        while not last:
-            self.state, chosen = self.schedule.step(self.setting, self.state, self.everywhere)
+            self.spins = snapshot(self.machine, self.spins, self.grid.rows)
+        for state, chosen in schedules.decisions(self.schedule, self.setting, self.state, self.everywhere):
+            self.state = state
             for info in chosen.apart(self.machine):
                 self.steps += 1
                 self.relaxations += info.sites.size
@@ -272,7 +271,6 @@ class _Run:
                 elif info.sites.size:
                     self._relax_single()
                     self._relax(info)
-            last = chosen.last
         self._relax_single()
 
     def _relax(self, info: schedules.Info) -> None:

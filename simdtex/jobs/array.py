@@ -210,9 +210,9 @@ def _run(
     def picture(number: int) -> NDArray[Any]:
         grid = run.grid(number)
         x, source = values(program.state)[:-1].astype(np.uint16), values(program.source)[0]
-        return run.sample.picture(grid.view(x), grid.view(source))
+        return run.sample.picture(grid.decimated(x), grid.decimated(source))
 
-    follow = _progress(run, callback, lambda k: run.grid(k).view(values(program.state)[-1]), picture)
+    follow = _progress(run, callback, lambda k: run.grid(k).decimated(values(program.state)[-1]), picture)
     for number in reversed(range(run.levels)):
         for sweep, active in program.relax(level_of(run, number)):
             steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))

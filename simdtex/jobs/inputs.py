@@ -153,10 +153,10 @@ class Inputs(NamedTuple):
             return self.pictures.pixels, self.pictures.known
         if name in ("mask", "guide"):
             return self.pictures.usable if name == "mask" else self.guide
-        given = self.given if self.given and self.given.told.any() else None
+        given = self.given if self.given and self.given.given_mask.any() else None
         if name == "known_source":
             return given and given.place
-        return given and (np.where(given.told, given.values, 0), given.told)
+        return given and (np.where(given.given_mask, given.values, 0), given.given_mask)
 
 
 def check_inputs(

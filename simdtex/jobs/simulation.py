@@ -353,8 +353,8 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
 def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
     """Return the digests of hard data and of the training images, with their unknown pixels completed."""
     found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
-    if given and given.told.any():
-        found["hard_data"] = digest(np.where(given.told, given.values, 0), given.told)
+    if given and given.given_mask.any():
+        found["hard_data"] = digest(np.where(given.given_mask, given.values, 0), given.given_mask)
     return found
 
 

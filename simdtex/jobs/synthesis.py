@@ -317,7 +317,7 @@ def lcpdf(
     grey = Sample.of_levels(y, greys)
     mrf.check_fit(y.shape, int(offsets.max()), order)
 
-    machine, grid = open_machine(device), Grid(x.shape[0], x.shape[1], 1, boundary == "torus")
+    machine, grid = open_machine(device), Grid(x.shape[:2], boundary == "torus")
     planes = x[None].astype(np.uint16), np.zeros(x.shape, np.int32), _check_temperature(temperature, x.shape)
     field = Field(*map(machine.put, planes))
     return lcpdf_at(machine, field, grey, where, offsets, grid, bandwidth, estimator)

@@ -50,7 +50,7 @@ class Account:
     def begin(self, grid: Grid, candidates: int, choice: Choice) -> None:
         """Start a level with its lattice, the number of candidates of a relaxation, and the choice among them."""
         self._grid, self._flop = grid, FLOP * len(self._offsets) * self._channels * candidates
-        mp1 = MP1(None, self.array, (grid.height, grid.width), inf)
+        mp1 = MP1(None, self.array, (grid.pixels[0], grid.pixels[1]), inf)
         any_value = np.broadcast_to(np.float32(0), (len(self._offsets), self._channels, candidates))
         number = any_value[0, 0].astype(np.int32)
         level = Level(0, grid, choice, number, any_value[0], any_value, number)

@@ -66,12 +66,14 @@ class ProcessorArray:
 
     def layers(self, grid: Grid) -> tuple[int, int]:
         """Return the virtual layers by rows and by columns, for the whole picture of a grid."""
-        return -(-grid.height // self.rows), -(-grid.width // self.cols)
+        height, width = grid.pixels
+        return -(-height // self.rows), -(-width // self.cols)
 
-    def place(self, sites: NDArray[np.int32], grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the virtual layers of pixel indices, and the numbers of their PEs, row by row."""
-        row, col = np.divmod(sites.astype(np.int64), grid.width)
-        (high, i), (wide, j) = self._axis(row, grid.height, self.rows), self._axis(col, grid.width, self.cols)
+    def place(self, sites: NDArray[np.integer], grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the virtual layers of sites, and the numbers of their PEs, row by row."""
+        height, width = grid.pixels
+        row, col = np.divmod(grid.places(sites), width)
+        (high, i), (wide, j) = self._axis(row, height, self.rows), self._axis(col, width, self.cols)
         return high * self.layers(grid)[1] + wide, i * self.cols + j
 
     def _axis(self, at: NDArray[np.int64], length: int, pes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -95,7 +97,7 @@ class ProcessorArray:
 
     def shifts(self, grid: Grid, offsets: NDArray[np.int32]) -> int:
         """Return the X-Net shifts that bring the sites of all layers one word from every neighbour, along a `path`."""
-        s = grid.spacing
+        s = grid.step
         return sum(sum(self.moves(grid, down * s, right * s)) for down, right, _ in path(offsets))
 
 
@@ -109,19 +111,19 @@ class Layout:
     def __init__(self, array: ProcessorArray, shape: tuple[int, int]) -> None:
         self.array, self.grid = array, Grid.of(shape)
         self.high, self.wide = array.layers(self.grid)
-        self.padded = Grid(array.rows * self.high, array.cols * self.wide)
+        self.padded = Grid((array.rows * self.high, array.cols * self.wide))
 
     @cached_property
     def address(self) -> NDArray[np.int64]:
         """The address of each pixel."""
-        layer, pe = self.array.place(self.padded.sites(), self.padded)
+        layer, pe = self.array.place(np.arange(self.padded.size), self.padded)
         return (layer * self.array.size + pe).reshape(self.padded.shape)
 
     @cached_property
     def pixel(self) -> NDArray[np.int64]:
         """The pixel at each address."""
         place = np.argsort(self.address, axis=None)
-        return np.stack(np.divmod(place, self.padded.width), 1).reshape(-1, self.array.size, 2)
+        return np.stack(np.divmod(place, self.padded.cols), 1).reshape(-1, self.array.size, 2)
 
 
 def path(offsets: NDArray[np.int32]) -> list[tuple[int, int, int | None]]:

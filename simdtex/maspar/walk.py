@@ -28,7 +28,7 @@ class Walk:
 
     def __init__(self, mp1: MP1, grid: Grid, offsets: NDArray[np.int32]) -> None:
         self.mp1, self.grid, self.offsets, self._path = mp1, grid, offsets, path(offsets)
-        s, sides = grid.spacing, (grid.rows, grid.cols)
+        s, sides = grid.step, (grid.rows, grid.cols)
         self.row, self.col, self.members = mp1.plural(), mp1.plural(), mp1.plural()
         with mp1.where((mp1.row % s == 0) & (mp1.col % s == 0)) as self.sites:
             self.row.set(mp1.row // s)
@@ -64,7 +64,7 @@ class Walk:
     def _pixel(self, axis: int, by: int) -> Plural:
         """Return the pixel row or column of the site that is ``by`` sites on, around the edges of the lattice."""
         sides, held = (self.grid.rows, self.grid.cols), self.mp1.plural()
-        held.set(((self.row, self.col)[axis] + by) % sides[axis] * self.grid.spacing)
+        held.set(((self.row, self.col)[axis] + by) % sides[axis] * self.grid.step)
         return held
 
     def neighbours(self, plural: Plural) -> Iterator[tuple[int, Plural]]:
@@ -72,7 +72,7 @@ class Walk:
         mp1 = self.mp1
         for down, right, number in self._path:
             with mp1.where(self.sites if self.grid.torus else mp1.everywhere):  # values may pass outside the picture
-                arrived = mp1.xnet(plural, down, right, self.grid.spacing)
+                arrived = mp1.xnet(plural, down, right, self.grid.step)
             if (down, right) in self._beyond:
                 with mp1.where(self._beyond[down, right]):
                     mp1.router(arrived, plural, self._wrapped[0, down], self._wrapped[1, right])

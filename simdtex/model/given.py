@@ -65,7 +65,7 @@ class Given:
         return np.asarray(self.known.all(-1))
 
     @property
-    def told(self) -> NDArray[np.bool_]:
+    def given_mask(self) -> NDArray[np.bool_]:
         """Mask of the given values at sites that take part, (H, W, C)."""
         return self.known if self.outside is None else self.known & ~self.outside[..., None]
 
@@ -85,8 +85,8 @@ class Given:
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of a level, with the known values at its sites."""
-        step = (slice(None, None, grid.spacing),) * len(grid.shape)
-        found: NDArray[Any] = np.where(self.known[step], self.values[step], picture)
+        sites = (slice(None, None, grid.step),) * len(grid.shape)
+        found: NDArray[Any] = np.where(self.known[sites], self.values[sites], picture)
         return found
 
 
@@ -106,9 +106,10 @@ NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     """Return the sites of a level's lattice that receive values from between the sites, in ascending order.
 
-    ``known`` (H, W) is the mask of values. A value moves if none of the four sites around it is known.
+    ``known`` (H, W) is the mask of values, and the results are pixel indices. A value moves if none of the four sites
+    around it is known.
     """
-    step, (height, width) = grid.spacing, known.shape
+    step, (height, width) = grid.step, known.shape
     row, col = between(known, grid).T.astype(np.int64)
 
     def at(i: NDArray[np.intp], n: int) -> NDArray[np.intp]:
@@ -132,8 +133,7 @@ def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
 
     ``known`` (H, W) or (D, H, W) is the mask of data; the sites around a datum are the corners of its cell.
     """
-    step, own = grid.spacing, np.zeros(grid.shape, bool)
-    own[:] = grid.view(known)
+    step, own = grid.step, grid.decimated(known)
     place = np.argwhere(known)
     place = place[(place % step > 0).any(1)]
     represented = np.zeros(len(place), bool)
@@ -145,26 +145,24 @@ def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
     return place[~represented].astype(np.int32)
 
 
-def around(
+def nearest_data(
     place: NDArray[np.int32], grid: Grid, order: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return the data near each site of a lattice or a window of it, site by site, the nearest first.
 
     ``place`` (n, 2 or 3) are the places of the data in pixels. The data of a site are the `MOST_NEAR` nearest within
-    the neighbourhood of ``order``. Returns the pixel index of the site in the grid's picture, the number of the datum,
-    and its offset (m, 2 or 3) from the site in pixels.
+    the neighbourhood of ``order``. Returns the number of the site in the grid, the number of the datum, and its offset
+    (m, 2 or 3) from the site in pixels.
     """
     step, reach, axes = grid.step, isqrt(order), place.shape[1]
-    first = np.array([0, grid.within.top, grid.within.left])[-axes:]
-    sides = np.array([0, grid.within.rows, grid.within.cols])[-axes:]
     found: list[list[NDArray[np.int64]]] = [[], [], []]
     for by in product(range(-reach, reach + 2), repeat=axes):
         site = place.astype(np.int64) // step + by
         apart = place - site * step
         near = ((apart**2).sum(1) <= order * step**2) & (abs(apart).max(1) <= reach * step)
-        site = (site - first) % sides if grid.torus else site - first
+        site = (site - grid.first) % grid.whole.shape if grid.torus else np.subtract(site, grid.first)
         near &= ((site >= 0) & (site < grid.shape)).all(1)
-        found[0].append(grid.pixel_of(site[near].T))
+        found[0].append(np.ravel_multi_index(tuple(site[near].T), grid.shape))
         found[1].append(np.flatnonzero(near))
         found[2].append(apart[near])
     site, datum, apart = (np.concatenate(parts) for parts in found)

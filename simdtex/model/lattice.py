@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import chain
 from math import isqrt, prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,40 +18,36 @@ MOST_ORDER = 4096
 """The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
 
 
-LAYER = 2**16
-"""Rows that represent a layer in an offset: (layers * LAYER + rows, columns)."""
-
-
 def neighbourhood_offsets(order: int, axes: int = 2) -> NDArray[np.int32]:
-    """Return the offsets r - s of the neighbourhood of an order, equation (3): (N, 2) int32, row and column.
+    """Return the offsets r - s of the neighbourhood of an order, equation (3): (N, axes) int32, in sites.
 
     The neighbours are the sites within the distance sqrt(order), 1 to `MOST_ORDER`, in canonical order: by distance,
-    then layer, then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60. With 3 ``axes`` the neighbourhood
-    is a ball, and the row of an offset includes its layers in units of `LAYER`: order 1 has 6, order 8 has 92.
+    then layer, then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60. With 3 ``axes``, layer, row and
+    column, the neighbourhood is a ball: order 1 has 6, order 8 has 92.
     """
     whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
-    side = slice(-radius, radius + 1)
-    layer, row, col = np.mgrid[side if axes > 2 else slice(0, 1), side, side].reshape(3, -1)
-    squared = layer * layer + row * row + col * col
+    place = np.indices((2 * radius + 1,) * axes).reshape(axes, -1).T - radius
+    squared = (place**2).sum(1)
     inside = (squared > 0) & (squared <= order)
-    layer, row, col, squared = layer[inside], row[inside], col[inside], squared[inside]
-    canonical = np.lexsort((col, row, layer, squared))
-    return np.stack([layer * LAYER + row, col], 1)[canonical].astype(np.int32)
+    offsets: NDArray[np.int32] = place[inside][np.argsort(squared[inside], kind="stable")].astype(np.int32)
+    return offsets
 
 
-def parts_of(offsets: NDArray[np.integer[Any]]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Return layers, rows and columns of offsets (N, 2), each (N,)."""
-    layer = (offsets[:, 0] + LAYER // 2) // LAYER
-    return layer, offsets[:, 0] - layer * LAYER, offsets[:, 1]
+def in_three_axes(offsets: NDArray[Any]) -> NDArray[Any]:
+    """Return offsets (N, 2 or 3) as layers, rows and columns, (N, 3)."""
+    return np.pad(offsets, ((0, 0), (3 - offsets.shape[1], 0)))
 
+
+AXES = ("layers", "rows", "cols")
 
 LATTICE = np.dtype(
     [
         (name, np.int32)
         for name in (
-            *("rows", "cols", "spacing", "width", "around_rows", "around_cols", "tile_rows", "tile_cols", "elsewhere"),
-            *("top", "left", "whole_rows", "whole_cols", "step", "whole_width", "layers", "high", "height"),
+            *(*AXES, "around_layers", "around_rows", "around_cols", "front", "top", "left"),
+            *("whole_layers", "whole_rows", "whole_cols", "step", "picture_rows", "picture_cols"),
+            *("tile_rows", "tile_cols", "elsewhere"),
         )
     ],
     align=True,
@@ -59,72 +55,50 @@ LATTICE = np.dtype(
 """The struct ``Lattice`` of kernels/common/lattice.h."""
 
 
-class Part(NamedTuple):
-    """The position of a window in the whole lattice.
-
-    ``top``, ``left``, the row and column of its first site in the whole lattice; ``rows``, ``cols``, the size of the
-    whole lattice; ``step``, 2**level, the spacing of sites in pixels of the whole picture; ``width``, the columns of
-    that picture.
-    """
-
-    top: int
-    left: int
-    rows: int
-    cols: int
-    step: int
-    width: int
-
-
 @dataclass(frozen=True)
 class Grid:
-    """The lattice of one level in a picture, equation (10), with sites (spacing i, spacing j); or a window of it.
+    """The lattice of one level, equation (10), or a window of it: an array of sites with a shape and an origin.
 
-    It may also be the lattice of a volume, whose layers lie one below another: open, without windows and tiles.
+    Sites have numbers in C order: row ``cols`` + column in a picture. The arrays of a level have its sites only.
 
     Parameters
     ----------
-    height, width : int
-        Size of the picture that holds the lattice, or of a layer of the volume, in pixels.
-    spacing : int
-        Pixels of that picture from site to site: 2**level, or 1 in a window.
+    shape : (int, int) or (int, int, int)
+        Rows and columns of sites, or layers, rows and columns.
     torus : bool
-        Whether rows and columns of the whole wrap around.
+        Whether all axes of the whole lattice wrap around.
+    step : int
+        Pixels of the whole picture from site to site: 2**level.
+    picture : tuple of int, optional
+        The shape of the whole picture or volume in pixels. None: one pixel for each site, without a window.
+    origin : tuple of int, optional
+        The place in the whole lattice of the first site of a window. None: this is the whole lattice.
     tile : (int, int), optional
-        Rows and columns of tiles, in sites of the grid. Neighbours in another tile are then read from an older
-        picture, `plane` pixels further on in the buffer (`simdtex.ops.snapshot`).
-    part : Part, optional
-        The position in the whole of a window that `window` has made.
-    layers : int
-        Layers of pixels of a volume; 1: a picture.
+        Rows and columns of tiles. Neighbours in another tile are then read from an older picture, which lies below the
+        picture in the same array (`simdtex.ops.snapshot`).
 
     Notes
     -----
-    The place of a site in the whole is the key of its random numbers, and its address in a buffer is not. So a window
+    The place of a site in the whole is the key of its random numbers, and its number in a window is not. So a window
     relaxes like the same sites of the whole, as far as it holds their neighbourhoods.
     """
 
-    height: int
-    width: int
-    spacing: int = 1
+    shape: tuple[int, ...]
     torus: bool = True
+    step: int = 1
+    picture: tuple[int, ...] | None = None
+    origin: tuple[int, ...] | None = None
     tile: tuple[int, int] | None = None
-    part: Part | None = None
-    layers: int = 1
 
     @classmethod
-    def of(cls, shape: tuple[int, ...], spacing: int = 1, torus: bool = True) -> Grid:
-        """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols)."""
-        return cls(shape[-2], shape[-1], spacing, torus, layers=shape[0] if len(shape) > 2 else 1)
+    def of(cls, picture: tuple[int, ...], step: int = 1, torus: bool = True) -> Grid:
+        """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols), in pixels."""
+        return cls(tuple(-(-side // step) for side in picture), torus, step, tuple(picture))
 
     @property
     def pixels(self) -> tuple[int, ...]:
-        """The shape of the picture, or of the volume."""
-        return (self.height, self.width) if self.layers == 1 else (self.layers, self.height, self.width)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape of the grid: (rows, cols), or (layers, rows, cols) of a volume."""
-        return tuple(-(-side // self.spacing) for side in self.pixels)
+        """The shape of the whole picture or volume, in pixels."""
+        return self.picture or self.shape
 
     @property
     def size(self) -> int:
@@ -133,154 +107,119 @@ class Grid:
 
     @property
     def rows(self) -> int:
-        """Number of rows of the grid, or of each of its layers."""
-        return -(-self.height // self.spacing)
+        """Number of rows, of each layer in a volume."""
+        return self.shape[-2]
 
     @property
     def cols(self) -> int:
-        """Number of columns of the grid."""
-        return -(-self.width // self.spacing)
+        """Number of columns."""
+        return self.shape[-1]
 
     @property
-    def plane(self) -> int:
-        """Number of pixels of the picture that holds the grid, or of the volume."""
-        return prod(self.pixels)
+    def layered(self) -> bool:
+        """Whether the sites are those of a volume."""
+        return len(self.shape) > 2
 
     @property
-    def within(self) -> Part:
-        """The position of the grid in the whole lattice; the whole is at (0, 0)."""
-        return self.part or Part(0, 0, self.rows, self.cols, self.spacing, self.width)
+    def first(self) -> tuple[int, ...]:
+        """The place of the first site in the whole lattice."""
+        return self.origin or (0,) * len(self.shape)
 
     @property
-    def step(self) -> int:
-        """Pixels of the whole picture, and of the sample, from site to site: 2**level."""
-        return self.within.step
+    def whole(self) -> Grid:
+        """The whole lattice of this window, without tiles; an equal grid if this is the whole."""
+        return Grid.of(self.pixels, self.step, self.torus)
 
     @property
-    def around(self) -> tuple[bool, bool]:
-        """Whether rows wrap around, and whether columns do: on a torus, if the grid is as large as the whole."""
-        whole = self.within
-        return self.torus and self.rows == whole.rows, self.torus and self.cols == whole.cols
+    def around(self) -> tuple[bool, ...]:
+        """Whether each axis wraps around: on a torus, if the grid is as long as the whole."""
+        return tuple(self.torus and n == whole for n, whole in zip(self.shape, self.whole.shape, strict=True))
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """-D constants of kernels."""
+        return {"AXES": 3} if self.layered else {}
 
     @cached_property
     def struct(self) -> np.void:
         """The grid as a kernel argument, of the type `LATTICE`."""
-        whole, numbers, deep = self.within, np.zeros((), LATTICE), self.size // (self.rows * self.cols)
-        for name, value in {
-            **{"layers": deep, "high": self.rows, "height": self.height},
-            **{"rows": deep * self.rows, "cols": self.cols, "spacing": self.spacing, "width": self.width},
-            **{"around_rows": self.around[0], "around_cols": self.around[1], "elsewhere": self.plane},
-            **dict(zip(("tile_rows", "tile_cols"), self.tile or (0, 0), strict=True)),
-            **{"top": whole.top, "left": whole.left, "whole_rows": whole.rows, "whole_cols": whole.cols},
-            **{"step": whole.step, "whole_width": whole.width},
-        }.items():
-            numbers[name] = value
+        numbers = np.zeros((), LATTICE)
+        one, none = (1,) * (3 - len(self.shape)), (0,) * (3 - len(self.shape))
+        axes = (*one, *self.shape), (*none, *self.around), (*none, *self.first), (*one, *self.whole.shape)
+        others = (self.step, *self.pixels[-2:], *(self.tile or (0, 0)), self.size)
+        numbers[()] = (*chain(*axes), *others)
         struct: np.void = numbers[()]  # type: ignore[assignment]
         return struct
 
     def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
-        """Return a window of this lattice in a picture of its own, with one pixel for each site.
+        """Return a window of this lattice of a picture.
 
         ``top`` and ``left`` are row and column of its first site; on a torus they may have any value, and the window
         continues across the seam. Raises ValueError if it is larger than the whole or, on an open lattice, reaches
         beyond it.
         """
-        whole = self.within
-        if not (0 < rows <= whole.rows and 0 < cols <= whole.cols):
-            raise ValueError(f"a window of {rows}x{cols} sites does not fit a lattice of {whole.rows}x{whole.cols}")
-        top, left = whole.top + top, whole.left + left
+        sides, first = self.whole.shape, np.add(self.first, (top, left))
+        if not (0 < rows <= sides[0] and 0 < cols <= sides[1]):
+            raise ValueError(f"a window of {rows}x{cols} sites does not fit a lattice of {sides[0]}x{sides[1]}")
         if self.torus:
-            top, left = top % whole.rows, left % whole.cols
-        elif not (0 <= top <= whole.rows - rows and 0 <= left <= whole.cols - cols):
+            first %= sides
+        elif (first < 0).any() or (np.add(first, (rows, cols)) > sides).any():
             raise ValueError("a window of an open lattice must lie in it")
-        return Grid(rows, cols, 1, self.torus, None, whole._replace(top=top, left=left))
-
-    @property
-    def whole(self) -> Grid:
-        """The whole lattice of this window, with one pixel for each site; the grid itself if it is no window."""
-        return self.window(-self.within.top, -self.within.left, *self.within[2:4]) if self.part else self
-
-    @property
-    def flat(self) -> Grid:
-        """The same sites as a separate lattice, numbered 0 .. rows * cols - 1."""
-        return Grid.of(self.shape, 1, self.torus)
+        origin = (int(first[0]), int(first[1]))
+        return replace(self, shape=(rows, cols), picture=self.pixels, origin=origin, tile=None)
 
     @property
     def above(self) -> tuple[tuple[int, int], tuple[int, int]]:
         """First row and rows, and first column and columns, of the sites that the level above shares with this grid."""
         (top, rows), (left, cols) = (
             (-(-first // 2), (first + size + 1) // 2 - -(-first // 2))
-            for first, size in ((self.within.top, self.rows), (self.within.left, self.cols))
+            for first, size in zip(self.first, self.shape, strict=True)
         )
         return (top, rows), (left, cols)
 
+    def lines(self) -> list[NDArray[np.int64]]:
+        """Return the layers, rows and columns of the whole lattice in which the sites lie, as far as there are any."""
+        return [
+            (first + np.arange(n)) % whole
+            for first, n, whole in zip(self.first, self.shape, self.whole.shape, strict=True)
+        ]
+
     def cut(self, whole: NDArray[Any]) -> NDArray[Any]:
         """Return the window's part of an array (..., rows, cols) over the whole lattice."""
-        row = (self.within.top + np.arange(self.rows)) % self.within.rows
-        col = (self.within.left + np.arange(self.cols)) % self.within.cols
-        return whole[..., row[:, None], col[None, :]]
-
-    def sites(self) -> NDArray[np.int32]:
-        """Return the pixel index of every site, (size,), row by row."""
-        row = np.arange(self.rows, dtype=np.int32)[:, None] * np.int32(self.width)
-        col = np.arange(self.cols, dtype=np.int32)[None, :]
-        layer = np.arange(self.size // (self.rows * self.cols), dtype=np.int32)[:, None, None]
-        sites: NDArray[np.int32] = layer * np.int32(self.height * self.width) + row + col
-        return (sites * np.int32(self.spacing)).ravel()
-
-    def pixel_of(self, place: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
-        """Return the pixel indices of sites by their row and column, or layer, row and column, each (n,)."""
-        return np.ravel_multi_index(tuple(line * self.spacing for line in place), self.pixels).astype(np.int64)
+        there: tuple[Any, ...] = (..., *np.ix_(*self.lines()))
+        return whole[there] if self.origin else whole
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""
-        if self.layers > 1:
-            return sites.astype(np.int64)
-        whole = self.within
-        row, col = np.divmod(sites.astype(np.int64), self.width)
-        row = (whole.top + row // self.spacing) % whole.rows
-        col = (whole.left + col // self.spacing) % whole.cols
-        places: NDArray[np.int64] = (row * whole.width + col) * whole.step
-        return places
+        lines = self.lines()
+        place = [line[at] * self.step for line, at in zip(lines, np.unravel_index(sites, self.shape), strict=True)]
+        return np.ravel_multi_index(tuple(place), self.pixels)
 
-    def view(self, picture: NDArray[Any]) -> NDArray[Any]:
-        """Return a view of the sites of this grid in a picture (..., H, W), without older pictures below it.
+    def decimated(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """Return the pixels of the whole picture (..., H, W), or volume, at the sites of the whole lattice."""
+        there: tuple[Any, ...] = (..., *(slice(None, None, self.step),) * len(self.shape))
+        found: NDArray[Any] = picture[there]
+        return found
 
-        For a volume, a view of (..., D, H, W).
-        """
-        if self.layers > 1:
-            return picture[..., :: self.spacing, :: self.spacing, :: self.spacing]
-        return picture[..., : self.height : self.spacing, :: self.spacing]
+    def latest(self, array: NDArray[Any]) -> NDArray[Any]:
+        """Return an array over sites (..., rows, cols) without the older picture below it, if there is one."""
+        return array[..., : self.rows, :]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return each neighbour's pixel index, (N, S); -1 outside an open lattice or a window, and for the site itself.
+        """Return each neighbour's number, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
-        If there are tiles, `plane` is added to the index of a neighbour in another tile.
+        If there are tiles, `size` is added to the number of a neighbour in another tile.
         """
-        if self.layers > 1:
-            return self._among_layers(sites, offsets)
-        row = sites // self.width // self.spacing
-        col = sites % self.width // self.spacing
-        k = row[None, :] + offsets[:, 0, None]
-        m = col[None, :] + offsets[:, 1, None]
-        around_rows, around_cols = self.around
-        k = k % self.rows if around_rows else k
-        m = m % self.cols if around_cols else m
-        inside = (k >= 0) & (k < self.rows) & (m >= 0) & (m < self.cols)
-        itself = (k == row) & (m == col)
-        pixel = (k * self.width + m) * self.spacing
+        itself = np.stack(np.unravel_index(sites, self.shape))[:, None]
+        there = itself + offsets.T[:, :, None]
+        sides = np.array(self.shape)[:, None, None]
+        there = np.where(np.array(self.around)[:, None, None], there % sides, there)
+        inside = ((there >= 0) & (there < sides)).all(0) & (there != itself).any(0)
+        number = np.ravel_multi_index(tuple(np.where(inside, there, 0)), self.shape)
         if self.tile:
-            high, wide = self.tile
-            apart = (k // high != row // high) | (m // wide != col // wide)
-            pixel = pixel + apart * self.plane
-        return np.where(inside & ~itself, pixel, -1).astype(np.int32)
-
-    def _among_layers(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        pixel = np.stack(np.unravel_index(sites, self.pixels))[:, None, :]
-        there = pixel // self.spacing + np.stack(parts_of(offsets))[:, :, None]
-        inside = ((there >= 0) & (there < np.array(self.shape)[:, None, None])).all(0)
-        layer, row, col = there * self.spacing
-        return np.where(inside, (layer * self.height + row) * self.width + col, -1).astype(np.int32)
+            tile = np.array(self.tile)[:, None, None]
+            number = number + (there // tile != itself // tile).any(0) * self.size
+        return np.where(inside, number, -1).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -317,7 +256,7 @@ def coloring_of_layers(order: int) -> tuple[int, int, int]:
 
     The neighbourhood of ``order`` in three dimensions is a ball. Order 8 needs 21 colours.
     """
-    layer, row, col = parts_of(neighbourhood_offsets(order, 3).astype(np.int64))
+    layer, row, col = neighbourhood_offsets(order, 3).astype(np.int64).T
     for m in range(2, 8 * (isqrt(order) + 1) ** 3):
         a, b = np.mgrid[:m, :m].reshape(2, -1, 1)
         apart = ((a * layer + b * row + col) % m != 0).all(1)

@@ -171,9 +171,7 @@ class Waves(NamedTuple):
 
     def at(self, grid: Grid) -> NDArray[np.uint16]:
         """Return the guide (4, rows, cols) of the output at the sites of a lattice or a window of it."""
-        whole = grid.within
-        row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
-        col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
+        row, col = (line * grid.step for line in grid.lines())
         found = np.empty((WAVES, grid.rows, grid.cols), np.uint16)
         for first in range(0, grid.rows, CACHED_ROWS):
             some = slice(first, first + CACHED_ROWS)

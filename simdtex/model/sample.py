@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.guide import AnyGuide
-from simdtex.model.lattice import parts_of
+from simdtex.model.lattice import in_three_axes
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest, structure
@@ -36,9 +36,9 @@ class NothingUsable(ValueError):
 class Places(NamedTuple):
     """The places of a level's candidates: the crossings of some rows and columns of the sample.
 
-    ``offsets`` (N, 2), the neighbourhood; ``spacing``, its spacing 2**level; ``step``, the pixels of the sample from
-    one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32, the pixel index of each,
-    row by row; ``allowed`` (n,), whether each is a candidate, or None if all are; ``reach`` (N,) int32, the pixel
+    ``offsets`` (N, 2 or 3), the neighbourhood; ``spacing``, its spacing 2**level; ``step``, the pixels of the sample
+    from one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32, the pixel index of
+    each, row by row; ``allowed`` (n,), whether each is a candidate, or None if all are; ``reach`` (N,) int32, the pixel
     offset of each neighbour; ``layers`` of crossings, 1 for pictures: a volume has the rows of all its layers.
     """
 
@@ -254,29 +254,29 @@ class Sample:
         """sigma^2 of equation (8): the variance of the working levels, averaged over the matched channels."""
         return variance(*(one[: self.channels] for one in self.levels))
 
-    def spread(self, offsets: NDArray[np.integer[Any]], spacing: int) -> NDArray[np.int32]:
-        """Return offsets (N, 2) from sites of a level in rows and columns of the sample with its margin."""
-        layer, row, col = parts_of(offsets)
-        return (np.stack([layer * self.layer + row, col], 1) * spacing).astype(np.int32)
+    def _in_pixels(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
+        """Return offsets from sites of a level in rows and columns of the sample with its margin, (N, 2)."""
+        layer, row, col = in_three_axes(offsets).T
+        return np.stack([layer * self.layer + row, col], 1) * np.int32(spacing)
 
-    def _crossings(
-        self, offsets: NDArray[np.int32], spacing: int, step: int
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-        """Return rows and columns of places, without the margin, and a mask of those with a whole neighbourhood."""
-        apart = [part * spacing for part in parts_of(offsets)]
+    def _crossings(self, radius: int, step: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
+        """Return rows and columns of places, without the margin, and a mask of those with a whole neighbourhood.
 
-        def whole(at: NDArray[np.int32], axis: int, first: int, size: int) -> NDArray[np.bool_]:
-            inside: NDArray[np.bool_] = (at + apart[axis].min() >= first) & (at + apart[axis].max() < first + size)
+        ``radius`` of the neighbourhood is in pixels.
+        """
+
+        def whole(at: NDArray[np.int32], first: int, size: int) -> NDArray[np.bool_]:
+            inside: NDArray[np.bool_] = (at - radius >= first) & (at + radius < first + size)
             return inside
 
         row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
         found = np.zeros((row.size, col.size), bool)
         for top, rows, cols in self.boxes:
-            found |= whole(row, 1, top, rows)[:, None] & whole(col, 2, 0, cols)[None, :]
+            found |= whole(row, top, rows)[:, None] & whole(col, 0, cols)[None, :]
         if self.layer:
             size = self.levels[0].shape[1]
             layer = np.arange(0, size, step, dtype=np.int32)
-            found = (whole(layer, 0, 0, size)[:, None, None] & found).reshape(-1, col.size)
+            found = (whole(layer, 0, size)[:, None, None] & found).reshape(-1, col.size)
             row = ((layer + self.margin)[:, None] * np.int32(self.layer) + row).ravel()
         return row, col, found
 
@@ -290,7 +290,7 @@ class Sample:
 
         Parameters
         ----------
-        offsets : (N, 2) int32 array
+        offsets : (N, 2 or 3) int32 array
             The neighbourhood.
         spacing : int
             The spacing 2**level of the neighbourhood.
@@ -310,9 +310,9 @@ class Sample:
         if key in self._places:
             return self._places[key]
         step, margin = 1 if phases == "all" else spacing, self.margin
-        row, col, whole = self._crossings(offsets, spacing, step)
+        row, col, whole = self._crossings(int(offsets.max()) * spacing, step)
         found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
-        spread = self.spread(offsets, spacing)
+        apart = self._in_pixels(offsets, spacing)
         few = np.count_nonzero(found & whole) < ENOUGH_WHOLE * np.count_nonzero(found)
         if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
             found &= whole
@@ -320,12 +320,12 @@ class Sample:
             row, col, allowed = row[found.any(1)], col[found.any(0)], None
         else:
             if self.pictures.known:
-                found &= self._sure(spread, row + margin, col + margin)
+                found &= self._sure(apart, row + margin, col + margin)
             if not found.any():
                 raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
             allowed = found.ravel()
         everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
-        reach = spread @ np.array([self.cols, 1], np.int32)
+        reach = apart @ np.array([self.cols, 1], np.int32)
         layers = len(set(((row + margin) // self.layer).tolist())) if self.layer else 1
         self._places[key] = Places(offsets, spacing, step, row, col, everywhere, allowed, reach, layers)
         return self._places[key]

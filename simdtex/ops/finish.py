@@ -51,7 +51,7 @@ def finish(
     offsets, weights = around(sd)
     first, count = rows.start * grid.cols, len(rows) * grid.cols
     if machine is None:
-        return _finished(field, given, grid, sample, offsets, weights, grid.sites()[first : first + count])
+        return _finished(field, given, grid, sample, offsets, weights, np.arange(first, first + count, dtype=np.int32))
     out = machine.empty((sample.shown, count), np.int16)
     machine.launch(
         "finish",

@@ -113,7 +113,7 @@ LEVEL = np.dtype(
         ("seed", np.uint64),
         ("level", np.uint32),
         *((name, np.int32) for name in ("area", "neighbours", "pixels", "candidates", "chance")),
-        *((name, np.int32) for name in ("plane", "down", "deep", "cols", "runs")),
+        *((name, np.int32) for name in ("plane", "row_stride", "layer_stride", "cols", "runs")),
         *((name, np.float32) for name in ("discount", "scale", "spread")),
         *((name, np.int32) for name in ("radius", "top", "xi")),
         *((name, np.float32) for name in ("novelty", "centre", "hard")),
@@ -196,15 +196,16 @@ class Relaxation(NamedTuple):
         level: dict[str, Any] = {
             **{"seed": self.seed, "level": self.level, "area": prod(field.source.shape), "xi": self.xi},
             **{"neighbours": self.offsets.shape[0], "pixels": candidates.plane, "candidates": candidates.size},
-            **{"plane": square.levels.shape[1], "down": square.down, "deep": square.deep},
-            **{"cols": square.cols, "runs": square.runs, "discount": costs.discount, "novelty": costs.novelty},
+            **{"plane": square.levels.shape[1], "row_stride": square.row_stride},
+            **{"layer_stride": square.layer_stride, "cols": square.cols, "runs": square.runs},
+            **{"discount": costs.discount, "novelty": costs.novelty},
             **{"scale": window.scale, "spread": choice.spread, "top": window.top},
             **{"radius": window.radius if choice.density else -1, "centre": confidences.centre},
             **{"hard": confidences.hard, "chance": self.proposal.chance},
         }
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}
-        defines |= confidences.defines | costs.defines | ({"CUBE": 1} if self.grid.layers > 1 else {})
+        defines |= confidences.defines | costs.defines | self.grid.defines
         defines |= {"TILES": 1} if self.grid.tile else {}
         return defines, [
             *(sites, 0, sites.size, *field, constants(self.grid, **level), self.offsets),

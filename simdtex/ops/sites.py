@@ -34,7 +34,7 @@ CHUNK = 256
 def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[int, int]:
     """Return the number of active sites, and the sum of their temperatures in 1/1024."""
     if machine is None:
-        t = grid.view(temperature)
+        t = grid.latest(temperature)
         return int((t > 0).sum()), int(t.sum(dtype=np.int64))
     stretches = -(-grid.size // CHUNK)
     both = machine.empty((2, stretches), np.int32)
@@ -62,7 +62,7 @@ def among(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Return the active sites of a list in its order, and the bounds of its groups among them.
 
-    ``sites`` (S,) int32 are pixel indices, group after group; ``starts`` and ``firsts`` come from `stretches`.
+    ``sites`` (S,) int32 are their numbers, group after group; ``starts`` and ``firsts`` come from `stretches`.
     """
     if machine is None:
         active = temperature.ravel()[sites] > 0
@@ -119,17 +119,16 @@ def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
     the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a few
     tens of rounds along its seam.
     """
-    if grid.layers > 1:
+    if grid.layered:
         m, *by = coloring_of_layers(order)
         return (np.tensordot([*by, 1], np.indices(grid.shape), 1) % m).astype(np.int32)
-    whole = grid.within
-    plan = lattice_plan(whole.rows, whole.cols, grid.torus, order, seed)
-    row = (whole.top + np.arange(grid.rows)) % whole.rows
-    col = (whole.left + np.arange(grid.cols)) % whole.cols
+    rows, cols = grid.whole.shape
+    plan = lattice_plan(rows, cols, grid.torus, order, seed)
+    row, col = grid.lines()
     colors = _cosets(plan.pattern, row[:, None], col[None, :])
-    here, there = (np.full(n, -1) for n in (whole.rows, whole.cols))
+    here, there = (np.full(n, -1) for n in (rows, cols))
     here[row], there[col] = np.arange(row.size), np.arange(col.size)
-    i, j = (line[at] for line, at in zip((here, there), np.divmod(plan.seam, whole.cols), strict=True))
+    i, j = (line[at] for line, at in zip((here, there), np.divmod(plan.seam, cols), strict=True))
     seen = (i >= 0) & (j >= 0)
     colors[i[seen], j[seen]] = plan.own[seen]
     return plan.compact[colors]
@@ -287,7 +286,7 @@ def luby(
         draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
         while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
-            r = grid.flat.neighbours(undecided, offsets)
+            r = grid.neighbours(undecided, offsets)
             there = r >= 0
             beaten = there & (host[r] == IN)
             above = (draws[r] > draws[undecided]) | ((draws[r] == draws[undecided]) & (r > undecided))
@@ -304,7 +303,10 @@ def luby(
     while True:
         for _ in range(ROUNDS):
             machine.launch(
-                "luby_round", (sites,), grid.flat.struct, offsets, offsets.shape[0], priority, state, following
+                "luby_round",
+                (sites,),
+                *(grid.struct, offsets, offsets.shape[0], priority, state, following),
+                defines=grid.defines,
             )
             state, following = following, state
         host = machine.get(state)

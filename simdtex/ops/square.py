@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
-from simdtex.model.lattice import parts_of
+from simdtex.model.lattice import in_three_axes
 from simdtex.model.sample import Places, Sample
 
 LANES = 16
@@ -24,18 +24,18 @@ class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
     ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) float32, the sample's working levels with the
-    columns that are a level's step apart side by side; ``down`` is the distance there from one row of the lattice to
-    the next, ``deep`` from one layer to the next; ``disc`` (side, columns) float32, for a volume (side, side, columns),
-    is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of each neighbour in ``disc`` and its offset in
-    ``levels``, in an order in which each is far from earlier ones, since close ones differ alike; the site itself is
-    the last. If ``at`` has all places of a level, they have ``cols`` columns, and every ``runs``-th of a row is side by
-    side in ``levels``.
+    columns that are a level's step apart side by side; ``row_stride`` is the distance there from one row of the lattice
+    to the next, ``layer_stride`` from one layer to the next; ``disc`` (side, columns) float32, or (side, side, columns) of a
+    volume, is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of each neighbour in ``disc`` and its
+    offset in ``levels``, in an order in which each is far from earlier ones, since close ones differ alike; the site
+    itself is the last. If ``at`` has all places of a level, they have ``cols`` columns, and every ``runs``-th of a row
+    is side by side in ``levels``.
     """
 
     at: Array
     levels: Array
-    down: int
-    deep: int
+    row_stride: int
+    layer_stride: int
     disc: Array
     looks: Array
     cols: int
@@ -54,18 +54,17 @@ class Square(NamedTuple):
         (N, C or 1, S) their confidences; both have one more, the site itself, if there are guides.
         """
         if len(x) > len(offsets):
-            offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
-        radius = int(offsets[:, 1].max())
-        layer, line, _ = parts_of(offsets)
-        there, columns = self.at[np.maximum(numbers, 0)], (offsets[:, 1] + radius) % LANES
+            offsets = np.pad(offsets, ((0, 1), (0, 0)))
+        layer, row, col = in_three_axes(offsets).T
+        there, columns = self.at[np.maximum(numbers, 0)], (col + col.max()) % LANES
+        apart = layer * self.layer_stride + row * self.row_stride + col
         lanes = []
         for lane in range(LANES):
             d = np.zeros((len(numbers), x.shape[-1]), np.float32)
             inside = np.flatnonzero(columns == lane)
-            for k in inside[np.lexsort((offsets[inside, 1], offsets[inside, 0]))]:
-                apart = layer[k] * self.deep + line[k] * self.down + offsets[k, 1]
+            for k in inside[np.lexsort((col[inside], row[inside], layer[inside]))]:
                 for c, y in enumerate(self.levels[: x.shape[1]]):
-                    e = ((x[k, c] - y[there + apart]) * u[k, c if u.shape[1] > 1 else 0]).astype(np.float64)
+                    e = ((x[k, c] - y[there + apart[k]]) * u[k, c if u.shape[1] > 1 else 0]).astype(np.float64)
                     d = (e * e + d).astype(np.float32)  # fits 53 bits, so it equals the device's fma: see Sample
             lanes.append(d)
         while len(lanes) > 1:
@@ -77,12 +76,10 @@ class Square(NamedTuple):
 def square_of(machine: Machine, sample: Sample, places: Places, every: bool = False) -> Square:
     """Return the candidates of a level in this layout, or with ``every`` all its places."""
     offsets, step = places.offsets, places.spacing
-    radius, rows, cols = int(offsets[:, 1].max()), sample.rows, sample.cols
+    radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
-    layer, line, col = parts_of(offsets)
-    disc = np.zeros((side, side, columns), np.float32)
-    disc[layer + radius, line + radius, col + radius] = 1
-    disc = disc if sample.layer else disc[radius]
+    disc = np.zeros((side,) * (offsets.shape[1] - 1) + (columns,), np.float32)
+    disc[tuple(offsets.T + radius)] = 1
     wide = -(-cols // step)
     around = ((0, 0), (0, 0), (0, wide * step - cols))
     working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
@@ -90,27 +87,27 @@ def square_of(machine: Machine, sample: Sample, places: Places, every: bool = Fa
     positions = places.everywhere if every else places.positions
     row, at = np.divmod(positions, np.int32(cols))
     at = (row * np.int32(step) + at % np.int32(step)) * np.int32(wide) + at // np.int32(step)
-    down, deep = step * step * wide, sample.layer * step * step * wide
-    lane = ((layer + radius) * bool(sample.layer) * side + line + radius) * columns + col + radius
-    looks = np.stack([lane, layer * deep + line * down + col], 1)[_spread(offsets.tobytes())]
-    itself = lane[0] - col[0] - line[0] * columns - layer[0] * side * columns
+    strides = np.array([sample.layer * step * step * wide, step * step * wide, 1])
+    itself = np.zeros((1, offsets.shape[1]), np.int32)
+    far = np.concatenate([offsets[_far_apart(offsets.tobytes(), offsets.shape[1])], itself])
+    looks = np.stack([np.ravel_multi_index(tuple(far.T + radius), disc.shape), in_three_axes(far) @ strides], 1)
     across = places.col.size if every else positions.size
     return Square(
         machine.put(at),
         machine.put(np.pad(levels, ((0, 0), (0, columns + TAIL)))),
-        down,
-        deep,
+        int(strides[1]),
+        int(strides[0]),
         machine.put(disc),
-        machine.put(np.concatenate([looks, [[itself, 0]]]).astype(np.int32)),
+        machine.put(looks.astype(np.int32)),
         across,
         min(step // places.step, across) if every else 1,
     )
 
 
 @lru_cache(maxsize=16)
-def _spread(offsets: bytes) -> NDArray[np.int32]:
+def _far_apart(offsets: bytes, axes: int) -> NDArray[np.int32]:
     """Return an order of neighbours in which each is far from earlier ones."""
-    place = np.stack(parts_of(np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)), 1)
+    place = np.frombuffer(offsets, np.int32).reshape(-1, axes).astype(np.int64)
     gap = np.full(len(place), np.iinfo(np.int64).max)
     order = []
     for _ in place:

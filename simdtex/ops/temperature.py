@@ -24,5 +24,6 @@ def temperature(machine: Launcher | None, sites: Array, field: Field, offsets: A
         (sites.size,),
         *(sites, sites.size, field.temperature, offsets, offsets.shape[0]),
         *(grid.struct, xi, cooled),
+        defines=grid.defines,
     )
     return cooled

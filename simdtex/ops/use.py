@@ -52,13 +52,13 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
     The counts are integers, so the order of counting does not matter, and counts of tiles add up.
     """
     if machine is None:
-        known = grid.view(field.temperature) < 1024
-        source = grid.view(field.source)[known]
+        known = grid.latest(field.temperature) < 1024
+        source = grid.latest(field.source)[known]
         number = candidates.index_of[source[source >= 0]]
         return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
     counts = machine.put(np.zeros(candidates.size, np.int32))
     sites = grid.size
-    machine.launch("use", (sites,), grid.struct, sites, field.source, field.temperature, candidates.index_of, counts)
+    machine.launch("use", (sites,), sites, field.source, field.temperature, candidates.index_of, counts)
     found: NDArray[np.int32] = machine.get(counts)
     return found
 

@@ -124,9 +124,9 @@ def steps(name: str, grid: Grid, order: int, seed: int) -> Steps:
     while True:
         state, info = schedule.step(setting, state, Masked(grid))
         for step in info.apart(setting.machine):
-            plane = np.zeros(grid.plane, bool)
-            plane[step.sites] = True
-            yield grid.view(plane.reshape(grid.pixels))
+            plane = np.zeros(grid.shape, bool)
+            plane.flat[step.sites] = True
+            yield plane
 
 
 def film(shown: Mapping[str, Steps]) -> bytes:

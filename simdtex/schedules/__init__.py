@@ -22,7 +22,17 @@ from simdtex.schedules.partition import (
     Synchronous,
 )
 from simdtex.schedules.scattered import Luby, RandomScan, RandomSubset, Scattered
-from simdtex.schedules.schedule import Active, Checked, Info, Masked, Schedule, Setting, Watched, neighbours_in
+from simdtex.schedules.schedule import (
+    Active,
+    Checked,
+    Info,
+    Masked,
+    Schedule,
+    Setting,
+    Watched,
+    decisions,
+    neighbours_in,
+)
 
 __all__ = [
     "SCHEDULES",
@@ -44,6 +54,7 @@ __all__ = [
     "Setting",
     "Synchronous",
     "Watched",
+    "decisions",
     "get",
     "neighbours_in",
 ]

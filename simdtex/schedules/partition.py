@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Machine
-from simdtex.model.lattice import Grid, coloring_of_layers, parts_of
+from simdtex.model.lattice import Grid, coloring_of_layers
 from simdtex.ops.sites import coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
@@ -20,7 +20,7 @@ from simdtex.schedules.schedule import Active, Info, Setting
 class State(NamedTuple):
     """The state of a partition.
 
-    ``sites`` (sites,) int32, the pixel indices of the lattice, group after group and row by row within each;
+    ``sites`` (sites,) int32, the numbers of the sites, group after group and row by row within each;
     ``starts`` (groups + 1,) int64, the first index of each group in ``sites``, and the end of the last; ``sweep``, the
     number of sweeps started.
     """
@@ -56,12 +56,12 @@ class Partition:
         else:
             if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
                 group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
-            count, group = int(group.max()) + 1, grid.cut(group) if grid.part else group
+            count, group = int(group.max()) + 1, grid.cut(group)
         group = np.ravel(group)
         few = group.astype(np.uint16) if count <= 2**16 else group  # sorts in linear time
         place = np.argsort(few, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=count))])
-        return State(grid.sites()[place], starts, 0)
+        return State(place.astype(np.int32), starts, 0)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
@@ -109,9 +109,10 @@ class Coloring(Partition):
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the number of colours of the whole lattice."""
-        if grid.layers > 1:
+        if grid.layered:
             return coloring_of_layers(order)[0]
-        return lattice_plan(grid.within.rows, grid.within.cols, grid.torus, order, seed).colors
+        rows, cols = grid.whole.shape
+        return lattice_plan(rows, cols, grid.torus, order, seed).colors
 
 
 class FixedColoring(Coloring):
@@ -138,20 +139,17 @@ class Checkerboard(Partition):
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Return whether every neighbour has the other colour."""
-        even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
-        return even and bool((np.sum(parts_of(offsets), 0) % 2 == 1).all())
+        even = not grid.torus or all(n == 1 or n % 2 == 0 for n in grid.shape)
+        return even and bool((offsets.sum(1) % 2 == 1).all())
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
-        first = np.array([0, grid.within.top, grid.within.left])[-len(grid.shape) :]
-        sides = np.array([*grid.shape[:-2], grid.within.rows, grid.within.cols])
-        place = np.moveaxis(np.indices(grid.shape), 0, -1) + first
-        colors: NDArray[Any] = (place % sides).sum(-1) % 2
+        colors: NDArray[Any] = sum(np.ix_(*grid.lines())) % 2  # type: ignore[assignment]
         return colors
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Two, or one of a single site."""
-        return min(2, grid.size if grid.layers > 1 else grid.within.rows * grid.within.cols)
+        return min(2, grid.whole.size)
 
 
 class Synchronous(Partition):

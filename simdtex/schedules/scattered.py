@@ -46,8 +46,7 @@ class Scattered:
         wanting, steps = active.numbers().size, state.steps + 1
         chosen = self.choose(setting, steps, active) if wanting else active.numbers()
         left = max(0, (state.left or wanting) - chosen.size) if wanting else 0
-        sites = setting.grid.pixel_of(np.unravel_index(chosen, setting.grid.shape)).astype(np.int32)
-        return State(steps, left), Info(sites, steps, not left)
+        return State(steps, left), Info(chosen.astype(np.int32), steps, not left)
 
 
 class Luby(Scattered):

@@ -37,16 +37,16 @@ class Active(Protocol):
         ...
 
     def numbers(self) -> NDArray[np.int64]:
-        """Return the numbers, row cols + column, of the active sites, in ascending order, on the host."""
+        """Return the numbers of the active sites, in ascending order, on the host."""
         ...
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active sites of a list of pixel indices, group after group.
+        """Return the active sites of a list of numbers, group after group.
 
         Parameters
         ----------
         sites : (S,) array
-            Pixel indices; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
+            Numbers of sites; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
         starts : (groups + 1,) array
             The first index of each group in ``sites``, and the end of the last.
 
@@ -64,7 +64,6 @@ class Masked:
     """The active sites by a constant mask (rows, cols); None: all are active."""
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
-        self._grid = grid
         self._mask = np.ones(grid.shape, bool) if mask is None else mask
 
     def mask(self) -> NDArray[np.bool_]:
@@ -83,19 +82,17 @@ class Masked:
         """Return the active sites of a list, computed in NumPy."""
         if self._mask.all():
             return sites, starts
-        plane = np.zeros(self._grid.plane, bool)
-        plane[self._grid.sites()] = self._mask.ravel()
-        wanted = plane[sites]
+        wanted = self._mask.ravel()[sites]
         return sites[wanted], np.concatenate([[0], np.cumsum(wanted)])[starts]
 
 
 class Info(NamedTuple):
     """The decision of a step, or of several steps in advance.
 
-    ``sites`` (S,) int32, pixel indices, an array of NumPy or of the machine. ``turn`` keys the random numbers of their
-    relaxation: no site is relaxed twice with the same turn. ``last``: whether a sweep ends with this. ``steps``: None
-    if all sites relax together, or (steps, 2) int64: sites ``steps[0, 0]`` to ``steps[0, 1]`` - 1 relax together, then
-    those of ``steps[1]``, and so on.
+    ``sites`` (S,) int32, the numbers of the sites (`simdtex.model.lattice.Grid`), an array of NumPy or of the machine.
+    ``turn`` keys the random numbers of their relaxation: no site is relaxed twice with the same turn. ``last``: whether
+    a sweep ends with this. ``steps``: None if all sites relax together, or (steps, 2) int64: sites ``steps[0, 0]`` to
+    ``steps[0, 1]`` - 1 relax together, then those of ``steps[1]``, and so on.
     """
 
     sites: Array
@@ -160,9 +157,21 @@ class Windowed(Schedule, Protocol):
         ...
 
 
+def decisions(schedule: Schedule, setting: Setting, state: Any, active: Active) -> Iterator[tuple[Any, Info]]:
+    """Yield the decisions of a schedule in a sweep, each with the state of the schedule after it.
+
+    The caller relaxes the sites of a decision before it asks for the next one.
+    """
+    last = False
+    while not last:
+        state, info = schedule.step(setting, state, active)
+        yield state, info
+        last = info.last
+
+
 def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int32]) -> tuple[int, int] | None:
     """Return two sites that are neighbours, which equation (14) forbids, or None."""
-    chosen = np.zeros(grid.plane, bool)
+    chosen = np.zeros(grid.size, bool)
     chosen[sites] = True
     r = grid.neighbours(sites, offsets)
     met = (r >= 0) & chosen[r]
@@ -222,11 +231,11 @@ class Checked(Watched):
         grid, offsets = setting.grid, setting.offsets
         if np.unique(info.sites).size != info.sites.size:
             raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
-        if not np.isin(info.sites, grid.sites()).all():
+        if ((info.sites < 0) | (info.sites >= grid.size)).any():
             raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
         met = neighbours_in(grid, offsets, info.sites) if self.independent(grid, offsets) else None
         if met:
-            here, there = (divmod(site, grid.width) for site in met)
+            here, there = (divmod(site, grid.cols) for site in met)
             raise RuntimeError(
                 f"the schedule {self.name} claims independent sites, but {here} and {there} are neighbours "
                 "and relax together: equation (14)"
@@ -250,7 +259,7 @@ class Trimmed(Watched):
         """Return the schedule's own step, without the rows that do not affect the tile."""
         state, info = self.schedule.step(setting, state, active)
         sites = info.sites if isinstance(info.sites, np.ndarray) else setting.machine.get(info.sites)
-        ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.width
+        ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.cols
         for number, (begin, end) in enumerate(ranges.tolist(), 1):
             reach = (len(ranges) - number) * radius
             rows = np.array([max(0, self.top - reach), self.bottom + reach], np.int64) * width

@@ -177,17 +177,16 @@ class Run:
     def _swept(self, state: State) -> State:
         machine = self.machine
         evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
-        kept, everywhere, last = state.schedule, schedules.Masked(self.grid), False
-        while not last:
-            kept, chosen = self.schedule.step(self._setting, kept, everywhere)
+        everywhere = schedules.Masked(self.grid)
+        for after, chosen in schedules.decisions(self.schedule, self._setting, state.schedule, everywhere):
+            memory = after
             for one in chosen.apart(machine):
                 if one.sites.size:
                     sites = machine.put(one.sites.astype(np.int32))
                     labels = potts(machine, sites, evidence, self._votes(labels), self._weight, labels)
-            last = chosen.last
         found = machine.get(labels)
         changed = int(np.count_nonzero(found != state.labels))
-        return State(state.done, state.logs, found, kept, (*state.changed, changed))
+        return State(state.done, state.logs, found, memory, (*state.changed, changed))
 
     def ended(self, state: State) -> bool:
         """Return whether all rows are compared, and the last sweep changed no label or no sweep is left."""

@@ -9,6 +9,7 @@ launch (`simdtex.ops.relax`). The observer (record.py) keeps progress, counts an
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.checkpoint import like
-from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, rule
+from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, with_penalty
 from simdtex.methods.mrf.record import Record, output
 from simdtex.model.lattice import Grid
 from simdtex.ops.commit import commit
@@ -46,14 +47,12 @@ class Run(Lattices):
 
     def begin(self) -> State:
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
-        everywhere = self.machine.put(self.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-        field = start(self.machine, self.planes, everywhere, Grid.of(self.plan.shape), self.seed)  # 2, 5
-        return self.enter(self.levels - 1, field)
+        return self.enter(self.levels - 1, None)
 
-    def enter(self, number: int, field: Field) -> State:
+    def enter(self, number: int, above: Field | None) -> State:
         """Return the state at the beginning of a level: sites of the level above have t = 0, all others t = 1."""
         level = self.level(number)  # 3, 4, 6.1
-        return opened(level, self.conditions.entered(self.machine, number, level.setting.grid, field))
+        return first_state(level, first_field(self, level, above))
 
     def step(self, state: State, watch: Watch = ignore) -> tuple[State, Info]:
         """Run a sweep, or enter the next level if the current one is at equilibrium; return the state after it."""
@@ -75,9 +74,9 @@ class Run(Lattices):
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
         """Return the picture ([layers,] rows, cols, channels) in the sample's type, and the rest of the output."""
         grid, given = self.grid(0), self.plan.given
-        source = grid.view(self.machine.get(state.source))
+        source = grid.latest(self.machine.get(state.source))
         known = given.data if given and given.data.any() else None
-        image = finished(self, grid, state.field, known, source)
+        image = finished_picture(self, grid, state.field, known, source)
         return given.shown(image, grid) if given else image, output(self, state, source, observer)
 
     def save(self, state: State) -> dict[str, Any]:
@@ -98,10 +97,21 @@ class Run(Lattices):
         return Record(self, callback)
 
 
-def opened(level: Level, field: Field) -> State:
+def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
+    """Return the field of a level, or of a window of it, before its first sweep: steps 2 and 5, and known sites.
+
+    ``above`` are the sites of the level above in the window, on the machine; None at the coarsest level.
+    """
+    machine, grid = level.machine, level.setting.grid
+    everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
+    field = start(machine, run.planes, everywhere, grid, run.seed, above)
+    return run.conditions.entered(machine, level.number, grid, field)
+
+
+def first_state(level: Level, field: Field) -> State:
     """Return the state of a level before its first sweep."""
     count, total = survey(level.machine, level.grid, field.temperature)
-    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, None)
+    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, None)
     memory = level.schedule.init(level.setting)
     return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)
 
@@ -114,28 +124,38 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
     schedule's decision at each step.
     """
     free = not state.active
-    field, memory, chosen = swept(level, state, free, watch)
+    field, memory, chosen = run_steps(level, state, watch)
     count, total = survey(level.machine, level.grid, field.temperature)
-    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, state.penalty)
+    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, state.penalty)
     cooling, freed = state.cooling + (not free), state.free + free
     return State(*field, penalty, memory, level.number, cooling, freed, count, total), chosen
 
 
-def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tuple[Field, Any, list[schedules.Info]]:
-    """Run the steps of a sweep; return the field after it, the state of the schedule, and its decisions."""
-    field, memory = exchanged(level, state.field), state.schedule
-    relaxation = rule(level, state.penalty)
+def run_steps(
+    level: Level, state: State, watch: Watch = ignore, sets: float = inf
+) -> tuple[Field, Any, list[schedules.Info]]:
+    """Run the steps of a sweep; return the field after it, the state of the schedule, and its decisions.
+
+    ``sets`` is the number of sets of sites after which the sweep is left.
+    """
+    field, memory = with_snapshot(level, state.field), state.schedule
+    active, relaxation = Active(level, field.temperature, not state.active), with_penalty(level, state.penalty)
     chosen: list[schedules.Info] = []
-    while not (chosen and chosen[-1].last):
-        memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))  # 6.2.1
-        for part in relaxed(level, field, now, relaxation):  # 6.2.2
+    for after, decision in schedules.decisions(level.schedule, level.setting, state.schedule, active):  # 6.2.1
+        if not sets:
+            break
+        memory = after
+        if sets < len(decision.ranges):
+            decision = decision._replace(steps=decision.ranges[: int(sets)])
+        for part in relax_parts(level, field, decision, relaxation):  # 6.2.2
             field = part.field
             watch(level, state, part)
-        chosen.append(now)
+        chosen.append(decision)
+        sets -= len(decision.ranges)
     return field, memory, chosen
 
 
-def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
+def use_counts(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     """Return the number of uses of each candidate, (n,); zeros if nothing depends on these."""
     candidates = level.proposal.candidates
     if not (level.rate or level.fair_use.kinds is not None):
@@ -144,7 +164,7 @@ def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     return found
 
 
-def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
+def relax_parts(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
     """Relax the sites of the chosen steps one step after another, and yield short parts: 6.2.2."""
     machine = level.machine
     if level.in_place:
@@ -173,14 +193,14 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
         yield Part(len(outcomes) < 2, done, step.last, chosen.turn, field)
 
 
-def exchanged(level: Level, field: Field) -> Field:
+def with_snapshot(level: Level, field: Field) -> Field:
     """Return the field; if the schedule has blocks, with a copy below it that other blocks read during the sweep."""
     if not level.schedule.tile:
         return field
-    return Field(*(snapshot(level.machine, plane, level.grid.height) for plane in field))
+    return Field(*(snapshot(level.machine, plane, level.grid.rows) for plane in field))
 
 
-def finished(
+def finished_picture(
     run: Lattices, grid: Grid, field: Field, known: NDArray[np.bool_] | None, seen: NDArray[np.int32], first: int = 0
 ) -> NDArray[Any]:
     """Return the picture in the sample's type, with the finish (`simdtex.ops.finish`) if the options have one.
@@ -190,11 +210,11 @@ def finished(
     """
     sample = run.sample
     if not run.options.finish:
-        values = grid.view(run.machine.get(field.values))[:, first : first + len(seen)]
+        values = grid.latest(run.machine.get(field.values))[:, first : first + len(seen)]
         return sample.picture(values, seen)
     sd, rows = run.options.finish, max(1, AT_ONCE // grid.cols)
     picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
-    given = run.machine.put((np.zeros(grid.pixels, bool) if known is None else known).view(np.uint8))
+    given = run.machine.put((np.zeros(grid.shape, bool) if known is None else known).view(np.uint8))
     for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
         by = finish(

@@ -59,24 +59,21 @@ class Conditions(ABC):
         held = self.at(number, grid)
         if held is None:
             return field
-        planes = [np.array(machine.get(plane)) for plane in field]
-        values, source, temperature = (grid.view(plane) for plane in planes)
+        values, source, temperature = (np.array(machine.get(plane)) for plane in field)
         guides, known = self.confidences.guides, held.known
         matched = len(values) - guides
         values[matched:] = held.values[len(held.values) - guides :]
         if known.any():
             values[:matched, known] = held.values[:matched, known]
             source[known], temperature[known] = held.source[known], 0
-        return Field(*map(machine.put, planes))
+        return Field(*map(machine.put, (values, source, temperature)))
 
     def movable(self, machine: Machine, number: int, grid: Grid) -> Array | None:
         """Return an (H, W) uint16 array that is 0 at the known sites of a grid; None if all sites are free."""
         held = self.at(number, grid)
         if held is None or not held.known.any():
             return None
-        plane = np.zeros(grid.pixels, np.uint16)
-        grid.view(plane)[...] = ~held.known
-        return machine.put(plane)
+        return machine.put((~held.known).astype(np.uint16))
 
 
 class Conditioning(Conditions):
@@ -100,7 +97,7 @@ class Conditioning(Conditions):
         if number not in self._held:
             self._held = {number: self._whole(Grid.of(self._shape, 2**number, grid.torus))}  # one level is enough
         held = self._held[number]
-        return Held(*(grid.cut(plane) for plane in held)) if grid.part else held
+        return Held(*(grid.cut(plane) for plane in held))
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
@@ -128,4 +125,4 @@ class Conditioning(Conditions):
             stand: Stand = stand_ins(guide != UNKNOWN, grid) if gaps else NO_STAND_IN
             plane[:] = guide
             plane.flat[stand.site] = guide.flat[stand.datum]
-        return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, known)))
+        return Held(*(np.ascontiguousarray(grid.decimated(plane)) for plane in (values, source, known)))

@@ -38,7 +38,7 @@ def lcpdf_at(
     """Return P(x_s | x_r, r in N_s) at ``sites``, (S, greys) float64; every row adds up to 1.
 
     ``field`` holds the image in working grey levels and its temperatures, and its sources are not read; the sample
-    has one channel; ``sites`` are pixel indices, and ``bandwidth`` is h in units of h_opt, equation (8). ``estimator``
+    has one channel; ``sites`` are their numbers, and ``bandwidth`` is h in units of h_opt, equation (8). ``estimator``
     is ``"parzen"``, equations (6) to (8), or ``"histogram"``, counts of exact matches, (4) and (5). Raises ValueError
     if no neighbourhood of the sample matches that of a site.
     """
@@ -70,7 +70,7 @@ def _all(machine: Machine, sample: Sample, places: Places, grid: Grid, window: l
 def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) -> NDArray[np.float64]:
     total = counts.sum(1, keepdims=True)
     if not total.all():
-        row, col = divmod(int(sites[(total[:, 0] == 0).argmax()]), grid.width)
+        row, col = divmod(int(sites[(total[:, 0] == 0).argmax()]), grid.cols)
         raise ValueError(
             f"no neighbourhood of the sample equals that of site ({row}, {col}); "
             'use fewer grey levels, a smaller order, or estimator="parzen"'
@@ -120,7 +120,7 @@ def given_data(
     places = sample.places(np.zeros((1, 2), np.int32), 1)  # the offset of no neighbour
     kinds, size = int(of.max()) + 1, places.positions.size
     window = lcpdf.window(1, sample.top)._replace(gauss=np.ones(1, np.float32), radius=0, top=kinds - 1)
-    relaxation = _all(machine, sample, places, Grid(1, 1), window)
+    relaxation = _all(machine, sample, places, Grid((1, 1)), window)
     square = relaxation.proposal.square
     kind = np.zeros(square.levels.shape[1], np.float32)
     kind[machine.get(square.at)] = of
@@ -147,7 +147,7 @@ def given_data(
                 planes = ((sample.channels, 1, here.size), 0, np.uint16), ((1, here.size), -1, np.int32)
                 field = Field(*(machine.put(np.full(*plane)) for plane in (*planes, ((1, here.size), 1024, np.uint16))))
                 rule = relaxation._replace(
-                    grid=Grid(1, here.size, 1, torus=False),
+                    grid=Grid((1, here.size), torus=False),
                     costs=relaxation.costs._replace(scattered=scattered),
                     choice=relaxation.choice._replace(window=window._replace(scale=scale)),
                 )

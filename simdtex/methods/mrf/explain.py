@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.methods.mrf.level import Lattices, rule
+from simdtex.methods.mrf.level import Lattices, with_penalty
 from simdtex.model.explanation import Explanation, Neighbours, Ranked
-from simdtex.model.lattice import parts_of
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import continuing
 from simdtex.ops.neighbourhood import Field, near
@@ -45,8 +44,8 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     ``twin`` is the run's plan on the reference. Cost: about two relaxations by the twins.
     """
     level = twin.level(moment.level)
-    pixel = np.array([pixel_of(twin, moment.level, site)], np.int32)
-    field, relaxation = moment.field, rule(level, moment.penalty)
+    pixel = np.array([site_number(twin, moment.level, site)], np.int32)
+    field, relaxation = moment.field, with_penalty(level, moment.penalty)
     choice, candidates = relaxation.choice, relaxation.proposal.candidates
 
     terms: dict[str, NDArray[np.float32]] = {}
@@ -98,13 +97,13 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     )
 
 
-def pixel_of(run: Lattices, number: int, site: tuple[int, ...]) -> int:
-    """Return the pixel index of a site of a level; raise ValueError if it is not of the level's lattice."""
+def site_number(run: Lattices, number: int, site: tuple[int, ...]) -> int:
+    """Return the number of a site of a level; raise ValueError if it is not of the level's lattice."""
     shape = run.grid(number).shape
     if len(site) != len(shape) or not all(0 <= n < side for n, side in zip(site, shape, strict=True)):
         sides = " x ".join(map(str, shape))
         raise ValueError(f"site {site} is not of the {sides} sites of level {number}; give one of these, from 0")
-    return int(run.grid(number).pixel_of([np.array(n) for n in site]))
+    return int(np.ravel_multi_index(site, shape))
 
 
 def _neighbours(
@@ -116,15 +115,15 @@ def _neighbours(
     _, values, certain, source, _ = near(pixel, field, relaxation.offsets, grid, relaxation.confidences)
     looked_at = len(r) if isinstance(proposal, AllCandidates) else SUGGESTING
     continued = continuing(proposal.candidates, source)[:looked_at, 0]
-    offsets = np.stack(parts_of(relaxation.offsets), 1)[:, -len(grid.shape) :]
+    offsets = relaxation.offsets
     if relaxation.confidences.guides:
         r, source, offsets = (np.pad(array, ((0, 1), (0, 0))) for array in (r, source, offsets))
         r[-1], source[-1] = pixel, -1
     there, made = r >= 0, len(values[0]) - relaxation.confidences.guides
     pixels = sample.picture(values[:, :made].transpose(1, 0, 2), field.source.ravel()[r])[:, 0]
     if given:
-        own = r[:, 0] % grid.plane
-        known, told = (one.reshape(grid.plane, -1)[own] for one in (given.known, given.values))
+        own = grid.places(r[:, 0] % grid.size)
+        known, told = (one.reshape(-1, one.shape[-1])[own] for one in (given.known, given.values))
         pixels = np.where(known, told, pixels)
     neighbours = Neighbours(
         offsets=offsets.astype(np.int32),

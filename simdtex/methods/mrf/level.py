@@ -16,9 +16,8 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import around
+from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
-from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
@@ -119,15 +118,13 @@ class Lattices:
     """A plan on a machine: the constants of the run, and its levels.
 
     ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
-    plan. ``planes`` are the sample's working levels on the machine, and ``evaluations`` (H, W) counts the candidates
-    that each site of the whole has evaluated.
+    plan. ``planes`` are the sample's working levels on the machine.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
         self.plan, self.machine, self.seed, self.levels = plan, machine, seed, plan.levels
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
-        self.evaluations = machine.put(np.zeros(plan.shape if conditions is None else (1, 1), np.int32))
         self.conditions = conditions or Conditioning(plan)
         self._last: Level | None = None
 
@@ -139,7 +136,7 @@ class Lattices:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
 
         ``window`` is (first row, first column, rows, columns) of a window of the lattice; the arrays of the state then
-        hold only the sites of the window. None: the whole lattice, in pictures of the output's size.
+        hold only the sites of the window. None: the whole lattice.
         """
         if self._last is None or self._last.number != number:
             self._last = None  # the arrays of one level are enough to keep
@@ -176,7 +173,8 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.order, self.seed, number)
-        return Level(setting, self.plan.schedule, relaxation, options.balance * self.usual, self.fair_use(number))
+        rate = options.balance * self.typical_distance
+        return Level(setting, self.plan.schedule, relaxation, rate, self.fair_use(number))
 
     def choice(self, number: int) -> Choice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
@@ -189,17 +187,18 @@ class Lattices:
     def _on(self, level: Level, grid: Grid) -> Level:
         """Return the level with the parts that depend on the window, for a lattice or a window of it."""
         machine, schedule, number, costs = self.machine, level.schedule, level.number, level.relaxation.costs
+        waves = self.sample.waves
         costs = costs._replace(
-            phased=costs.phased and costs.phased._replace(sites=self._phases(grid)),
+            phased=costs.phased and waves and costs.phased._replace(sites=machine.put(waves.at(grid))),
             scattered=self._scattered(number, grid),
-            kinds=costs.kinds and costs.kinds._replace(sites=self._soft(number, grid)),
+            kinds=costs.kinds and costs.kinds._replace(sites=self._soft(grid)),
         )
         return replace(
             level,
             setting=level.setting._replace(grid=grid),
             relaxation=level.relaxation._replace(grid=replace(grid, tile=schedule.tile), costs=costs),
             in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
-            evaluations=machine.put(np.zeros(grid.pixels, np.int32)) if grid.part else self.evaluations,
+            evaluations=machine.put(np.zeros(grid.shape, np.int32)),
             movable=self.conditions.movable(machine, number, grid),
             lists={},
         )
@@ -211,13 +210,11 @@ class Lattices:
         those = self.plan.soft.kinds(self.sample, self.machine.get(candidates.positions))
         return Kinds(self.machine.put(np.pad(those, ((0, 0), (0, TAIL)))), None)  # as many as `Phased` has
 
-    def _soft(self, number: int, grid: Grid) -> Array:
+    def _soft(self, grid: Grid) -> Array:
         """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, H, W)."""
         assert self.plan.soft
-        found = self.plan.soft.costs(self.sample, 2**number, self.options.soft_weight * self.usual)
-        planes = np.zeros((len(found), *grid.pixels), np.float32)
-        grid.view(planes)[...] = grid.cut(found) if grid.part else found
-        return self.machine.put(planes)
+        costs = self.plan.soft.costs(self.sample, grid.step, self.options.soft_weight * self.typical_distance)
+        return self.machine.put(grid.cut(costs))
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
@@ -231,29 +228,22 @@ class Lattices:
         those = np.pad(those, ((0, 0), (0, TAIL)))
         return Phased(self.machine.put(those), None, certain, free)
 
-    def _phases(self, grid: Grid) -> Array:
-        """Return the phases (waves, H, W) of the output at the sites of a lattice or a window of it."""
-        assert self.sample.waves
-        planes = np.zeros((WAVES, grid.height, grid.width), np.uint16)
-        grid.view(planes)[...] = self.sample.waves.at(grid)
-        return self.machine.put(planes)
-
     def _scattered(self, number: int, grid: Grid) -> Scattered | None:
         """Return the conditioning data between the sites of a lattice or a window of it; None if there are none."""
         data = self.conditions.scattered(number)
         if data is None:
             return None
-        site, datum, apart = around(data.place, grid, self.options.order)
+        site, datum, apart = nearest_data(data.place, grid, self.options.order)
         if not site.size:
             return None
-        begin = np.searchsorted(site, np.arange(grid.plane + 1)).astype(np.int32)
+        begin = np.searchsorted(site, np.arange(grid.size + 1)).astype(np.int32)
         strides = np.array([self.sample.layer * self.sample.cols, self.sample.cols, 1])
         reach = (apart @ strides[-apart.shape[1] :]).astype(np.int32)
         put = self.machine.put
         return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
     @property
-    def usual(self) -> float:
+    def typical_distance(self) -> float:
         """N C sigma^2: half of the mean distance between two neighbourhoods."""
         return len(self.offsets) * self.sample.channels * self.sample.variance
 
@@ -272,7 +262,7 @@ class Lattices:
         if categories is not None and wanted is not None:
             kinds = np.searchsorted(categories, self.sample.own(places.everywhere)[..., 0])
         fair, listed = self.sample.fair(places), not self.exhaustive(number)
-        return FairUse(places.shape, around, fair, listed, kinds, wanted or (), STRICT * self.usual)
+        return FairUse(places.shape, around, fair, listed, kinds, wanted or (), STRICT * self.typical_distance)
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
@@ -352,7 +342,7 @@ class Level:
         return max(most, TOGETHER) if isinstance(self.proposal, CandidateList) and self.in_place else most
 
 
-def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
+def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     """Return the relaxation of the level in a sweep, with the penalty (n,) of each candidate."""
     padded = level.machine.put(np.pad(penalty, (0, TAIL)))  # whole vectors are read, even at the end
     return level.relaxation._replace(costs=level.relaxation.costs._replace(penalty=padded))
@@ -377,7 +367,7 @@ class Active:
         grid = self._level.grid
         if self._plane is None:
             return np.ones(grid.shape, bool)
-        return np.asarray(grid.view(self._level.machine.get(self._plane)) > 0)
+        return np.asarray(grid.latest(self._level.machine.get(self._plane)) > 0)
 
     def numbers(self) -> NDArray[np.int64]:
         """Return the numbers of active sites, read back from the machine."""

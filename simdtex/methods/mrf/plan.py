@@ -161,7 +161,7 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
         if categories is None:
             continue
         if given:
-            asked = np.unique(given.values[given.told[..., variable], variable])
+            asked = np.unique(given.values[given.given_mask[..., variable], variable])
             strange = asked[~np.isin(asked, categories)]
             if strange.size:
                 raise ValueError(

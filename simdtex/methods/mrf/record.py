@@ -50,7 +50,7 @@ class Record:
         self._slots, self._listed = 0, False  # candidates that a relaxation evaluates; whether they are listed
         self._done = 0  # relaxed sites of the current sweep
         self._ended = True  # the next part begins a sweep
-        self._skipped = self._weighed = 0
+        self._skipped = self._evaluations = 0  # the latter of the level before the run was resumed
         self._twin: Lattices | None = None  # the plan on the reference, for explanations
 
     def part(self, level: Level, state: State, part: Part) -> None:
@@ -117,23 +117,23 @@ class Record:
             level, report = self._run.level(info.level), self.reports[-1]
             self.stages.append(Stage(level.number, picture(self._run, level.grid, state.field)))
             if self._listed:
-                before, self._weighed = self._weighed, self._total()
-                weighed = self._weighed - before
-                report["weighed"] = weighed / max(1, report["relaxations"])  # none if the whole level is known
-                report["fma"] += weighed * (level.work // level.proposal.slots)
+                evaluations = self._evaluated()
+                report["weighed"] = evaluations / max(1, report["relaxations"])  # none if the whole level is known
+                report["fma"] += evaluations * (level.work // level.proposal.slots)
             report["skipped"] = machine.spared - self._skipped
             report["seconds"] = time.perf_counter() - self._began
 
-    def _total(self) -> int:
-        """Return the number of candidates that all sites have evaluated so far, if the level lists candidates."""
+    def _evaluated(self) -> int:
+        """Return the number of candidates that the sites of the level have evaluated, if the level lists candidates."""
         if not self._listed:
-            return self._weighed
-        weighed = self._run.grid(self.reports[-1]["level"]).view(self._run.machine.get(self._run.evaluations))
-        return int(weighed.sum(dtype=np.int64))
+            return 0
+        level = self._run.level(self.reports[-1]["level"])
+        return self._evaluations + int(self._run.machine.get(level.evaluations).sum(dtype=np.int64))
 
     def _begin(self, level: Level) -> None:
         """Start the report of a level."""
         self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
+        self._evaluations = 0
         self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, CandidateList)
         grid, candidates = level.grid, level.proposal.candidates.size
         names = ("layers", "rows", "cols")[-len(grid.shape) :]
@@ -150,7 +150,7 @@ class Record:
             "stages": [(stage.level, stage.image) for stage in self.stages],
             **{"reports": self.reports, "account": self.account and self.account.total, "fraction": self._fraction},
             **{"slots": self._slots, "listed": self._listed, "first_left": self._first_left},
-            **{"weighed": self._total() - self._weighed, "skipped": self._run.machine.spared - self._skipped},
+            **{"evaluations": self._evaluated(), "skipped": self._run.machine.spared - self._skipped},
             "seconds": time.perf_counter() - self._began,
         }
 
@@ -159,7 +159,7 @@ class Record:
         self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
         self.reports, self._fraction, self._first_left = saved["reports"], saved["fraction"], saved["first_left"]
         self._slots, self._listed = saved["slots"], saved["listed"]
-        self._skipped, self._weighed = self._run.machine.spared - saved["skipped"], -saved["weighed"]
+        self._skipped, self._evaluations = self._run.machine.spared - saved["skipped"], saved["evaluations"]
         self._began = time.perf_counter() - saved["seconds"]
         if self.account and self.reports:
             number = self.reports[-1]["level"]
@@ -169,7 +169,7 @@ class Record:
 
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> OutputWithSource:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
-    place, t = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
+    place, t = run.sample.place(source), run.grid(0).latest(run.machine.get(state.temperature))
     statistics = known_before(run) | {"levels": record.reports, "use": None}
     if record.account:
         launches = run.machine.launches - record.launches
@@ -194,19 +194,19 @@ def known_before(run: Lattices) -> dict[str, Any]:
 def picture(run: Lattices, grid: Grid, field: Field) -> NDArray[Any]:
     """Return the picture of a level, read back, in the sample's type."""
     values, source = run.machine.get(field.values), run.machine.get(field.source)
-    found = run.sample.picture(grid.view(values), grid.view(source))
+    found = run.sample.picture(grid.latest(values), grid.latest(source))
     return run.plan.given.shown(found, grid) if run.plan.given else found
 
 
 def temperatures(run: Lattices, grid: Grid, field: Field) -> NDArray[np.float64]:
     """Return the temperatures of a level, read back, 0 to 1."""
-    found: NDArray[np.float64] = np.ascontiguousarray(grid.view(run.machine.get(field.temperature))) / np.float64(1024)
+    found: NDArray[np.float64] = grid.latest(run.machine.get(field.temperature)) / np.float64(1024)
     return found
 
 
 def sources(run: Lattices, grid: Grid, field: Field) -> NDArray[np.int32]:
     """Return the source map of a level, read back: the position in the sample of each site, (rows, cols, 2 or 3)."""
-    return run.sample.place(grid.view(run.machine.get(field.source)))
+    return run.sample.place(grid.latest(run.machine.get(field.source)))
 
 
 def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:

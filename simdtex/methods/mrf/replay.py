@@ -13,9 +13,9 @@ from simdtex import schedules
 from simdtex.io.brief import Brief
 from simdtex.machine import Machine
 from simdtex.machine.reference import Reference
-from simdtex.methods.mrf.algorithm import exchanged, relaxed
-from simdtex.methods.mrf.explain import Moment, explained, pixel_of
-from simdtex.methods.mrf.level import Active, Lattices, State, rule
+from simdtex.methods.mrf.algorithm import run_steps
+from simdtex.methods.mrf.explain import Moment, explained, site_number
+from simdtex.methods.mrf.level import Lattices, State
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.record import picture, sources, temperatures
 from simdtex.model.explanation import Explanation
@@ -120,14 +120,14 @@ class Replay:
         level = self._sweeps[sweep].level
         run, grid = self._twin, self._twin.grid(level)
         field = Field(*map(self._run.machine.get, played.field))
-        done = np.zeros(grid.pixels, np.uint8)
+        done = np.zeros(grid.shape, np.uint8)
         chosen = [info.sites[begin:end] for info in played.decided for begin, end in info.ranges]
         for each in chosen:
             done.flat[each] = 1
         if chosen:
             done.flat[chosen[-1]] = 2
         seen = picture(run, grid, field), sources(run, grid, field), temperatures(run, grid, field)
-        return Instant(level, *seen, grid.view(done))
+        return Instant(level, *seen, done)
 
     def explain(self, site: tuple[int, ...], level: int = 0, sweep: int | None = None) -> Explanation:
         """Return an explanation of the value that a site of a level took in a sweep of the level.
@@ -139,7 +139,7 @@ class Replay:
             raise ValueError(
                 f"level is {level} and the levels of this run are 0 to {self._run.levels - 1}; give one of these"
             )
-        pixel = pixel_of(self._run, level, site)
+        pixel = site_number(self._run, level, site)
         asked = (level, sweep)
         while self._state.level >= level and all(one[:2] != asked for one in self._sweeps) and self._record():
             pass
@@ -161,7 +161,7 @@ class Replay:
         limits: dict[int, int | None] = {sweep: sets}
         row, col = (n >> self._sweeps[sweep].level for n in (row, col))
         for level in range(self._sweeps[sweep].level, self._run.levels):
-            pixel = pixel_of(self._run, level, (row, col))
+            pixel = site_number(self._run, level, (row, col))
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
                     return explained(self._twin, moment, (row, col))
@@ -204,21 +204,11 @@ class Replay:
 
     def _play(self, number: int, sets: int | None) -> Played:
         """Run the first ``sets`` sets of a sweep, None: all; return the field and the decisions of the schedule."""
-        state, machine = self._before(number), self._run.machine
-        level, left = self._run.level(state.level), self._sweeps[number].sets if sets is None else sets
-        field, memory = exchanged(level, state.field), state.schedule
-        relaxation, free = rule(level, state.penalty), not state.active
-        decided: list[schedules.Info] = []
-        while left > 0 and not (decided and decided[-1].last):
-            memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))
-            sites = now.sites if isinstance(now.sites, np.ndarray) else machine.get(now.sites)
-            ranges = now.ranges[:left]
-            now = now._replace(sites=sites, steps=ranges)
-            left -= len(ranges)
-            decided.append(now)
-            for part in relaxed(level, field, now, relaxation):
-                field = part.field
-        return Played(field, decided)
+        state = self._before(number)
+        most = self._sweeps[number].sets if sets is None else max(0, sets)
+        field, _, decided = run_steps(self._run.level(state.level), state, sets=most)
+        here = (one.sites if isinstance(one.sites, np.ndarray) else self._run.machine.get(one.sites) for one in decided)
+        return Played(field, [one._replace(sites=sites) for one, sites in zip(decided, here, strict=True)])
 
     def _moment(self, number: int, pixel: int, sets: int | None = None) -> Moment | None:
         """Return the last moment at which a site relaxes in the first ``sets`` sets of a sweep; None without any."""

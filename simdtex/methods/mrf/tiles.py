@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
-from simdtex.methods.mrf.algorithm import Run, counted, opened, sweep, swept
+from simdtex.methods.mrf.algorithm import Run, first_field, run_steps, use_counts
 from simdtex.methods.mrf.level import Level, State
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.sites import survey
-from simdtex.ops.start import start
 from simdtex.schedules.schedule import Trimmed
 
 
@@ -77,27 +76,25 @@ def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
     return Framed(Tile(top, left, rows, cols), down, right)
 
 
-def entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
-    """Return a tile at the beginning of its level: steps 2 and 5 of Algorithm 1, and the sites of the level above.
+def begin_tile(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
+    """Return a tile before the first sweep of its level, and its tally.
 
-    ``above`` are the sites of the level above in the tile; None at the coarsest level. Returns the field of the tile,
-    and its tally.
+    ``above`` are the sites of the level above in the tile; None at the coarsest level.
     """
-    level, field = _entered(run, number, tile, above)
+    level = run.level(number, tile)
+    field = first_field(run, level, above and _on(run.machine, above))
     return _off(run.machine, field), _tally(level, field, level.grid)
 
 
-def whole(run: Run, number: int, above: Field | None) -> Field:
+def run_level(run: Run, number: int, above: Field | None) -> Field:
     """Return a level that is a single tile, after all its sweeps."""
-    grid = run.grid(number)
-    level, field = _entered(run, number, Tile(0, 0, grid.rows, grid.cols), above)
-    state = opened(level, field)
+    state = run.enter(number, above and _on(run.machine, above))
     while not run.at_equilibrium(state):
-        state, _ = sweep(level, state)
+        state, _ = run.step(state)
     return _off(run.machine, state.field)
 
 
-def relaxed(
+def sweep_tile(
     run: Run, number: int, tile: Tile, frame: Framed, field: Field, penalty: NDArray[np.float32], done: int, free: bool
 ) -> tuple[Field, Tally]:
     """Return a tile after a sweep, and its tally.
@@ -110,28 +107,18 @@ def relaxed(
     if frame.window.rows < run.grid(number).rows:  # otherwise rows wrap around, and all are near
         level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
     memory = level.schedule.init(level.setting)._replace(sweep=done)  # the only part of the state that persists
-    state = State(*Field(*map(machine.put, field)), penalty, memory, number)
-    found, *_ = swept(level, state, free)
+    state = State(*_on(machine, field), penalty, memory, number, active=int(not free))
+    found, *_ = run_steps(level, state)
     inside = Field(*map(frame.cut, _off(machine, found)))
-    inner = run.grid(number).window(*tile)
-    return inside, _tally(level, Field(*map(machine.put, inside)), inner)
-
-
-def _entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Level, Field]:
-    machine, level = run.machine, run.level(number, tile)
-    grid = level.setting.grid
-    everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-    field = start(machine, run.planes, everywhere, grid, run.seed)
-    if above is not None:
-        planes = _off(machine, field)
-        for plane, kept in zip(planes, above, strict=True):
-            plane[..., tile.top % 2 :: 2, tile.left % 2 :: 2] = kept
-        field = Field(*map(machine.put, planes))
-    return level, run.conditions.entered(machine, number, grid, field)
+    return inside, _tally(level, _on(machine, inside), run.grid(number).window(*tile))
 
 
 def _tally(level: Level, field: Field, grid: Grid) -> Tally:
-    return Tally(counted(level, field, grid), *survey(level.machine, grid, field.temperature))
+    return Tally(use_counts(level, field, grid), *survey(level.machine, grid, field.temperature))
+
+
+def _on(machine: Machine, field: Field) -> Field:
+    return Field(*map(machine.put, field))
 
 
 def _off(machine: Machine, field: Field) -> Field:
