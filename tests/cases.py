@@ -81,7 +81,7 @@ class Problem(NamedTuple):
         return neighbourhood_offsets(self.order)
 
     def places(self):
-        return self.sample.places(self.offsets, self.grid.spacing, self.phases, self.edges)
+        return self.sample.places(self.offsets, self.grid.step, self.phases, self.edges)
 
     def candidates(self, machine, every=False):
         return self.sample.candidates(machine, self.places(), every=every)
@@ -118,7 +118,7 @@ class Problem(NamedTuple):
         rng, channels = np.random.default_rng(8), self.sample.channels
         begin = np.zeros(self.field.source.size + 1, np.int32)
         begin[self.sites + 1] = rng.integers(0, 4, self.sites.size)
-        begin, reach = np.cumsum(begin, dtype=np.int32), int(self.offsets.max()) * self.grid.spacing
+        begin, reach = np.cumsum(begin, dtype=np.int32), int(self.offsets.max()) * self.grid.step
         apart = rng.integers(-reach, reach + 1, (begin[-1] + 1, 2))
         values = rng.integers(0, self.sample.top + 1, (begin[-1] + 1, channels)).astype(np.uint16)
         values[rng.random(values.shape) < 0.2] = UNKNOWN
@@ -177,20 +177,26 @@ class Problem(NamedTuple):
         h = bandwidth * lcpdf.optimal_bandwidth(self.sample.variance, count, self.sample.channels * (n + 1))
         return lcpdf.window(h, self.sample.top), h
 
-    # What the plain loops want, in (row, column) instead of pixel indices.
+    # What the plain loops want: whole pictures, and (row, column) in pixels instead of numbers of sites.
+
+    def in_picture(self, array):
+        """An array over sites, in pictures that are 0 between the sites."""
+        picture = np.zeros((*array.shape[: -len(self.grid.shape)], *self.grid.pixels), array.dtype)
+        self.grid.decimated(picture)[...] = array
+        return picture
 
     def image(self):
-        return list(self.field.values)
+        return list(self.in_picture(self.field.values))
 
     def temperature(self):
-        return self.field.temperature / 1024
+        return self.in_picture(self.field.temperature) / 1024
 
     def where(self):
-        return [divmod(int(site), self.grid.width) for site in self.sites]
+        return [tuple(n * self.grid.step for n in divmod(int(site), self.grid.cols)) for site in self.sites]
 
     def source(self):
         """(row, column) in the padded sample of each site's source."""
-        return np.stack(np.divmod(self.field.source, self.sample.cols), -1)
+        return np.stack(np.divmod(self.in_picture(self.field.source), self.sample.cols), -1)
 
     def padded(self):
         return [channel.reshape(self.sample.rows, self.sample.cols) for channel in self.sample.working]
@@ -245,7 +251,7 @@ def problem(
     heavy = 16 if guides or nowhere else 1
     values = heavy * ((channels + bool(weight) + guides) * len(offsets) + bool(guides))
     sample = Sample(pixels, values, margin, weight, guides=[guide] if guide else [])
-    grid = Grid(*shape, spacing, torus)
+    grid = Grid.of(shape, spacing, torus)
     row, col = np.indices(shape)
     scattered = rng.integers(0, sample_shape, (*shape, 2))
     shifted = np.stack([row % sample_shape[0], col % sample_shape[1]], -1)
@@ -257,7 +263,7 @@ def problem(
         "zero": np.zeros(shape, int),
         "one": np.full(shape, 1024),
     }[temperatures]
-    sites = grid.sites()
+    sites = np.arange(grid.size, dtype=np.int32)
     sites = rng.permutation(sites)[: count or sites.size].astype(np.int32)
     if guides:
         values[-guides:] = sample.guides
@@ -266,7 +272,7 @@ def problem(
         source, t = np.where(hard, np.int32(-1), source), np.where(hard, 0, t)
         if weight:
             values[channels, hard] = UNKNOWN
-    field = Field(values, source, t.astype(np.uint16))
+    field = Field(*(grid.decimated(plane).copy() for plane in (values, source, t.astype(np.uint16))))
     return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular, between, soft)
 
 

@@ -14,7 +14,7 @@ from simdtex.ops.lcpdf import Choice, window
 
 def test_cut_and_stack_by_hand():
     """5 x 6 pixels on 2 x 4 PEs: three layers down, two across."""
-    array, grid = ProcessorArray(2, 4), Grid(5, 6)
+    array, grid = ProcessorArray(2, 4), Grid((5, 6))
     assert array.layers(grid) == (3, 2)
     layer, pe = array.place(np.array([0, 3, 4, 5, 6, 12, 29], np.int32), grid)
     assert layer.tolist() == [0, 0, 1, 1, 0, 2, 5]
@@ -23,7 +23,7 @@ def test_cut_and_stack_by_hand():
 
 def test_hierarchical_by_hand():
     """5 x 6 pixels on 2 x 4 PEs: blocks of 3 x 2, the last column of PEs empty."""
-    array, grid = ProcessorArray(2, 4, "hierarchical"), Grid(5, 6)
+    array, grid = ProcessorArray(2, 4, "hierarchical"), Grid((5, 6))
     assert array.layers(grid) == (3, 2)
     layer, pe = array.place(np.array([0, 1, 2, 5, 6, 18, 29], np.int32), grid)
     assert layer.tolist() == [0, 1, 0, 1, 2, 0, 3]
@@ -33,10 +33,10 @@ def test_hierarchical_by_hand():
 def test_shifts():
     """The walk brings all sites a neighbour with each move, which is longer at a coarser level."""
     array, offsets = ProcessorArray(16, 16), neighbourhood_offsets(1)
-    assert [array.shifts(Grid(16, 16, 2**n), offsets) for n in range(4)] == [4, 8, 16, 32]
+    assert [array.shifts(Grid.of((16, 16), 2**n), offsets) for n in range(4)] == [4, 8, 16, 32]
     offsets = np.array([[0, -1], [0, 1]], np.int32)  # left, and two moves to the right
-    assert ProcessorArray(4, 4).shifts(Grid(8, 8), offsets) == 3 * 4
-    assert ProcessorArray(4, 4, "hierarchical").shifts(Grid(8, 8), offsets) == 3 * 2  # half of them stay on their PE
+    assert ProcessorArray(4, 4).shifts(Grid((8, 8)), offsets) == 3 * 4
+    assert ProcessorArray(4, 4, "hierarchical").shifts(Grid((8, 8)), offsets) == 3 * 2  # half of them stay on their PE
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_utilisation_by_hand():
     """A checkerboard of 4 x 4 pixels on 4 x 4 PEs: two steps of eight."""
     row, col = np.indices((4, 4))
     colors = [np.flatnonzero((row + col) % 2 == c) for c in (0, 1)]
-    told = account(ProcessorArray(4, 4), Grid(4, 4), colors)
+    told = account(ProcessorArray(4, 4), Grid((4, 4)), colors)
     assert (told["steps"], told["passes"], told["layers"], told["sites"]) == (2, 2, 1, 16)
     assert (told["active"], told["utilisation"]) == (8, 0.5)
     assert told["moved"] == 2 * 4 * 2  # passes, shifts, words
@@ -94,7 +94,7 @@ def test_a_layer_without_an_active_site_costs_nothing():
     """8 x 8 pixels on 4 x 4 PEs: a step in one quarter is one pass cut and stacked, four in blocks."""
     quarter = (np.arange(4)[:, None] * 8 + np.arange(4)).ravel()
     for mapping, passes, utilisation in [("cut-and-stack", 1, 1.0), ("hierarchical", 4, 0.25)]:
-        told = account(ProcessorArray(4, 4, mapping), Grid(8, 8), [quarter])
+        told = account(ProcessorArray(4, 4, mapping), Grid((8, 8)), [quarter])
         assert (told["layers"], told["passes"], told["utilisation"]) == (4, passes, utilisation)
 
 

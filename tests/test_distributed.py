@@ -223,7 +223,7 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     ids=str,
 )
 def test_a_tile_lies_in_its_window(tile, halo, torus, window, where):
-    frame = framed(Grid(40, 50, 1, torus), tile, halo)
+    frame = framed(Grid.of((40, 50), 1, torus), tile, halo)
     assert tuple(frame.window) == window
     assert (frame.rows.start, frame.cols.start) == where
     assert frame.cut(np.zeros((2, *window[2:]))).shape == (2, tile.rows, tile.cols)

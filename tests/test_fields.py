@@ -29,7 +29,7 @@ from simdtex.ops.temperature import temperature
 
 def run(machine, sample, positions, shape, seed):
     planes = machine.put(sample.working.astype(np.float32))
-    return host(machine, start(machine, planes, machine.put(positions), Grid(*shape), seed))
+    return host(machine, start(machine, planes, machine.put(positions), Grid(shape), seed))
 
 
 @st.composite
@@ -82,7 +82,8 @@ def run_temperature(machine, p, xi):
 
 
 def check_formula(p, xi):
-    formula = [plain.cooled(p.field.temperature, site, p.order, p.grid.spacing, p.grid.torus, xi) for site in p.where()]
+    t = p.in_picture(p.field.temperature)
+    formula = [plain.cooled(t, site, p.order, p.grid.step, p.grid.torus, xi) for site in p.where()]
     ours = run_temperature(REFERENCE, p, xi)
     assert ours.dtype == p.field.temperature.dtype
     assert ours.tolist() == formula
@@ -124,12 +125,10 @@ def test_the_least_xi_cools_everything_in_the_end():
 
 @st.composite
 def temperatures(draw):
-    grid = Grid(
-        draw(st.integers(1, 40)), draw(st.integers(1, 60)), draw(st.sampled_from([1, 2, 4])), draw(st.booleans())
-    )
+    grid = Grid((draw(st.integers(1, 40)), draw(st.integers(1, 60))), draw(st.booleans()))
     rng = np.random.default_rng(draw(st.integers(0, 2**16)))
     share = draw(st.sampled_from([0.0, 0.02, 0.5, 1.0]))
-    t = rng.integers(1, 1025, (grid.height, grid.width)) * (rng.random((grid.height, grid.width)) < share)
+    t = rng.integers(1, 1025, grid.shape) * (rng.random(grid.shape) < share)
     return grid, t.astype(np.uint16)
 
 
@@ -137,8 +136,7 @@ def temperatures(draw):
 @settings(max_examples=30)
 def test_a_survey_counts_sites_and_heat(machine, case):
     grid, t = case
-    here = t[:: grid.spacing, :: grid.spacing]
-    expected = int((here > 0).sum()), int(here.sum())
+    expected = int((t > 0).sum()), int(t.sum())
     assert survey(REFERENCE, grid, t) == survey(machine, grid, machine.put(t)) == expected
 
 
@@ -147,7 +145,7 @@ def test_a_survey_counts_sites_and_heat(machine, case):
 def test_the_active_sites_of_a_list_stay_in_order_group_by_group(machine, case, groups, chunk):
     grid, t = case
     rng = np.random.default_rng(groups)
-    sites = rng.permutation(grid.sites())
+    sites = rng.permutation(np.arange(grid.size, dtype=np.int32))
     starts = np.concatenate([[0], np.sort(rng.integers(0, sites.size + 1, groups - 1)), [sites.size]])
     expected = [s[t.ravel()[s] > 0] for s in np.split(sites, starts[1:-1])]
     with pytest.MonkeyPatch.context() as patch:
@@ -182,7 +180,7 @@ def run_commit(machine, p):
 def check_formula_commit(p):
     choice, values, cooled = outcome(p)
     expected = [np.array(a) for a in p.field]
-    for s, (row, col) in enumerate(p.where()):
+    for s, (row, col) in enumerate(divmod(int(site), p.grid.cols) for site in p.sites):
         for c in range(len(values)):
             expected[0][c, row, col] = values[c, s]
         expected[1][row, col], expected[2][row, col] = choice[s], cooled[s]
@@ -280,23 +278,23 @@ def tiles_of(grid, i, j):
     ids=str,
 )
 def test_exactly_the_neighbours_in_another_tile_are_read_elsewhere(height, width, spacing, tile, order, torus):
-    grid = Grid(height, width, spacing, torus, tile)
-    sites, offsets = grid.sites(), neighbourhood_offsets(order)
+    grid = Grid.of((height, width), spacing, torus, tile)
+    sites, offsets = np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order)
     found = grid.neighbours(sites, offsets)
     bare = replace(grid, tile=None).neighbours(sites, offsets)
     assert found.dtype == np.int32
     other = 0
-    for s, site in enumerate(sites.tolist()):
-        i, j = site // width // spacing, site % width // spacing
+    for s in sites.tolist():
+        i, j = divmod(s, grid.cols)
         for k, r in enumerate(plain.neighbours(i, j, order, grid.rows, grid.cols, torus)):
             expected = -1
             if r is not None:
                 apart = tiles_of(grid, *r) != tiles_of(grid, i, j)
-                expected = (r[0] * width + r[1]) * spacing + (height * width if apart else 0)
+                expected = r[0] * grid.cols + r[1] + (grid.size if apart else 0)
                 other += apart
             assert found[k, s] == expected
     assert other, "some neighbour is in another tile"
-    assert np.array_equal(np.where(found >= grid.plane, found - grid.plane, found), bare)
+    assert np.array_equal(np.where(found >= grid.size, found - grid.size, found), bare)
 
 
 def tiled(seed, tile, **options):
@@ -319,7 +317,7 @@ TILED = [
 def test_a_neighbourhood_reads_the_older_picture_across_an_edge(options):
     p, now, old = tiled(1, **options)
     _, values, confidence, *_ = near(p.sites, p.field, p.offsets, p.grid, p.confidences)
-    spacing, grid = p.grid.spacing, p.grid
+    spacing, grid = p.grid.step, p.grid
     for s, (row, col) in enumerate(p.where()):
         i, j = row // spacing, col // spacing
         for k, r in enumerate(plain.neighbours(i, j, p.order, grid.rows, grid.cols, grid.torus)):
@@ -327,10 +325,8 @@ def test_a_neighbourhood_reads_the_older_picture_across_an_edge(options):
                 assert not confidence[k, 0, s]
                 continue
             seen = now if tiles_of(grid, i, j) == tiles_of(grid, *r) else old
-            here = r[0] * spacing, r[1] * spacing
-            u = 1 - seen.temperature[here] / 1024
-            assert confidence[k, 0, s] == u
-            assert np.array_equal(values[k, :, s], seen.values[(slice(None), *here)])
+            assert confidence[k, 0, s] == 1 - seen.temperature[r] / 1024
+            assert np.array_equal(values[k, :, s], seen.values[(slice(None), *r)])
 
 
 @pytest.mark.parametrize("exact", [False, True], ids=["list", "exact"])

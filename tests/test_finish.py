@@ -112,7 +112,7 @@ def test_a_device_has_the_references_bits_on_any_rows(machine, p, rows, torus):
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int8, np.float32, np.float64])
 def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
     pixels = texture((20, 22), 2, dtype, 1)
-    sample, grid = Sample(pixels, 8, 3), Grid(9, 10, 1, False)
+    sample, grid = Sample(pixels, 8, 3), Grid.of((9, 10), 1, False)
     row, col = np.indices((9, 10)) + sample.margin + 4
     source = (row * sample.cols + col).astype(np.int32)
     for m in (REFERENCE, machine):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from plain_sample import stand_ins as plainly
 
 import simdtex
-from simdtex.model.given import MOST_NEAR, Given, around, planes, stand_ins
+from simdtex.model.given import MOST_NEAR, Given, nearest_data, planes, stand_ins
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.schedules import SCHEDULES
@@ -91,7 +91,7 @@ def test_all_is_known_but_one_site(schedule, search, site):
 @settings(max_examples=60)
 def test_stand_ins_are_those_of_plain_loops(rows, cols, spacing, torus, share, seed):
     known = np.random.default_rng(seed).random((rows, cols)) < share
-    site, datum = stand_ins(known, Grid(rows, cols, spacing, torus))
+    site, datum = stand_ins(known, Grid.of((rows, cols), spacing, torus))
     expected = sorted((a * cols + b, i * cols + j) for (a, b), (i, j) in plainly(known, spacing, torus).items())
     assert list(zip(site.tolist(), datum.tolist(), strict=True)) == expected
 
@@ -100,7 +100,7 @@ def standing(torus, spacing, *data, shape=(9, 10)):
     known = np.zeros(shape, bool)
     for at in data:
         known[at] = True
-    site, datum = stand_ins(known, Grid(*shape, spacing, torus))
+    site, datum = stand_ins(known, Grid.of(shape, spacing, torus))
     return {divmod(int(s), shape[1]): divmod(int(d), shape[1]) for s, d in zip(site, datum, strict=True)}
 
 
@@ -291,33 +291,33 @@ def test_proportions_are_about_kept():
 def near(place, grid, order):
     """{site: [(number of the datum, offset)]} of the data near the sites of a lattice."""
     found = {}
-    for site, datum, apart in zip(*(one.tolist() for one in around(np.array(place), grid, order)), strict=True):
+    for site, datum, apart in zip(*(one.tolist() for one in nearest_data(np.array(place), grid, order)), strict=True):
         found.setdefault(site, []).append((datum, tuple(apart)))
     return found
 
 
 def test_a_site_is_compared_with_the_data_that_its_neighbourhood_reaches():
-    found = near([(5, 6)], Grid(16, 16, 4), 1)
-    assert found == {68: [(0, (1, 2))], 72: [(0, (1, -2))], 132: [(0, (-3, 2))], 136: [(0, (-3, -2))]}
-    assert near([(13, 6)], Grid(16, 16, 4), 1)[4] == [(0, (-3, 2))], "around the seam"
-    assert 4 not in near([(13, 6)], Grid(16, 16, 4, False), 1), "but of no open lattice"
-    far = [one for those in near([(5, 6)], Grid(64, 64, 2), 18).values() for _, one in those]
+    found = near([(5, 6)], Grid.of((16, 16), 4), 1)
+    assert found == {5: [(0, (1, 2))], 6: [(0, (1, -2))], 9: [(0, (-3, 2))], 10: [(0, (-3, -2))]}
+    assert near([(13, 6)], Grid.of((16, 16), 4), 1)[1] == [(0, (-3, 2))], "around the seam"
+    assert 1 not in near([(13, 6)], Grid.of((16, 16), 4, False), 1), "but of no open lattice"
+    far = [one for those in near([(5, 6)], Grid.of((64, 64), 2), 18).values() for _, one in those]
     assert np.abs(far).max() == 8, "no farther along rows and columns than the neighbourhood, whatever its order"
 
 
 def test_of_many_data_the_nearest_count():
     place = [(20, 20 + k) for k in range(1, 24)]
-    here = near(place, Grid(64, 64, 8, False), 18)[16 * 64 + 16]
+    here = near(place, Grid.of((64, 64), 8, False), 18)[2 * 8 + 2]
     assert [datum for datum, _ in here] == list(range(MOST_NEAR))
-    other = near(place[::-1], Grid(64, 64, 8, False), 18)[16 * 64 + 16]
+    other = near(place[::-1], Grid.of((64, 64), 8, False), 18)[2 * 8 + 2]
     assert [datum for datum, _ in other] == list(range(22, 22 - MOST_NEAR, -1))
 
 
 @pytest.mark.parametrize("torus", [True, False])
 def test_a_window_has_the_data_of_the_whole(torus):
-    rng, grid = np.random.default_rng(2), Grid(40, 48, 4, torus)
+    rng, grid = np.random.default_rng(2), Grid.of((40, 48), 4, torus)
     place = rng.integers(0, 40, (30, 2))
     whole, window = near(place, grid, 8), grid.window(7 if torus else 4, 9 if torus else 6, 6, 5)
-    rows, cols = (window.within.top + np.arange(6)) % 10, (window.within.left + np.arange(5)) % 12
-    expected = {a * 5 + b: whole.get(i * 4 * 48 + j * 4, []) for a, i in enumerate(rows) for b, j in enumerate(cols)}
+    rows, cols = window.lines()
+    expected = {a * 5 + b: whole.get(i * 12 + j, []) for a, i in enumerate(rows) for b, j in enumerate(cols)}
     assert near(place, window, 8) == {site: data for site, data in expected.items() if data}

@@ -33,8 +33,8 @@ def counted(p):
     counts = np.zeros((p.sites.size, GREYS), np.uint32)
     y = p.padded()
     for s, site in enumerate(p.where()):
-        for position in plain.whole_positions(y[0].shape, p.order, p.grid.spacing):
-            d = plain.distance(p.image(), p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus)
+        for position in plain.whole_positions(y[0].shape, p.order, p.grid.step):
+            d = plain.distance(p.image(), p.temperature(), site, y, position, p.order, p.grid.step, p.grid.torus)
             counts[s, y[0][position]] += d == 0
     return counts
 

@@ -72,10 +72,10 @@ EXACT = ["coloring", "coloring-fixed", "luby", "checkerboard", "raster", "random
 def problem(seed=0, shape=(6, 5), torus=True, tile=None, temperatures=(1.5, 3.0), seeds=3, count=None):
     """Spins of chains, some sites of the lattice, and the chances."""
     rng = np.random.default_rng(seed)
-    grid = Grid(*shape, torus=torus, tile=tile)
+    grid = Grid.of(shape, torus=torus, tile=tile)
     rows = 2 * shape[0] if tile else shape[0]
     spins = rng.integers(0, 2, (len(temperatures) * seeds, rows, shape[1]), dtype=np.uint8)
-    sites = rng.permutation(grid.sites())[:count].astype(np.int32)
+    sites = rng.permutation(np.arange(grid.size, dtype=np.int32))[:count].astype(np.int32)
     return grid, spins, sites, heat_bath_chances(temperatures, len(OFFSETS))
 
 
@@ -107,7 +107,7 @@ def check_formula(p, seed=7, key=3):
     """Against a loop over chains, sites and neighbours, and floating-point probabilities."""
     grid, spins, sites, chances = p
     drawn, after = relaxed(REFERENCE, *p)
-    expected, (h, w) = spins.copy(), (grid.height, grid.width)
+    expected, (h, w) = spins.copy(), grid.shape
     for chain in range(len(spins)):
         temperature = {1: (2.0,), 2: (1.5, 3.0), 3: (0.5, 2.3, 40.0)}[len(chances)][chain * len(chances) // len(spins)]
         for s, site in enumerate(sites):
@@ -216,7 +216,7 @@ class Turns:
         return False
 
     def init(self, setting):
-        return setting.grid.sites(), 0
+        return np.arange(setting.grid.size, dtype=np.int32), 0
 
     def step(self, setting, state, active):
         sites, count = state
@@ -229,11 +229,13 @@ def test_single_sites_and_steps_of_many_keep_their_order(machine):
     for m in (machine, REFERENCE):
         run = ising(m, (4, 4), [2.0], Turns(), seeds=2, sweeps=4, burn_in=0, start="random")
         spins = ising(m, (4, 4), [2.0], Turns(), seeds=2, sweeps=1, burn_in=0, start="random").spins[0]
-        grid, chances = Grid(4, 4), heat_bath_chances([2.0], 4)
+        grid, chances = Grid((4, 4)), heat_bath_chances([2.0], 4)
         bits = random.draw4(1, 0, 0, np.arange(16), random.START, np.arange(2)[:, None])[0]
         expected = (bits >> 31).astype(np.uint8).reshape(2, 4, 4)
         for key, part in enumerate((slice(0, 1), slice(1, -1), slice(-1, None))):
-            expected = relaxed(REFERENCE, grid, expected, grid.sites()[part], chances, seed=1, key=key)[1]
+            expected = relaxed(
+                REFERENCE, grid, expected, np.arange(grid.size, dtype=np.int32)[part], chances, seed=1, key=key
+            )[1]
         assert_same_bits(spins, expected)
         assert run.energy.shape == (1, 2, 4)
 

@@ -39,34 +39,32 @@ spacings = st.sampled_from([1, 2, 4, 8])
 
 @given(sizes, sizes, spacings)
 def test_the_sites_of_a_grid(height, width, spacing):
-    grid = Grid(height, width, spacing)
+    grid = Grid.of((height, width), spacing)
     assert (grid.rows, grid.cols) == plain.grid_size((height, width), spacing)
     rows, cols = range(0, height, spacing), range(0, width, spacing)
-    assert grid.sites().tolist() == [i * width + j for i in rows for j in cols]
-    assert grid.sites().dtype == np.int32
+    assert grid.places(np.arange(grid.size)).tolist() == [i * width + j for i in rows for j in cols]
     picture = np.arange(height * width).reshape(height, width)
-    assert np.array_equal(grid.view(picture).ravel(), grid.sites())
-    assert grid.view(np.stack([picture] * 3)).shape == (3, grid.rows, grid.cols)
-    assert grid.plane == picture.size
+    assert np.array_equal(grid.decimated(picture).ravel(), grid.places(np.arange(grid.size)))
+    assert grid.decimated(np.stack([picture] * 3)).shape == (3, grid.rows, grid.cols)
 
 
 @given(sizes, sizes, spacings, st.integers(1, 13), st.booleans())
 def test_the_neighbours_of_every_site(height, width, spacing, order, torus):
-    grid = Grid(height, width, spacing, torus)
-    ours = grid.neighbours(grid.sites(), neighbourhood_offsets(order))
+    grid = Grid.of((height, width), spacing, torus)
+    ours = grid.neighbours(np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order))
     assert ours.dtype == np.int32
-    for site, column in zip(grid.sites().tolist(), ours.T.tolist(), strict=True):
-        i, j = site // width // spacing, site % width // spacing
+    for site, column in enumerate(ours.T.tolist()):
+        i, j = divmod(site, grid.cols)
         near = plain.neighbours(i, j, order, grid.rows, grid.cols, torus)
-        assert column == [-1 if r is None else (r[0] * width + r[1]) * spacing for r in near]
+        assert column == [-1 if r is None else r[0] * grid.cols + r[1] for r in near]
 
 
 def test_what_a_kernel_is_told():
-    picture, volume = Grid(7, 9, 2, False), Grid.of((5, 7, 9), 2, False)
-    assert picture.struct.tolist() == (4, 5, 2, 9, 0, 0, 0, 0, 63, 0, 0, 4, 5, 2, 9, 1, 4, 7)
-    assert volume.struct.tolist() == (12, 5, 2, 9, 0, 0, 0, 0, 315, 0, 0, 4, 5, 2, 9, 3, 4, 7)
-    window = Grid(20, 30, 2, True, (3, 4)).window(-2, 7, 10, 6)
-    assert window.struct.tolist() == (10, 6, 1, 6, 1, 0, 0, 0, 60, 8, 7, 10, 15, 2, 30, 1, 10, 10)
+    picture, volume = Grid.of((7, 9), 2, False), Grid.of((5, 7, 9), 2, False)
+    assert picture.struct.tolist() == (1, 4, 5, 0, 0, 0, 0, 0, 0, 1, 4, 5, 2, 7, 9, 0, 0, 20)
+    assert volume.struct.tolist() == (3, 4, 5, 0, 0, 0, 0, 0, 0, 3, 4, 5, 2, 7, 9, 0, 0, 60)
+    window = Grid.of((20, 30), 2, True, (3, 4)).window(-2, 7, 10, 6)
+    assert window.struct.tolist() == (1, 10, 6, 0, 1, 0, 0, 8, 7, 1, 10, 15, 2, 20, 30, 0, 0, 60)
 
 
 def vectors(pattern, reach=12):

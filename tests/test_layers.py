@@ -23,8 +23,8 @@ from simdtex.cli import main
 from simdtex.experiments.ensemble import connectivity
 from simdtex.io import volume
 from simdtex.methods import mrf
-from simdtex.model.given import around, between
-from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of, sums_around
+from simdtex.model.given import between, nearest_data
+from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, sums_around
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.sites import coloring
@@ -57,8 +57,8 @@ def simulated(training=None, **options):
 @pytest.mark.parametrize("order", [1, 2, 3, 5, 8, 12])
 def test_the_neighbourhood_is_a_ball(order):
     found = neighbourhood_offsets(order, 3)
-    assert list(zip(*(part.tolist() for part in parts_of(found)), strict=True)) == ball(order)
-    assert parts_of(neighbourhood_offsets(order))[0].tolist() == [0] * len(neighbourhood_offsets(order))
+    assert found.dtype == np.int32 and list(map(tuple, found.tolist())) == ball(order)
+    assert neighbourhood_offsets(order).tolist() == [list(one[1:]) for one in ball(order) if not one[0]]
 
 
 @pytest.mark.parametrize(("order", "spacing"), CASES)
@@ -66,15 +66,16 @@ def test_sites_and_neighbours_are_those_of_plain_loops(order, spacing):
     grid = Grid.of(SHAPE, spacing, False)
     sides = [range(0, n, spacing) for n in SHAPE]
     sites = [np.ravel_multi_index(at, SHAPE) for at in product(*sides)]
-    assert grid.sites().tolist() == sites and grid.size == len(sites)
-    assert grid.places(grid.sites()).tolist() == sites
+    assert grid.size == len(sites)
+    assert grid.places(np.arange(grid.size, dtype=np.int32)).tolist() == sites
     marked = np.arange(np.prod(SHAPE)).reshape(SHAPE)
-    assert grid.view(marked).ravel().tolist() == sites
-    found = grid.neighbours(grid.sites(), neighbourhood_offsets(order, 3))
+    assert grid.decimated(marked).ravel().tolist() == sites
+    found = grid.neighbours(np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order, 3))
     for at, column in zip(product(*sides), found.T.tolist(), strict=True):
         there = [tuple(n + spacing * by for n, by in zip(at, offset, strict=True)) for offset in ball(order)]
         inside = [all(0 <= n < side for n, side in zip(one, SHAPE, strict=True)) for one in there]
-        assert column == [int(marked[one]) if yes else -1 for one, yes in zip(there, inside, strict=True)]
+        wanted = [sites.index(marked[one]) if yes else -1 for one, yes in zip(there, inside, strict=True)]
+        assert column == wanted
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 8, 9])
@@ -82,7 +83,7 @@ def test_no_neighbours_share_a_colour(order):
     grid = Grid.of((5, 9, 11), 1, False)
     colors = coloring(grid, order)
     assert colors.shape == grid.shape and set(colors.ravel()) <= set(range(coloring_of_layers(order)[0]))
-    near = grid.neighbours(grid.sites(), neighbourhood_offsets(order, 3))
+    near = grid.neighbours(np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order, 3))
     same = colors.ravel()[near] == colors.ravel()[None, :]
     assert not (same & (near >= 0)).any()
 
@@ -118,8 +119,7 @@ def test_candidates_and_their_neighbours_are_those_of_plain_loops(spacing, phase
         row, col = divmod(number, square.cols)
         first = square.at[row * square.cols + col % square.runs]
         assert square.at[number] == first + col // square.runs, "every `runs`-th of a row is side by side"
-        layer, line, column = parts_of(offsets)
-        there = square.at[number] + layer * square.deep + line * square.down + column
+        there = square.at[number] + offsets @ [square.layer_stride, square.row_stride, 1]
         assert square.levels[0, there].tolist() == near
 
 
@@ -146,15 +146,15 @@ def test_data_between_sites_are_those_of_plain_loops(order, spacing):
             wanted.append(list(at))
     place = between(known, grid)
     assert place.tolist() == wanted and wanted
-    site, datum, apart = around(place, grid, order)
+    site, datum, apart = nearest_data(place, grid, order)
     found = {}
     for one, number, by in zip(site.tolist(), datum.tolist(), apart.tolist(), strict=True):
         found.setdefault(one, []).append((number, tuple(by)))
-    for at in product(*(range(0, n, spacing) for n in SHAPE)):
+    for number, at in enumerate(product(*(range(0, n, spacing) for n in SHAPE))):
         by = [tuple(a - b for a, b in zip(one, at, strict=True)) for one in wanted]
         far = [max(map(abs, o)) > isqrt(order) * spacing or sum(n * n for n in o) > order * spacing**2 for o in by]
         near = sorted((sum(n * n for n in o), k, o) for k, (o, no) in enumerate(zip(by, far, strict=True)) if not no)
-        assert found.get(int(np.ravel_multi_index(at, SHAPE)), []) == [(k, o) for _, k, o in near[:8]]
+        assert found.get(number, []) == [(k, o) for _, k, o in near[:8]]
 
 
 def data(shape=(8, 14, 15), share=0.03):

@@ -17,7 +17,7 @@ def plain_distances(p):
     x, t, y = p.image(), p.temperature(), p.padded()
     return np.array(
         [
-            [plain.distance(x, t, site, y, position, p.order, p.grid.spacing, p.grid.torus) for site in p.where()]
+            [plain.distance(x, t, site, y, position, p.order, p.grid.step, p.grid.torus) for site in p.where()]
             for position in p.positions()
         ]
     )
@@ -191,11 +191,11 @@ def draw_many(p, win, density, strength=0.0):
 def reweighted(p, strength):
     """d_p at the problem's first site, divided by 1 + coherence where the candidate continues a neighbour."""
     site, t = p.where()[0], p.field.temperature
-    continuing = plain.coherent(p.source(), t, site, p.order, p.grid.spacing, p.grid.torus) if strength else ()
+    continuing = plain.coherent(p.source(), t, site, p.order, p.grid.step, p.grid.torus) if strength else ()
     x, y = p.image(), p.padded()
     found = []
     for position in p.positions():
-        d = plain.distance(x, p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus)
+        d = plain.distance(x, p.temperature(), site, y, position, p.order, p.grid.step, p.grid.torus)
         found.append(d / (1 + strength) if position in continuing else d)
     return np.array(found)
 

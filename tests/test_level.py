@@ -14,7 +14,7 @@ import simdtex
 from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_source
 from simdtex.methods import mrf
-from simdtex.methods.mrf.algorithm import opened, sweep
+from simdtex.methods.mrf.algorithm import first_state, sweep
 from simdtex.methods.mrf.level import parts
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.ops.neighbourhood import Field
@@ -60,7 +60,7 @@ def test_a_struct_names_its_numbers_as_the_header_does():
 
 
 def test_what_a_kernel_is_told_of_a_level():
-    told = constants(Grid(5, 7, 2), seed=2**63, discount=0.5, xi=-1024)
+    told = constants(Grid.of((5, 7), 2), seed=2**63, discount=0.5, xi=-1024)
     assert (told["lattice"]["rows"], told["lattice"]["cols"]) == (3, 4)
     assert (told["seed"], told["discount"], told["xi"], told["radius"]) == (2**63, np.float32(0.5), -1024, 0)
 
@@ -114,7 +114,7 @@ def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, se
 def test_a_state_tells_what_is_left():
     run = prepared(REFERENCE)
     for level, state, info in sweeps(run):
-        t = level.grid.view(state.temperature)
+        t = level.grid.latest(state.temperature)
         assert (state.active, state.temperature_sum) == ((t > 0).sum(), t.sum(dtype=int))
         assert info.sweep == state.cooling + state.free
         assert info.ended == (not state.active and state.free == run.options.free_sweeps)
@@ -135,10 +135,10 @@ def test_sites_that_may_not_relax_keep_their_values(any_device, schedule):
     for machine in (REFERENCE, opencl(any_device)):
         run = prepared(machine, schedule=schedule)
         given = np.random.default_rng(2).random(run.plan.shape) < 0.3
-        before = Field(*(np.array(machine.get(plane)) for plane in run.begin().field))
+        before = Field(*(np.array(machine.get(plane)) for plane in run.enter(0, None).field))
         before = before._replace(temperature=np.where(given, 0, before.temperature).astype(np.uint16))
         level = replace(run.level(0), movable=machine.put((~given).astype(np.uint16)))
-        state = opened(level, Field(*map(machine.put, before)))
+        state = first_state(level, Field(*map(machine.put, before)))
         while state.active:
             state, _ = sweep(level, state)
         state, free = sweep(level, state)

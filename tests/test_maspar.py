@@ -185,33 +185,33 @@ lattices = given(
 
 @lattices
 def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, order, spacing):
-    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
+    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     offsets, radius, number = neighbourhood_offsets(order), 4, 1 + np.arange(shape[0] * shape[1]).reshape(shape)
     walk, x, found = Walk(mp1, grid, offsets), filled(mp1, number), np.zeros((len(offsets), grid.rows, grid.cols), int)
     for k, there in walk.neighbours(x):
         kept = mp1.plural()
         kept.set(there)
-        found[k] = grid.view(seen(kept))
-    around = np.pad(grid.view(number), radius, mode="wrap" if torus else "constant")
+        found[k] = grid.decimated(seen(kept))
+    around = np.pad(grid.decimated(number), radius, mode="wrap" if torus else "constant")
     for (down, right), got in zip(offsets.tolist(), found, strict=True):
         itself = torus and not (down % grid.rows or right % grid.cols)
         wanted = around[radius + down :, radius + right :][: grid.rows, : grid.cols]
         assert (got == wanted * (not itself)).all()
-    assert (grid.view(seen(walk.members)) == np.maximum((found > 0).sum(0), 1)).all()
+    assert (grid.decimated(seen(walk.members)) == np.maximum((found > 0).sum(0), 1)).all()
 
 
 @lattices
 def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, torus, order, spacing):
-    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid(*shape, spacing, torus)
+    mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 5)
     wanted = engine(grid, order, 5)
-    assert (grid.view(seen(color)) == wanted).all()
+    assert (grid.decimated(seen(color)) == wanted).all()
     assert count == wanted.max() + 1
 
 
 def test_colours_beyond_a_word_and_on_a_device(machine):
     for each, shape, order in ((machine, (13, 11), 8), (REFERENCE, (17, 19), 32)):
-        mp1, grid = MP1(each, ProcessorArray(8, 8), shape), Grid(*shape)
+        mp1, grid = MP1(each, ProcessorArray(8, 8), shape), Grid(shape)
         color, _ = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 7)
         assert (seen(color) == engine(grid, order, 7)).all()
 

@@ -72,7 +72,7 @@ def test_the_program_has_the_same_bytes_on_devices(machine, name):
 
 def test_distances_are_summed_lane_by_lane_and_row_by_row(machine):
     """Of one candidate, whose distance is the least: the order of the sum is seen in its bits, seldom in a picture."""
-    rng, grid, offsets = np.random.default_rng(1), Grid(8, 8), neighbourhood_offsets(18)
+    rng, grid, offsets = np.random.default_rng(1), Grid((8, 8)), neighbourhood_offsets(18)
     offsets = offsets[by_lane(offsets)]
     sample, x, t = rng.integers(0, 256, len(offsets)), rng.integers(0, 256, (8, 8)), rng.integers(0, 1024, (8, 8))
     lanes = np.zeros((16, 8, 8), np.float32)
@@ -107,7 +107,7 @@ def test_of_tied_modes_the_lowest_is_taken(machine, make):
 @pytest.mark.parametrize("density", [True, False])
 def test_a_pass_takes_the_memory_that_it_uses(draws, density):
     """A mode has a sum of 64 bits for each grey level; nothing grows with the number of candidates."""
-    grid, choice = Grid(4, 4), Choice(draws, density, window(1.0, 255))
+    grid, choice = Grid((4, 4)), Choice(draws, density, window(1.0, 255))
     mp1 = MP1(REFERENCE, ProcessorArray(4, 4), (4, 4), 2**20)
     program = Program(mp1, Problem(np.zeros((2, 1), np.int32), neighbourhood_offsets(1), 1, -1, 0))
     walk = Walk(mp1, grid, neighbourhood_offsets(1))
@@ -149,10 +149,10 @@ def test_the_steps_show_which_elements_relax():
     active = [step.active for step in output.steps]
     assert active[0].shape == (9, 4, 5)
     assert sum(one.sum() for one in active) == sum(level["relaxations"] for level in engine.statistics["levels"])
-    grid = Grid(11, 13)
+    grid = Grid((11, 13))
     padded = np.array([one.reshape(3, 3, 4, 5).swapaxes(1, 2).reshape(12, 15)[:11, :13] for one in active])
     for step, one in zip(output.steps, padded, strict=True):
-        grid = Grid(11, 13, 2**step.level)
+        grid = Grid.of((11, 13), 2**step.level)
         sites = np.flatnonzero(one).astype(np.int32)
         assert neighbours_in(grid, neighbourhood_offsets(2), sites) is None
 

@@ -176,8 +176,7 @@ def test_a_window_of_a_level():
     whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
     assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
     assert (window.evaluations.shape, window.evaluations.dtype, window.evaluations.any()) == ((4, 5), np.int32, False)
-    assert whole.evaluations is run.evaluations
-    assert (run.evaluations.shape, run.evaluations.dtype, run.evaluations.any()) == ((20, 23), np.int32, False)
+    assert whole.evaluations.shape == run.grid(1).shape
 
 
 def test_a_level_with_few_candidates_evaluates_them_all(monkeypatch):

@@ -154,7 +154,7 @@ def test_what_does_not_fit_is_left_alone_or_refused():
 
 def guide_of(lattice, height=100.0, shape=(24, 30)):
     """The levels of a guide whose sample and output have one lattice, and its lattice."""
-    return regularity.Waves((lattice,), lattice, 1.0, height), Grid(*shape, torus=False)
+    return regularity.Waves((lattice,), lattice, 1.0, height), Grid.of(shape, torus=False)
 
 
 def test_pixels_a_lattice_vector_apart_have_one_phase():
@@ -169,8 +169,8 @@ def test_pixels_a_lattice_vector_apart_have_one_phase():
 def test_a_window_and_a_coarse_level_have_the_phases_of_the_whole():
     waves, grid = guide_of(Lattice((6.3, 3), (-2, 8.2)))
     levels = waves.at(grid)
-    assert (waves.at(Grid(24, 30, 4, False)) == levels[:, ::4, ::4]).all()
-    torus = Grid(24, 30, 2)
+    assert (waves.at(Grid.of((24, 30), 4, False)) == levels[:, ::4, ::4]).all()
+    torus = Grid.of((24, 30), 2)
     window = torus.window(9, 13, 6, 4)
     rows, cols = np.arange(9, 15) % 12 * 2, np.arange(13, 17) % 15 * 2
     assert (waves.at(window) == levels[:, rows[:, None], cols]).all()

@@ -31,14 +31,14 @@ def apart(machine, p, turn=3, **how):
 
 def suggestions(p, site):
     """Sample positions that the nearest neighbours suggest, each once, in the neighbours' order."""
-    i, j = site[0] // p.grid.spacing, site[1] // p.grid.spacing
+    i, j = site[0] // p.grid.step, site[1] // p.grid.step
     near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
     found = []
     for (di, dj), r in list(zip(plain.offsets(p.order), near, strict=True))[:SUGGESTING]:
-        if r is None or p.field.temperature[r[0] * p.grid.spacing, r[1] * p.grid.spacing] >= 1024:
+        if r is None or p.field.temperature[r[0] * p.grid.step, r[1] * p.grid.step] >= 1024:
             continue
-        row, col = p.source()[r[0] * p.grid.spacing, r[1] * p.grid.spacing]
-        position = (int(row) - di * p.grid.spacing, int(col) - dj * p.grid.spacing)
+        row, col = p.source()[r[0] * p.grid.step, r[1] * p.grid.step]
+        position = (int(row) - di * p.grid.step, int(col) - dj * p.grid.step)
         if position in p.positions() and position not in found:
             found.append(position)
     return found
@@ -289,7 +289,7 @@ def test_the_order_in_which_neighbours_are_looked_at(order):
     place = np.stack(np.divmod(square.looks[:, 0], columns), 1) - radius
     assert sorted(map(tuple, place)) == sorted([(0, 0), *map(tuple, offsets)])
     assert place[-1].tolist() == [0, 0]
-    assert square.looks[:, 1].tolist() == (place @ [square.down, 1]).tolist()
+    assert square.looks[:, 1].tolist() == (place @ [square.row_stride, 1]).tolist()
     if order >= 8:
         gaps = [abs(a - b).sum() for i, a in enumerate(place[:4]) for b in place[:i]]
         assert min(gaps) >= radius, "the first are far apart"
@@ -303,8 +303,8 @@ def alike(p):
     """The problem with so many sites, all of the first one's values, source and temperature."""
     first = [np.ascontiguousarray(plane[..., :1, :1]) for plane in p.field]
     field = Field(*(np.tile(plane, (1,) * (plane.ndim - 2) + (DRAWS, DRAWS)) for plane in first))
-    grid = Grid(DRAWS, DRAWS)
-    return p._replace(grid=grid, field=field, sites=grid.sites())
+    grid = Grid((DRAWS, DRAWS))
+    return p._replace(grid=grid, field=field, sites=np.arange(grid.size, dtype=np.int32))
 
 
 @pytest.mark.parametrize("coherence", [0.0, 1.0])

@@ -161,7 +161,7 @@ def test_the_schedule_of_the_page_works(machine):
     for relaxation in ("icm", "gibbs"):
         ours = run(schedules.Checked(wavefront), relaxation, (9, 11), machine, boundary="open")
         assert_same_bits(ours, run("raster", relaxation, (9, 11), boundary="open"))
-    grid = Grid(6, 8, 1, False)
+    grid = Grid.of((6, 8), 1, False)
     state = wavefront.init(setting(grid))
     _, info = wavefront.step(setting(grid), state, Masked(grid))
     assert len(info.ranges) == 5 * 2 + 8

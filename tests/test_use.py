@@ -15,12 +15,10 @@ from simdtex.ops.use import FairUse, use, use_penalty
 @settings(max_examples=20)
 def test_known_sites_are_counted_at_their_sources(machine, p):
     expected = dict.fromkeys(p.positions(), 0)
-    source = p.source()
-    for i in range(0, p.grid.height, p.grid.spacing):
-        for j in range(0, p.grid.width, p.grid.spacing):
-            place = tuple(int(n) for n in source[i, j])
-            if p.field.temperature[i, j] < 1024 and place in expected:
-                expected[place] += 1
+    for source, t in zip(p.field.source.ravel().tolist(), p.field.temperature.ravel().tolist(), strict=True):
+        place = divmod(source, p.sample.cols)
+        if t < 1024 and place in expected:
+            expected[place] += 1
     for m in (REFERENCE, machine):
         _, field, _ = p.on(m)
         found = use(m, field, p.grid, p.candidates(m))
@@ -46,10 +44,7 @@ def test_what_is_from_nowhere_uses_nothing(machine, how, every):
     p = problem(2, shape=(30, 28), edges="reflect", **how)
     candidates = p.candidates(REFERENCE, every)
     expected = dict.fromkeys(candidates.positions[: candidates.size].tolist(), 0)
-    view = p.grid.view
-    for source, t in zip(
-        view(p.field.source).ravel().tolist(), view(p.field.temperature).ravel().tolist(), strict=True
-    ):
+    for source, t in zip(p.field.source.ravel().tolist(), p.field.temperature.ravel().tolist(), strict=True):
         if t < 1024 and source >= 0 and p.sample.inside.ravel()[source]:
             expected[source] += 1
     assert sum(expected.values())

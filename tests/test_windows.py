@@ -9,7 +9,7 @@ import simdtex
 from simdtex import random
 from simdtex.methods import mrf
 from simdtex.methods.mrf import replay as module
-from simdtex.methods.mrf.algorithm import opened, sweep
+from simdtex.methods.mrf.algorithm import first_state, sweep
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.start import start
@@ -30,9 +30,9 @@ def test_these_schedules_claim_windows():
     assert WINDOWS == ["coloring", "coloring-fixed", "checkerboard", "synchronous"]
 
 
-def cut(saved, grid, window):
+def cut(saved, window):
     """The part that a window holds of a whole's saved state."""
-    return [np.ascontiguousarray(window.cut(grid.view(saved[name]))) for name in Field._fields]
+    return [np.ascontiguousarray(window.cut(saved[name])) for name in Field._fields]
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
@@ -46,7 +46,7 @@ def test_a_window_relaxes_as_the_whole(any_device, name, number, how, boundary):
     shape = (26 << number, (31 << number) - number)  # the last column of the coarse lattice is a pixel short
     run = laid_out(machine, texture((40, 41), seed=2)[..., None], shape, mrf.Options(**given), 2**40 + 9)
     level = run.level(number)
-    state, compared = run.enter(number, run.begin().field), 0
+    state, compared = run.enter(number, None), 0
     for done in range(4):
         state = state._replace(active=0) if done == 3 else state  # a free sweep
         before = run.save(state)
@@ -59,12 +59,12 @@ def test_a_window_relaxes_as_the_whole(any_device, name, number, how, boundary):
                 top, left = min(top, grid.rows - rows), min(max(0, left), grid.cols - cols)
             small = run.level(number, (top, left, rows, cols))
             window = small.setting.grid
-            inner = opened(small, Field(*map(machine.put, cut(before, run.grid(number), window))))
+            inner = first_state(small, Field(*map(machine.put, cut(before, window))))
             inner = inner._replace(penalty=before["penalty"], active=before["active"])  # those of the whole
             inner = inner._replace(schedule=inner.schedule._replace(sweep=before["schedule"].sweep))
             inner, _ = sweep(small, inner)
             ours = [np.array(machine.get(plane)) for plane in inner.field]
-            theirs = cut(run.save(state), run.grid(number), window)
+            theirs = cut(run.save(state), window)
             inside = slice(halo, rows - halo), slice(halo, cols - halo)
             for mine, whole in zip(ours, theirs, strict=True):
                 assert_same_bits(mine[..., *inside].copy(), whole[..., *inside].copy())
@@ -77,26 +77,31 @@ def test_a_window_begins_as_the_whole(request, machine_):
     machine = REFERENCE if machine_ == "reference" else opencl(request.getfixturevalue("any_device"))
     run = laid_out(machine, texture((12, 13))[..., None], (22, 27), mrf.Options(order=2, levels=2), 3)
     everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-    whole = [np.array(machine.get(plane)) for plane in run.begin().field]
     for number in (0, 1):
         grid = run.grid(number)
+        whole = [np.array(machine.get(plane)) for plane in run.enter(number, None).field]
         window = grid.window(-3, 5, 8, 6)
         ours = [machine.get(a) for a in start(machine, run.planes, everywhere, window, run.seed)]
-        assert_same_bits(ours, [np.ascontiguousarray(window.cut(grid.view(a))) for a in whole])
+        assert_same_bits(ours, [np.ascontiguousarray(window.cut(a)) for a in whole])
 
 
 def test_a_window_of_a_window_lies_where_it_should():
-    grid = Grid(40, 50, 2)
+    grid = Grid.of((40, 50), 2)
     outer = grid.window(15, -4, 12, 9)
     inner = outer.window(3, 2, 4, 5)
-    assert inner.within == grid.window(18, -2, 4, 5).within
-    assert inner.whole.within == grid.window(0, 0, 20, 25).within
-    assert_same_bits(inner.places(inner.sites()), inner.cut(grid.sites().reshape(20, 25)).ravel().astype(np.int64))
+    assert inner == grid.window(18, -2, 4, 5)
+    assert inner.whole == grid
+    places = grid.places(np.arange(grid.size)).reshape(grid.shape)
+    assert_same_bits(inner.places(np.arange(inner.size)), inner.cut(places).ravel())
 
 
 @pytest.mark.parametrize(
     ("grid", "window"),
-    [(Grid(8, 9), (0, 0, 9, 3)), (Grid(8, 9, 1, False), (6, 0, 3, 3)), (Grid(8, 9, 1, False), (-1, 0, 3, 3))],
+    [
+        (Grid((8, 9)), (0, 0, 9, 3)),
+        (Grid.of((8, 9), 1, False), (6, 0, 3, 3)),
+        (Grid.of((8, 9), 1, False), (-1, 0, 3, 3)),
+    ],
     ids=str,
 )
 def test_a_window_that_does_not_fit_is_refused(grid, window):
@@ -106,11 +111,11 @@ def test_a_window_that_does_not_fit_is_refused(grid, window):
 
 def test_places_beyond_32_bits_draw_numbers_of_their_own(machine):
     """The upper bits of a place stand above level and purpose: no two sites of 10^6 x 10^6 share a counter."""
-    vast = Grid(10**6, 10**6)
+    vast = Grid((10**6, 10**6))
     places = []
     for top, left in [(0, 0), (4294, 967296), (999_990, 999_990), (42949, 672960)]:
-        window = Grid(4, 5, part=vast.within._replace(top=top, left=left))
-        found = window.places(window.sites())
+        window = vast.window(top, left, 4, 5)
+        found = window.places(np.arange(window.size))
         places.append(found)
         planes, pixels = machine.put(np.arange(97, dtype=np.float32)[None]), machine.put(np.arange(97, dtype=np.int32))
         ours = machine.get(start(machine, planes, pixels, window, 11).source)

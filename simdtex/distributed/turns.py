@@ -195,10 +195,10 @@ class Turns:
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
         number = turn.number + 1
-        if turn.phase != "whole" and (active or free < lattices.options.free_sweeps):
+        after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
+        if turn.phase != "whole" and not lattices.at_equilibrium(after):
             before = store.penalty(turn) if turn.phase == "sweep" else None
             rate = lattices.options.balance * lattices.typical_distance
-            after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
             return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
         if turn.level:
             return store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1))

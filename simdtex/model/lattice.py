@@ -91,9 +91,11 @@ class Grid:
     tile: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, picture: tuple[int, ...], step: int = 1, torus: bool = True) -> Grid:
+    def of(
+        cls, picture: tuple[int, ...], step: int = 1, torus: bool = True, tile: tuple[int, int] | None = None
+    ) -> Grid:
         """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols), in pixels."""
-        return cls(tuple(-(-side // step) for side in picture), torus, step, tuple(picture))
+        return cls(tuple(-(-side // step) for side in picture), torus, step, tuple(picture), tile=tile)
 
     @property
     def pixels(self) -> tuple[int, ...]:

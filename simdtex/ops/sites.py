@@ -9,6 +9,7 @@ it. A random maximal set of sites without neighbours takes the rounds of Luby (1
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from math import inf
 from typing import NamedTuple
@@ -281,7 +282,7 @@ def luby(
     ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
     priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
-    sites = grid.size
+    grid, sites = replace(grid, tile=None), grid.size
     if machine is None:
         draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)

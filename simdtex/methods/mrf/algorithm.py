@@ -63,10 +63,6 @@ class Run(Lattices):
         number = state.cooling + state.free
         return state, Info(level.number, number, tuple(chosen), self.at_equilibrium(state))
 
-    def at_equilibrium(self, state: State) -> bool:
-        """Return whether all temperatures of the level are 0 and its free sweeps are done."""
-        return not state.active and state.free == self.options.free_sweeps
-
     def ended(self, state: State) -> bool:
         """Return whether the finest level has reached equilibrium."""
         return state.level == 0 and self.at_equilibrium(state)
@@ -104,7 +100,7 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
     """
     machine, grid = level.machine, level.setting.grid
     everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-    field = start(machine, run.planes, everywhere, grid, run.seed, above)
+    field = start(machine, run.planes, everywhere, grid, run.seed, above)  # 2, 5
     return run.conditions.entered(machine, level.number, grid, field)
 
 

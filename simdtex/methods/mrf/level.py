@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import log2, prod, sqrt
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,18 @@ class State(NamedTuple):
     def field(self) -> Field:
         """The arrays over sites."""
         return Field(*self[:3])
+
+
+class Counts(Protocol):
+    """The counts of a state that tell whether its level is at equilibrium."""
+
+    @property
+    def free(self) -> int:
+        """Number of finished free sweeps."""
+
+    @property
+    def active(self) -> int:
+        """Number of active sites."""
 
 
 class Info(NamedTuple):
@@ -246,6 +258,10 @@ class Lattices:
     def typical_distance(self) -> float:
         """N C sigma^2: half of the mean distance between two neighbourhoods."""
         return len(self.offsets) * self.sample.channels * self.sample.variance
+
+    def at_equilibrium(self, state: Counts) -> bool:
+        """Return whether all temperatures of the level are 0 and its free sweeps are done."""
+        return not state.active and state.free == self.options.free_sweeps
 
     def exhaustive(self, number: int) -> bool:
         """Return whether a site of a level evaluates all its candidates."""
