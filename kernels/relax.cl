@@ -216,10 +216,10 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
             if (g.runs == 1) {
                 const int p = run * g.cols + n % wide * V;
                 for (int c = 0; c < WAVES; ++c) {
-                    const vec e = ((float)phases[c * area_ + site] - LOAD(waves + c * listed + p)) * certain_;
+                    const vec e = ((float)phases[c * area_ + site] - LOAD(waves + c * listed + p)) * phase_weight;
                     d[q] = fma(e, e, d[q]);
                 }
-                d[q] = LOAD(penalty + p) + fmax(d[q] - free_, (vec)0.0f);
+                d[q] = LOAD(penalty + p) + fmax(d[q] - tolerance, (vec)0.0f);
             }
         }
         const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;

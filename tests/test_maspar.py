@@ -92,7 +92,7 @@ def test_masks_nest_and_inactive_elements_change_nothing(device):
 @given(SHAPES, SHAPES, st.sampled_from(MAPPINGS), st.integers(1, 4))
 def test_the_x_net_moves_by_pixels_around_the_edges(pes, shape, mapping, distance):
     mp1 = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape)
-    values = np.arange(mp1.layout.padded.plane).reshape(mp1.layout.padded.shape)
+    values = np.arange(mp1.layout.padded.size).reshape(mp1.layout.padded.shape)
     x = filled(mp1, values)
     for down, right in DIRECTIONS:
         got = seen(mp1.xnet(x, down, right, distance))

@@ -121,8 +121,8 @@ def prepared(machine=REFERENCE, **given):
 
 def test_which_sites_are_active():
     level = prepared().level(1)
-    temperature = np.zeros((20, 23), np.uint16)
-    temperature[2, 4], temperature[18, 22], temperature[1, 1] = 1, 1024, 7  # the last is no site of the level
+    temperature = np.zeros((10, 12), np.uint16)
+    temperature[1, 2], temperature[9, 11] = 1, 1024
     active, free = Active(level, temperature, False), Active(level, temperature, True)
     assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
     assert active.numbers().tolist() == [14, 119]

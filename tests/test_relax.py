@@ -35,10 +35,10 @@ def suggestions(p, site):
     near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
     found = []
     for (di, dj), r in list(zip(plain.offsets(p.order), near, strict=True))[:SUGGESTING]:
-        if r is None or p.field.temperature[r[0] * p.grid.step, r[1] * p.grid.step] >= 1024:
+        if r is None or p.field.temperature[r] >= 1024:
             continue
-        row, col = p.source()[r[0] * p.grid.step, r[1] * p.grid.step]
-        position = (int(row) - di * p.grid.step, int(col) - dj * p.grid.step)
+        row, col = divmod(int(p.field.source[r]), p.sample.cols)
+        position = (row - di * p.grid.step, col - dj * p.grid.step)
         if position in p.positions() and position not in found:
             found.append(position)
     return found
@@ -130,11 +130,11 @@ def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
         t, here = p.temperature(), (p.order, spacing, p.grid.torus)
         d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
         d = [a * (discount if position in found else 1) for a, position in zip(d, listed, strict=True)]
-        assert evaluations[site] == len(listed)
+        assert p.in_picture(evaluations)[site] == len(listed)
         best = listed.index(divmod(int(choice[s]), p.sample.cols))
         assert d[best] <= min(d) * (1 + 1e-5)
         assert_same_bits(values[:, s], p.sample.working[:, choice[s]])
-        assert cooled[s] == plain.cooled(p.field.temperature, site, p.order, spacing, p.grid.torus, -1024)
+        assert cooled[s] == plain.cooled(p.in_picture(p.field.temperature), site, p.order, spacing, p.grid.torus, -1024)
 
 
 @pytest.mark.parametrize("longest", [16, 2**17])

@@ -325,7 +325,7 @@ def test_raster_and_block_go_row_by_row():
     assert [sites for sites, *_ in plainly(walk(get("raster"), grid))[0]] == [[site] for site in range(24)]
     steps = [sites for sites, *_ in plainly(walk(get("block:2x3"), grid))[0]]
     assert steps == [[s, s + 3, s + 12, s + 15] for s in (0, 1, 2, 6, 7, 8)]
-    assert plainly(walk(get("block:9x9"), Grid.of((13, 11), 2)))[0][:3] == [([s], 1, False) for s in (0, 2, 4)]
+    assert plainly(walk(get("block:9x9"), Grid.of((13, 11), 2)))[0][:3] == [([s], 1, False) for s in (0, 1, 2)]
 
 
 def test_groups_of_ones_own_may_have_any_numbers():
@@ -369,7 +369,7 @@ def test_a_claim_that_does_not_hold_is_caught():
 def test_a_site_twice_or_from_elsewhere_is_caught(claim):
     with pytest.raises(RuntimeError, match="the schedule told relaxes a site twice in one step"):
         walk(Checked(Told([7, 30, 7], claim)), Grid((6, 9)))
-    for foreign in ([0, 1], [9], [54], [-2], [10**6]):
+    for foreign in ([0, 15], [15], [54], [-2], [10**6]):
         with pytest.raises(RuntimeError, match="the schedule told relaxes sites that are not of the level's lattice"):
             walk(Checked(Told(foreign, claim)), Grid.of((6, 9), 2))
 

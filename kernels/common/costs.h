@@ -3,9 +3,9 @@
 //
 //   factor d_p                                        equation (12), less where it continues a neighbour: coherence.h
 //   penalty_p                                         for its use
-//   max(0, sum_c (certain (x_c - y_c))^2 - free)      for its phases where the sample is regular, -D WAVES of them
+//   max(0, sum_c (weight (x_c - y_c))^2 - tolerance)  for its phases where the sample is regular, -D WAVES of them
 //   sum_r (hard (x_r - y_r))^2                        for data r between the sites of the level, -D SCATTERED channels
-//   sum_k dear_k[kind_k]                              for its kinds, as its category, -D KINDS of them
+//   sum_k kind_cost[kind_k]                           for its kinds, as its category, -D KINDS of them
 //   novelty n_p                                       for each neighbour that it continues, or 4 for one that it repeats
 //
 // Only the first may be less than that of all candidates; none is below 0.
@@ -27,8 +27,8 @@
 // levels  (C, plane)       grey levels of the sample, columns apart by the level's step side by side
 // penalty (listed,)        of each candidate
 // waves   (WAVES, listed)  of each candidate
-// kind_   (KINDS, listed)  row of `dear` that each candidate's kinds have
-// dear    (.., area)       what a candidate of a kind costs at each site, 0 or more
+// kinds_of (KINDS, listed) row of `kind_cost` that each candidate's kinds have
+// kind_cost (.., area)     what a candidate of a kind costs at each site, 0 or more
 // phases  (WAVES, area)    of each site
 // begin   (area + 1,)      where the data of the site at each pixel index begin
 // reach_  (n,)             pixel offset of each datum in the sample
@@ -38,15 +38,16 @@
 #define COSTS                                                                                                          \
     __global const int *restrict at, __global const float *restrict levels, __global const float *restrict penalty,    \
         __global const float *restrict waves, const int listed, __global const ushort *restrict phases,                \
-        const int area_, const float certain_, const float free_, __global const int *restrict begin_,                 \
+        const int area_, const float phase_weight, const float tolerance, __global const int *restrict begin_,         \
         __global const int *restrict reach_, __global const ushort *restrict told, const float hard_,                  \
         __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
-        __global const ushort *restrict kind_, __global const float *restrict dear
+        __global const ushort *restrict kinds_of, __global const float *restrict kind_cost
 #define EVALUATED(p, factor, site)                                                                                     \
-    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride) * (factor) + penalty[p] +                       \
-     apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) + MISFIT(p, site) + OF_KIND(p, site))
+    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride) * (factor) + penalty[p] +         \
+     PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
+#define PHASE(p, site) apart_in_phase(waves + (p), listed, phases + (site), area_, phase_weight, tolerance)
 #if KINDS
-#define OF_KIND(p, site) of_kind(kind_ + (p), listed, dear + (site), area_)
+#define OF_KIND(p, site) of_kind(kinds_of + (p), listed, kind_cost + (site), area_)
 #else
 #define OF_KIND(p, site) 0.0f
 #endif
@@ -58,21 +59,21 @@
 #endif
 
 inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
-                            const float certain, const float free)
+                            const float weight, const float tolerance)
 {
     float d = 0.0f;
     for (int c = 0; c < WAVES; ++c) {
-        const float e = ((float)x[c * area] - y[c * listed]) * certain;
+        const float e = ((float)x[c * area] - y[c * listed]) * weight;
         d = fma(e, e, d);
     }
-    return fmax(d - free, 0.0f);
+    return fmax(d - tolerance, 0.0f);
 }
 
-inline float of_kind(__global const ushort *kind, const int listed, __global const float *dear, const int area)
+inline float of_kind(__global const ushort *kind, const int listed, __global const float *kind_cost, const int area)
 {
     float d = 0.0f;
     for (int k = 0; k < KINDS; ++k)
-        d += dear[kind[k * listed] * area];
+        d += kind_cost[kind[k * listed] * area];
     return d;
 }
 

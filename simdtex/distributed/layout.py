@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tile
 from simdtex.model.lattice import Grid
-from simdtex.ops.finish import around
+from simdtex.ops.finish import gaussian_offsets
 from simdtex.options import whole
 from simdtex.schedules.schedule import Windowed
 
@@ -180,7 +180,7 @@ def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Lay
         raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
     levels = tuple(_level(plan, seed, number, tile) for number in range(plan.levels))
     sample, channels, sd = plan.sample, plan.sample.working.shape[0], plan.options.finish or 0
-    shown = tile + (2 * int(around(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
+    shown = tile + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
     window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel

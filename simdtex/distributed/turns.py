@@ -26,7 +26,7 @@ from simdtex.methods.mrf.level import Lattices
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.tiles import Tally, Tile, framed
 from simdtex.model.source_map import apply_source_map
-from simdtex.ops.finish import around
+from simdtex.ops.finish import gaussian_offsets
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
@@ -90,7 +90,7 @@ def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
 def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     run, work, level = here.run, here.work, here.work.layout.levels[0]
     sd = run.options.finish or 0
-    frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
+    frame = framed(level.lattice, tile, int(gaussian_offsets(sd)[0].max()) if sd else 0)
     state = here.store.read(level, turn.number - 1, frame.window)
     known = here.store.held(level, frame.window).known if work.held else None
     field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)

@@ -27,23 +27,23 @@ class Phased(NamedTuple):
     """Cosines and sines of the phases of a regular sample (`simdtex.model.regularity`).
 
     The phase difference between candidate and site is the same at every neighbour, so only the site itself is compared.
-    ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``certain``, the
-    factor of their differences, whose square is the number of neighbours that they represent; ``free``, the part of the
+    ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``weight``, the
+    factor of their differences, whose square is the number of neighbours that they represent; ``tolerance``, the part of the
     cost that is subtracted, so that all candidates within half a step of a phase cost nothing.
     """
 
     candidates: Array
     sites: Array
-    certain: np.float32
-    free: np.float32
+    weight: np.float32
+    tolerance: np.float32
 
     def cost(self, numbers: NDArray[np.integer], sites: NDArray[np.int32]) -> NDArray[np.float32]:
         """Return the cost of the phases of candidates ``numbers`` (slots, S or 1) at sites (S,)."""
         d = np.zeros((len(numbers), sites.size), np.float32)
         for y, x in zip(self.candidates, self.sites.reshape(len(self.sites), -1), strict=True):
-            e = (x[sites].astype(np.float32) - y[np.maximum(numbers, 0)]) * self.certain
+            e = (x[sites].astype(np.float32) - y[np.maximum(numbers, 0)]) * self.weight
             d = fma32(e, e, d)
-        over: NDArray[np.float32] = np.maximum(d - self.free, np.float32(0))
+        over: NDArray[np.float32] = np.maximum(d - self.tolerance, np.float32(0))
         return over
 
 
@@ -52,13 +52,13 @@ class Scattered(NamedTuple):
 
     ``begin`` (H * W + 1,) int32: the data of the site at pixel index s are begin[s] .. begin[s + 1] - 1; ``reach`` (n,)
     int32 is the pixel offset of each datum in the sample, ``values`` (n, C) uint16 are its grey levels, `UNKNOWN` in
-    unknown channels; ``certain`` is the factor of the differences.
+    unknown channels; ``weight`` is the factor of the differences.
     """
 
     begin: Array
     reach: Array
     values: Array
-    certain: np.float32
+    weight: np.float32
 
     def cost(
         self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
@@ -71,7 +71,7 @@ class Scattered(NamedTuple):
             here = np.flatnonzero(first + k < end)
             datum = (first + k)[here]
             for x, y in zip(self.values[datum].T, candidates.pixels, strict=False):
-                e = (x.astype(np.float32) - y[place[:, here] + self.reach[datum]].astype(np.float32)) * self.certain
+                e = (x.astype(np.float32) - y[place[:, here] + self.reach[datum]].astype(np.float32)) * self.weight
                 e = np.where(x == UNKNOWN, np.float32(0), e)
                 d[:, here] = fma32(e, e, d[:, here])
         return d
@@ -128,7 +128,7 @@ class Costs(NamedTuple):
         area = max(prod(phased.sites.shape[1:]), prod(kinds.sites.shape[1:]))
         return (
             *(self.penalty, phased.candidates, listed, phased.sites, area),
-            *(phased.certain, phased.free, scattered.begin, scattered.reach, scattered.values, scattered.certain),
+            *(phased.weight, phased.tolerance, scattered.begin, scattered.reach, scattered.values, scattered.weight),
             *(candidates.pixels, candidates.plane, candidates.positions),
             *kinds,
         )

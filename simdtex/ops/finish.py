@@ -21,7 +21,7 @@ from simdtex.ops.neighbourhood import Field
 
 
 @cache
-def around(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def gaussian_offsets(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return offsets (N, 2), including the site itself, and weights (N,) in 1/1024 of a Gaussian cut off at 2.5 sd."""
     radius = ceil(2.5 * sd)
     row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
@@ -48,7 +48,7 @@ def finish(
     others. ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, those of the sample, are arrays of
     the machine. Cost: N channels gathers per site.
     """
-    offsets, weights = around(sd)
+    offsets, weights = gaussian_offsets(sd)
     first, count = rows.start * grid.cols, len(rows) * grid.cols
     if machine is None:
         return _finished(field, given, grid, sample, offsets, weights, np.arange(first, first + count, dtype=np.int32))

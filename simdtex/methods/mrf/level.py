@@ -233,12 +233,12 @@ class Lattices:
         waves = self.sample.waves
         if not waves:
             return None
-        certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
+        weight = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
         step = 1 if self.options.phases == "all" else 2**number
-        free = np.float32(round(float(certain) ** 2 * waves.half(step)))
+        tolerance = np.float32(round(float(weight) ** 2 * waves.half(step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))
-        return Phased(self.machine.put(those), None, certain, free)
+        return Phased(self.machine.put(those), None, weight, tolerance)
 
     def _scattered(self, number: int, grid: Grid) -> Scattered | None:
         """Return the conditioning data between the sites of a lattice or a window of it; None if there are none."""

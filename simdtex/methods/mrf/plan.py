@@ -24,7 +24,7 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
-from simdtex.ops.finish import around
+from simdtex.ops.finish import gaussian_offsets
 from simdtex.options import within_32_bits
 
 LABELS = 64
@@ -123,7 +123,7 @@ def sampled(
     regular: Phases | None,
 ) -> tuple[int, Sample]:
     """Return the number of levels and the sample; if ``options.levels`` is None, every level has a candidate."""
-    far = int(around(options.finish)[0].max()) if options.finish else 0
+    far = int(gaussian_offsets(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
         margin = int(offsets[:, 1].max()) * step
