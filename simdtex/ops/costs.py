@@ -28,8 +28,8 @@ class Phased(NamedTuple):
 
     The phase difference between candidate and site is the same at every neighbour, so only the site itself is compared.
     ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``weight``, the
-    factor of their differences, whose square is the number of neighbours that they represent; ``tolerance``, the part of the
-    cost that is subtracted, so that all candidates within half a step of a phase cost nothing.
+    factor of their differences, whose square is the number of neighbours that they represent; ``tolerance``, the part
+    of the cost that is subtracted, so that all candidates within half a step of a phase cost nothing.
     """
 
     candidates: Array
