@@ -144,8 +144,7 @@ class Checkerboard(Partition):
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
-        colors: NDArray[Any] = sum(np.ix_(*grid.lines())) % 2  # type: ignore[assignment]
-        return colors
+        return np.asarray(sum(np.ix_(*grid.lines())) % 2)
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Two, or one of a single site."""
