@@ -144,8 +144,7 @@ class Watched:
     )
     callback: Callback | None = given(
         Data("callable"),
-        doc="Called several times a second with a `simdtex.run.Progress`, whose class is that of the job or method. An "
-        "error that it raises ends the run.",
+        doc="Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.",
         identity=False,
     )
 

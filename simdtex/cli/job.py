@@ -22,6 +22,7 @@ from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, QUIET, SEED, job_op
 
 if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
+    from simdtex.run import Progress
 
 
 CALIBRATION, SURE = 0.1, 1.0
@@ -167,7 +168,7 @@ def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
     forecast, seconds, levels = Forecast(), None, 1
     memory.required.clear()
 
-    def observe(progress: Any) -> None:
+    def observe(progress: Progress) -> None:
         nonlocal seconds, levels
         seconds, levels = forecast.seconds(progress.fraction), progress.levels
         if seconds is not None:
@@ -291,7 +292,7 @@ def watching(
     stages: Path | None = None,
     limits: tuple[float, float] = (0.0, 1.0),
     checkpoint: Checkpoint | None = None,
-) -> Iterator[Callable[[Any], None]]:
+) -> Iterator[Callable[[Progress], None]]:
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None
     if stages:
@@ -300,7 +301,7 @@ def watching(
         writer = StageWriter(stages, limits=limits, resumed=lambda: bool(checkpoint and checkpoint.resumed))
     with progress_bar(quiet) as show:
 
-        def callback(progress: Any) -> None:
+        def callback(progress: Progress) -> None:
             nonlocal writer
             show(progress.fraction, progress.doing)
             if writer:

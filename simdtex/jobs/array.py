@@ -245,6 +245,7 @@ def _progress(
         if seen != step[:2]:
             seen, left = step[:2], float(temperature(step.level).mean()) / 1024
         share = fraction_done(expected, step.level, 1 - sqrt(min(1.0, left)), 0.0)
-        callback(Progress(level=step.level, levels=run.levels, fraction=share, image=partial(picture, step.level)))
+        now, doing = partial(picture, step.level), f"level {step.level}, sweep {step.sweep}"
+        callback(Progress(level=step.level, levels=run.levels, fraction=share, doing=doing, image=now))
 
     return follow

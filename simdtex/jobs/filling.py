@@ -25,7 +25,7 @@ from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, within_32_bits
-from simdtex.run import Callback, Output, OutputWithSource
+from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""
@@ -271,17 +271,21 @@ class Filling:
         sample: WindowSample,
         number: int,
         count: int,
-        progress: Any,
+        progress: Progress,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
         at = (window.rows, window.cols)
         pasted = partial(paste, at=at, hole=self.hole[at], level=progress.level)
-        shown = {
-            "image": lambda: pasted(whole.image, progress.image()),
-            "temperature": lambda: pasted(whole.temperature, progress.temperature()),
-            "source": lambda: pasted(whole.source, shifted(progress.source(), sample.corner)),
-        }
-        return callback(replace(progress, **shown, fraction=(number + progress.fraction) / count))
+        read: Any = progress.source
+        return callback(
+            replace(
+                progress,
+                fraction=(number + progress.fraction) / count,
+                image=lambda: pasted(whole.image, progress.image()),
+                maps={"temperature": lambda: pasted(whole.temperature, progress.temperature())},
+                source=lambda: pasted(whole.source, shifted(read(), sample.corner)),
+            )
+        )
 
     def _blend(self, whole: Whole) -> None:
         """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""

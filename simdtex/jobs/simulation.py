@@ -39,7 +39,7 @@ from simdtex.model.given import Given, Soft
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.options import moderate, require, resolve, whole, within_32_bits
-from simdtex.run import Callback, Output, Progress, Simulating
+from simdtex.run import Callback, Output, Progress
 
 if TYPE_CHECKING:
     import xarray
@@ -149,14 +149,22 @@ def simulate(call: Any) -> Work:
                 with lock:
                     checkpointing.offer(info, state)
 
-        def tell(number: int, progress: Any, image: Callable[[], NDArray[Any]]) -> None:
+        def tell(number: int, progress: Progress | None, image: Callable[[], NDArray[Any]]) -> None:
             """Report a part of a realisation, or without ``progress`` its end."""
             shares[number] = progress.fraction if progress else 1
-            shown: dict[str, Any] = {"level": progress.level if progress else 0, "levels": plan.levels, "image": image}
-            shown |= {"realisation": first + number, "realisations": n, "complete": progress is None}
             with lock:
                 if callback:
-                    callback(Simulating(**shown, fraction=shares.sum() / n, finished=len(finished)))
+                    callback(
+                        Progress(
+                            level=progress.level if progress else 0,
+                            levels=plan.levels,
+                            fraction=shares.sum() / n,
+                            doing=f"{len(finished)} of {n} realisations finished",
+                            stage=None if progress else f"realisation{first + number:04d}",
+                            image=image,
+                            details={"realisation": first + number, "finished": len(finished), "realisations": n},
+                        )
+                    )
 
         def one(number: int, machine: Machine) -> None:
             told = callback and (lambda progress: tell(number, progress, progress.image))
@@ -268,8 +276,8 @@ def estimate(call: Any) -> Work:
             found[:, here] = probability.T if categorical else _moments(probability, of, own)
             done += here.size
             if callback:
-                now = found.T.reshape(*size, -1).copy
-                callback(Progress(level=0, levels=1, fraction=done / len(sites), image=now))
+                now, doing = found.T.reshape(*size, -1).copy, f"{done} of {len(sites)} cells"
+                callback(Progress(fraction=done / len(sites), doing=doing, image=now))
         told = given.values[given.whole][:, 0]
         certain = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])
         found[:, given.whole.ravel()] = certain
