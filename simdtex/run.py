@@ -214,8 +214,8 @@ class OutputWithSource(Output):
 class Observer:
     """The observer of a run: it reports progress and keeps the stages and reports of levels; it changes nothing."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self.callback = callback
+    def __init__(self, run: Any, callback: Callback | None) -> None:
+        self._run, self._callback = run, callback
         self.stages: list[Stage] = []
         self.reports: list[dict[str, Any]] = []
         self._began = time.perf_counter()  # of what the next report describes

@@ -28,7 +28,7 @@ def feed(recorder, pictures, level=0, phase="free", **more):
             "phase": phase,
             "step": 3 * number,
             "temperature_left": 1 / number,
-            "end_of_sweep": True,
+            "stage": "level0-sweep01",
             "image": lambda picture=picture: picture,
             "temperature": lambda: np.full((2, 2), 0.25),
         }
@@ -72,7 +72,7 @@ def test_levels_are_not_compared_with_one_another():
 def test_only_ends_of_sweeps_are_recorded_and_all_progress_is_passed_on():
     seen = []
     recorder = Recorder(then=seen.append)
-    feed(recorder, [np.zeros((2, 2))] * 3, end_of_sweep=False)
+    feed(recorder, [np.zeros((2, 2))] * 3, stage=None)
     assert len(seen) == 3 and recorder.sweeps == []
 
 

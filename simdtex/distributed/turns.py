@@ -209,20 +209,19 @@ class Watch(Observer):
     """The observer of a run: it reports every tile, and the store holds the state."""
 
     def __init__(self, run: Turns, callback: Callback | None) -> None:
-        super().__init__(callback)
-        self._run = run
+        super().__init__(run, callback)
         self._expected = expected_work(run.lattices)
         self._fraction = 0.0
 
     def part(self, turn: Turn, done: int) -> None:
         """Report that ``done`` tiles have finished a turn."""
-        if self.callback is None:
+        if self._callback is None:
             return
         level, sweep = self._run.work.layout.levels[turn.level], turn.cooling + turn.free + 1
         self._fraction = max(self._fraction, self._share(turn, level, done / level.count))
         what = f"level {turn.level}" + (f", sweep {sweep}" if turn.phase == "sweep" else "")
         what = "writing the picture" if turn.phase == "show" else what
-        self.callback(
+        self._callback(
             Progress(
                 level=turn.level,
                 levels=self._run.lattices.levels,

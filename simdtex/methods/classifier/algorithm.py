@@ -278,15 +278,13 @@ class Run:
 class Record(Observer):
     """The observer of a classification: the state holds everything that it reports."""
 
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        super().__init__(callback)
-        self._run = run
+    _run: Run
 
     def step(self, state: State, info: None) -> None:
         """Report a step."""
-        if self.callback:
+        if self._callback:
             compared, sweeps = state.done / self._run.grid.rows, len(state.changed)
-            self.callback(
+            self._callback(
                 Progress(
                     fraction=0.9 * compared + 0.1 * sweeps / max(1, self._run.options.sweeps),
                     doing=f"sweep {sweeps}" if sweeps else f"compared {100 * compared:.0f} %",

@@ -34,13 +34,12 @@ class Record(Observer):
     """
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
-        super().__init__(callback)
+        super().__init__(run, callback)
         options = run.options
         self.account: Account | None = None
         if options.array:
             self.account = Account(parse_array(options.array), run.offsets, run.sample.channels)
         self.launches = run.machine.launches
-        self._run = run
         self._expected = expected_work(run)
         self._fraction = 0.0
         self._began, self._first_left = time.perf_counter(), 0.0  # of the current level
@@ -64,9 +63,9 @@ class Record(Observer):
         report["fma"] += 0 if self._listed else level.work * part.sites
         self._ended, self._first_left = part.last, self._first_left or left
         self._advance(level.number, state, left, min(1.0, self._done / max(1, state.active or sites)))
-        if self.callback:
+        if self._callback:
             read, sweep = (self._run, level.grid, part.field), state.cooling + state.free + 1
-            self.callback(
+            self._callback(
                 Progress(
                     level=level.number,
                     levels=self._run.levels,

@@ -187,17 +187,15 @@ class Run:
 class Record(Observer):
     """The observer of a run: it reports every launch, and keeps the stage of every level."""
 
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        super().__init__(callback)
-        self._run = run
+    _run: Run
 
     def step(self, state: State, end: End | None) -> None:
         """Report the sampled pixels; at the end of a level, keep its stage and report it."""
         if end:
             self._end(*end)
-        if self.callback:
+        if self._callback:
             shapes, last, level = self._run.shapes, self.stages[-1], state.level + bool(end)
-            self.callback(
+            self._callback(
                 Progress(
                     level=level,
                     levels=len(shapes),

@@ -286,9 +286,7 @@ def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
 class Record(Observer):
     """The observer of a run: it reports every channel's turn, every part of a solid's, and iterations."""
 
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        super().__init__(callback)
-        self._run = run
+    _run: Run
 
     def part(self, state: State, share: float) -> None:
         """Report a share of the current channel's turn."""
@@ -310,11 +308,11 @@ class Record(Observer):
 
     def _tell(self, state: State, done: float, ended: bool) -> None:
         """Report ``done`` turns of channels."""
-        if self.callback:
+        if self._callback:
             iterations, channels = self._run.options.iterations, len(self._run.busy)
             turns = done / channels if channels else iterations
             iteration = min(iterations, int(turns) + (not ended))
-            self.callback(
+            self._callback(
                 Progress(
                     fraction=turns / iterations if iterations else 1.0,
                     doing=f"iteration {iteration} of {iterations}",
