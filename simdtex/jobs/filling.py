@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import drive
+from simdtex.inputs import Extend, Fill
 from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
@@ -79,7 +80,7 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 
 
 @public("fill")
-def fill(call: Any) -> Work:
+def fill(call: Fill) -> Work:
     """Return a picture with its holes filled with the texture around them.
 
     Returns
@@ -126,7 +127,7 @@ def fill(call: Any) -> Work:
 
 
 @public("extend", without="boundary")
-def extend(call: Any) -> Work:
+def extend(call: Extend) -> Work:
     """Return a picture that is continued beyond its edges, or seamless.
 
     Returns

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest
 from simdtex.driver import check_shape, check_sides, drive
+from simdtex.inputs import Cells, Estimate, Simulate
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import (
@@ -49,7 +50,7 @@ MOST_TOGETHER = 4
 
 
 @public("simulate")
-def simulate(call: Any) -> Work:
+def simulate(call: Simulate) -> Work:
     """Return realisations that look like a training image and honour data (multiple-point simulation).
 
     Returns
@@ -212,7 +213,7 @@ def simulate(call: Any) -> Work:
 
 
 @public("estimate")
-def estimate(call: Any) -> Work:
+def estimate(call: Estimate) -> Work:
     """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
 
     Returns
@@ -323,7 +324,7 @@ def realisation_seed(seed: int, number: int) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def placing(call: Any) -> Placing:
+def placing(call: Cells) -> Placing:
     """Return a function that places a table of data in the cells of a call."""
     return partial(place_hard_data, origin=call.origin, cell=call.cell, several=call.several, outside=call.outside)
 
