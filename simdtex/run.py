@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,8 @@ class Progress(Brief):
     ``iterations``. In the picture, channels that are not yet done in this iteration are those of the previous one.
 
     `simdtex.simulate`, after every part of a step of a realisation, and at its end, has ``realisation``, the number of
-    that whose picture it is, and the numbers of ``finished`` and of all ``realisations``.
+    that whose picture it is, and the numbers of ``finished`` and of all ``realisations``; before its end also the map
+    ``temperature``.
 
     `simdtex.classify`, after every step, has a picture of the labels so far: 1 is the first class, and 0 a pixel not
     yet compared.
@@ -93,6 +94,10 @@ class Progress(Brief):
         if name in known:
             return known[name]
         raise AttributeError(f"this progress has no {name!r}; choose from its details and maps: {', '.join(known)}")
+
+    def within(self, number: int, count: int, job: str) -> Progress:
+        """Return the progress of ``count`` jobs of equal work, while the one of this number, from 0, runs."""
+        return replace(self, fraction=(number + self.fraction) / count, doing=f"{job}, {self.doing}")
 
 
 Callback = Callable[[Progress], Any]

@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from math import prod
@@ -150,25 +151,18 @@ def simulate(call: Simulate) -> Work:
                 with lock:
                     checkpointing.offer(info, state)
 
-        def tell(number: int, progress: Progress | None, image: Callable[[], NDArray[Any]]) -> None:
-            """Report a part of a realisation, or without ``progress`` its end."""
-            shares[number] = progress.fraction if progress else 1
+        def tell(number: int, progress: Progress) -> None:
+            shares[number] = progress.fraction
             with lock:
                 if callback:
-                    callback(
-                        Progress(
-                            level=progress.level if progress else 0,
-                            levels=plan.levels,
-                            fraction=shares.sum() / n,
-                            doing=f"{len(finished)} of {n} realisations finished",
-                            stage=None if progress else f"realisation{first + number:04d}",
-                            image=image,
-                            details={"realisation": first + number, "finished": len(finished), "realisations": n},
-                        )
-                    )
+                    doing = f"{len(finished)} of {n} realisations finished"
+                    about = {"realisation": first + number, "finished": len(finished), "realisations": n}
+                    callback(replace(progress, fraction=shares.sum() / n, doing=doing, details=about))
 
         def one(number: int, machine: Machine) -> None:
-            told = callback and (lambda progress: tell(number, progress, progress.image))
+            told = callback and (
+                lambda progress: tell(number, replace(progress, stage=None, source=None, explain=None))
+            )
             own = Checkpointing(None, offer_finished)
             picture, output = drive(plan, machine, realisation_seed(seed, first + number), told, own)
             if inputs.given and inputs.given.outside is not None:
@@ -180,7 +174,8 @@ def simulate(call: Simulate) -> Work:
                     sources[number] = copies.sources(at, columns == 3) if copies else at
                 finished.append(number)
                 checkpointing.offer(None, state)
-            tell(number, None, lambda: picture)
+            name = f"realisation{first + number:04d}"
+            tell(number, Progress(levels=plan.levels, fraction=1.0, doing="", stage=name, image=lambda: picture))
 
         try:
             _in_turn(one, [number for number in range(n) if number not in finished], machines)

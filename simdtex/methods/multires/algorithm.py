@@ -192,7 +192,14 @@ class Record(Observer):
     def step(self, state: State, end: End | None) -> None:
         """Report the sampled pixels; at the end of a level, keep its stage and report it."""
         if end:
-            self._end(*end)
+            stage, counts = end
+            self.stages.append(stage)
+            mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
+            self.report(
+                **{"level": stage.level, "rows": counts.shape[0], "cols": counts.shape[1]},
+                **{"candidates": mean, "most": int(counts[..., 0].max())},
+                **{"nodes": pixels(self._run.analysis.shapes[stage.level + 1 :]), "compared": compared},
+            )
         if self._callback:
             shapes, last, level = self._run.shapes, self.stages[-1], state.level + bool(end)
             self._callback(
@@ -206,16 +213,6 @@ class Record(Observer):
                     maps={"candidates": lambda: np.asarray(last.candidates)},
                 )
             )
-
-    def _end(self, stage: Stage, counts: NDArray[np.int32]) -> None:
-        self.stages.append(stage)
-        rows, cols = counts.shape[:2]
-        mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
-        self.report(
-            **{"level": stage.level, "rows": rows, "cols": cols},
-            **{"candidates": mean, "most": int(counts[..., 0].max())},
-            **{"nodes": pixels(self._run.analysis.shapes[stage.level + 1 :]), "compared": compared},
-        )
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:

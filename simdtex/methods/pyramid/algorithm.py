@@ -204,6 +204,8 @@ class Run:
 
         The description of the step is None or, at the end of an iteration, the histograms' distances by subband.
         """
+        if not self.busy:
+            return state._replace(turns=state.turns + 1), {}
         c, matcher = state.turns % len(self.busy), self.matcher
         matcher.moved[:] = state.moved
         picture = self._turn(state.pictures[c], self._subbands[c], matcher, lambda share: watch(state, share))
@@ -215,7 +217,7 @@ class Run:
 
     def ended(self, state: State) -> bool:
         """Return whether all iterations are done."""
-        return state.turns >= self.options.iterations * len(self.busy)
+        return state.turns >= self.options.iterations * max(1, len(self.busy))
 
     def read(self, pictures: tuple[Array, ...]) -> NDArray[Any]:
         """Return the image of the channels' pictures, read back."""
@@ -229,7 +231,6 @@ class Run:
 
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
         """Return the image (*shape, channels) in the sample's type, and the statistics."""
-        observer.nothing_done(state)
         own, machine = self.texture.own, self.machine
         if own is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
             ranks = machine.put(np.arange(own.size, dtype=np.int32)[None])
@@ -298,23 +299,14 @@ class Record(Observer):
         if distances is not None:
             self.report(iteration=len(self.reports) + 1, distances=distances)
 
-    def nothing_done(self, state: State) -> None:
-        """Complete the reports if there was no turn, because no channel varies or there are no iterations."""
-        if not self._run.busy:
-            wanted = range(1, self._run.options.iterations + 1)
-            self.reports[:] = [{"iteration": number, "seconds": 0.0, "distances": {}} for number in wanted]
-        if not state.turns:
-            self._tell(state, 0, ended=False)
-
     def _tell(self, state: State, done: float, ended: bool) -> None:
         """Report ``done`` turns of channels."""
         if self._callback:
-            iterations, channels = self._run.options.iterations, len(self._run.busy)
-            turns = done / channels if channels else iterations
+            turns, iterations = done / max(1, len(self._run.busy)), self._run.options.iterations
             iteration = min(iterations, int(turns) + (not ended))
             self._callback(
                 Progress(
-                    fraction=turns / iterations if iterations else 1.0,
+                    fraction=turns / iterations,
                     doing=f"iteration {iteration} of {iterations}",
                     stage=f"iteration{iteration:02d}" if ended else None,
                     image=lambda: self._run.read(state.pictures),
