@@ -88,9 +88,7 @@ class Progress(Brief):
 
     def __getattr__(self, name: str) -> Any:
         """Return the detail or the map of this name."""
-        known = (
-            {} if name.startswith("_") else self.details | self.maps
-        )  # a copy asks for __setstate__ when it is empty
+        known = {} if name[0] == "_" else self.details | self.maps  # an empty copy is asked for __setstate__
         if name in known:
             return known[name]
         raise AttributeError(f"this progress has no {name!r}; choose from its details and maps: {', '.join(known)}")
