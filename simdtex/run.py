@@ -94,8 +94,8 @@ class Progress(Brief):
         raise AttributeError(f"this progress has no {name!r}; choose from its details and maps: {', '.join(known)}")
 
     def within(self, number: int, count: int, job: str) -> Progress:
-        """Return the progress of ``count`` jobs of equal work, while the one of this number, from 0, runs."""
-        return replace(self, fraction=(number + self.fraction) / count, doing=f"{job}, {self.doing}")
+        """Return the progress of ``count`` jobs while one, ``number`` from 0, runs; the detail ``job`` describes it."""
+        return replace(self, fraction=(number + self.fraction) / count, details=self.details | {"job": job})
 
 
 Callback = Callable[[Progress], Any]

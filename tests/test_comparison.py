@@ -190,7 +190,7 @@ def test_progress_runs_from_0_to_1():
     fractions = [one.fraction for one in seen]
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1) and fractions[0] < 0.1
     jobs = [f"run {1 + 2 * s + n} of 4: {names[n]}, seed {s + 1}" for s in range(2) for n in range(2)]
-    assert list(dict.fromkeys(one.doing.partition(", level")[0] for one in seen)) == jobs
+    assert list(dict.fromkeys(one.job for one in seen)) == jobs
 
 
 @pytest.mark.parametrize(

@@ -237,18 +237,20 @@ def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) ->
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Show a progress bar on a terminal; elsewhere print a line every ten seconds.
+    """Show a progress bar on a terminal; elsewhere print a line every ten seconds, and whenever another job begins.
 
     Yields the callback that shows a progress. Once, it says how long a long run is expected to last.
     """
     if quiet:
         yield lambda progress: None
         return
-    forecast, said, next_line = Forecast(), False, time.perf_counter() + EVERY
+    forecast, last, said, next_line = Forecast(), None, False, time.perf_counter() + EVERY
 
     def tell(progress: Progress) -> None:
-        nonlocal said, next_line
-        seconds = forecast.seconds(progress.fraction, SURE)
+        nonlocal last, said, next_line
+        if (job := progress.details.get("job")) != last and not bar:
+            click.echo(job, err=True)
+        last, seconds = job, forecast.seconds(progress.fraction, SURE)
         if seconds is None:
             return
         if seconds > LONG and not said:
@@ -277,7 +279,8 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
         task, echo = shown.add_task("starting", total=1.0), shown.console.print
 
         def show(progress: Progress) -> None:
-            shown.update(task, completed=progress.fraction, description=progress.doing)
+            parts = [*filter(None, [progress.details.get("job")]), progress.doing]
+            shown.update(task, completed=progress.fraction, description=", ".join(parts))
             tell(progress)
 
         yield show
