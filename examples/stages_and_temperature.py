@@ -29,7 +29,7 @@ writer = StageWriter(folder / "stages")  # pictures and temperatures of every sw
 
 def watch(progress: simdtex.Progress) -> None:
     writer(progress)
-    if progress.end_of_sweep:
+    if progress.stage:
         hot = progress.temperature().max()
         print(f"level {progress.level}, sweep {progress.sweep:2} ({progress.phase}): hottest site {hot:.3f}")
 

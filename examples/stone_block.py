@@ -37,7 +37,7 @@ pictures = []
 
 def keep(progress):
     """Keep the picture of each iteration."""
-    if progress.end_of_iteration:
+    if progress.stage:
         pictures.append((progress.doing, progress.image()))
 
 

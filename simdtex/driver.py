@@ -2,7 +2,7 @@
 """The one loop that runs every method, and the common part of all public functions around it.
 
 A `Plan` is validated input. On a machine it is a `Run`, which `drive` begins, steps and ends. Everything that must
-survive between two steps is in the state, a tree of plain arrays and numbers. An `Observer` only watches the run.
+survive between two steps is in the state, a tree of plain arrays and numbers. A `simdtex.run.Observer` only watches it.
 """
 
 from __future__ import annotations
@@ -21,26 +21,10 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import Checkpoint, Checkpointing, begin_run
 from simdtex.machine import Machine, open_machine
 from simdtex.options import real_array, whole
-from simdtex.run import Callback, Output
+from simdtex.run import Callback, Observer, Output, Progress
 
 Tree = Any
 """Plain arrays and numbers, in dicts, lists and tuples."""
-
-
-class Observer(Protocol):
-    """The observer of a run: it reports progress, counts the work, and keeps the stages."""
-
-    def part(self, *seen: Any) -> None:
-        """Receive a part of a long step."""
-
-    def step(self, state: Any, info: Any) -> None:
-        """Receive a step: the state after it, and a description of its work."""
-
-    def save(self) -> Tree:
-        """Return everything received so far."""
-
-    def load(self, saved: Tree) -> None:
-        """Continue from the tree that `save` returned."""
 
 
 class Run(Protocol):
@@ -162,9 +146,8 @@ def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | No
     if callback is None:
         return None
 
-    def seen(progress: Any) -> Any:
-        read: Callable[[], NDArray[Any]] = progress.image
-        return callback(replace(progress, image=lambda: restored(read(), channel_axis)))
+    def seen(progress: Progress) -> Any:
+        return callback(replace(progress, image=lambda: restored(progress.image(), channel_axis)))
 
     return seen
 

@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import numpy as np
-    from numpy.typing import ArrayLike
 
     from simdtex.checkpoint import Checkpoint
     from simdtex.io.hard_data import HardData
     from simdtex.machine import Machine
     from simdtex.run import Callback
+
+    ArrayLike = Any  # for the planners, whose call has what a check made of the array
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,18 @@ MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader":
 NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
 
 
+class Planned:
+    """What the call of a planner has beside the inputs: ``options`` as given, and what checks and planners add."""
+
+    options: dict[str, Any]
+    inputs: Any
+    axes: int
+    given: Any
+    maps: Any
+
+
 @dataclass
-class Watched:
+class Watched(Planned):
     """The inputs that all functions share."""
 
     device: str | Machine | None = given(
@@ -144,8 +155,7 @@ class Watched:
     )
     callback: Callback | None = given(
         Data("callable"),
-        doc="Called several times a second with a `simdtex.run.Progress`, whose class is that of the job or method. An "
-        "error that it raises ends the run.",
+        doc="Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.",
         identity=False,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,230 +22,83 @@ class Progress(Brief):
     Attributes
     ----------
     level, levels : int
-        The current level (0 is the finest, and the last) and the number of levels.
+        The current level (0 is the finest, and the last) and the number of levels; 0 and 1 if there are none.
     fraction : float
         Estimated share of the work that is done, 0 to 1.
-    image : callable
-        ``image()`` reads back the picture of the level, (rows, cols[, channels]) in the sample's type; that of the
-        previous level if the method has no picture before the end of a level.
     doing : str
         Description of the current work.
     stage : str or None
-        The name of the picture that is now complete: at the end of a sweep, of a level without sweeps, or of an
-        iteration. None otherwise.
-    """
-
-    level: int
-    levels: int
-    fraction: float
-    image: Callable[[], NDArray[Any]]
-
-    @property
-    def doing(self) -> str:  # noqa: D102
-        return f"level {self.level}"
-
-    @property
-    def stage(self) -> str | None:  # noqa: D102
-        return None
-
-    def picture(self) -> NDArray[Any]:
-        """Return the picture of the stage, which is the image."""
-        return self.image()
-
-    def maps(self) -> dict[str, NDArray[np.float64]]:
-        """Return further pictures of the stage by name: arrays (rows, cols), 0 to 1."""
-        return {}
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Relaxing(Progress):
-    """The progress of the method ``mrf``, after every part of a step.
-
-    Attributes
-    ----------
-    sweep : int
-        The current sweep of the level, from 1.
-    step : int
-        The current step of the level, from 1. The sites of a step relax together.
-    phase : str
-        ``"relax"`` while some temperature is above 0, then ``"free"``.
-    temperature_left : float
-        Mean temperature of the level, 0 to 1, at the beginning of the sweep.
-    end_of_sweep : bool
-        Whether the sweep ends with this part.
-    temperature : callable
-        ``temperature()`` reads back the level's temperatures, (rows, cols), 0 to 1.
-    source : callable
+        The name of the picture that is now complete, such as ``level0-sweep01``: at the end of a sweep, of a level
+        without sweeps, of an iteration, or of a realisation. None otherwise.
+    image : callable
+        ``image()`` reads back the picture of the level, (rows, cols[, channels]) in the sample's type; that of the
+        previous level if the method has no picture before the end of a level.
+    solid : bool
+        Whether the image is a block, (depth, rows, cols[, channels]).
+    details : dict
+        Numbers and texts that tell where the run is, by name: see Notes. Each is an attribute, too: ``progress.sweep``.
+    maps : dict
+        Functions by name that read back a map of the level, (rows, cols): see Notes. Each is an attribute, too:
+        ``progress.temperature()``.
+    source : callable or None
         ``source()`` reads back the position in the sample of each site of the level, as `Output.source`: int32,
-        (rows, cols, 2) or, with several samples, (rows, cols, 3).
-    explain : callable
+        (rows, cols, 2) or, with several samples, (rows, cols, 3). Only ``mrf``.
+    explain : callable or None
         ``explain(row, col)``, or ``explain(layer, row, col)`` in a volume, returns a
         `simdtex.model.explanation.Explanation` of how that site of the level would relax now, with the random numbers
         of the current step. A call after the callback has returned uses the state of the run at that time. It changes
-        nothing.
+        nothing. Only ``mrf``.
+
+    Notes
+    -----
+    ``mrf``, after every part of a step, has ``sweep`` and ``step`` of the level, from 1 (the sites of a step relax
+    together); ``phase``, ``"relax"`` while some temperature is above 0, then ``"free"``; ``temperature_left``, the mean
+    temperature of the level, 0 to 1, at the beginning of the sweep; and the map ``temperature``, 0 to 1.
+
+    ``multires``, after every part of a level, has the map ``candidates``, the number of candidates that each pixel of
+    the last complete level was drawn from, integers.
+
+    ``pyramid``, after every channel or, for a solid, after every part of a channel, has ``iteration``, from 1, and
+    ``iterations``. In the picture, channels that are not yet done in this iteration are those of the previous one.
+
+    `simdtex.simulate`, after every part of a step of a realisation, and at its end, has ``realisation``, the number of
+    that whose picture it is, and the numbers of ``finished`` and of all ``realisations``; before its end also the map
+    ``temperature``.
+
+    `simdtex.classify`, after every step, has a picture of the labels so far: 1 is the first class, and 0 a pixel not
+    yet compared.
+
+    `simdtex.distributed.synthesize`, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
+    ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or ``"show"``, write the picture. ``sweep`` is that of
+    the level, from 1; ``tile`` and ``tiles`` are the numbers of finished tiles and of all. The image has every n-th
+    site of the level before the turn, about 1000 on a side. Reading it is slow.
     """
 
-    sweep: int
-    step: int
-    phase: str
-    temperature_left: float
-    end_of_sweep: bool
-    temperature: Callable[[], NDArray[Any]]
-    source: Callable[[], NDArray[np.int32]]
-    explain: Callable[..., Explanation]
-
-    @property
-    def doing(self) -> str:  # noqa: D102
-        return f"level {self.level}, sweep {self.sweep}, temperature {self.temperature_left:.3f}"
-
-    @property
-    def stage(self) -> str | None:  # noqa: D102
-        return f"level{self.level}-sweep{self.sweep:02d}" if self.end_of_sweep else None
-
-    def maps(self) -> dict[str, NDArray[np.float64]]:
-        """Return the temperatures."""
-        return {"temperature": self.temperature()}
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Sampling(Progress):
-    """The progress of the method ``multires``, after every part of a level.
-
-    Attributes
-    ----------
-    end_of_level : bool
-        Whether the level ends with this part.
-    candidates : callable
-        ``candidates()`` reads back the number of candidates that each pixel of the level was drawn from, (rows, cols)
-        integers, at the end of the level.
-    """
-
-    end_of_level: bool
-    candidates: Callable[[], NDArray[Any]]
-
-    @property
-    def stage(self) -> str | None:  # noqa: D102
-        return f"level{self.level}" if self.end_of_level else None
-
-    def maps(self) -> dict[str, NDArray[np.float64]]:
-        """Return the number of candidates of each pixel, on a logarithmic scale from 1 to the maximum of the level."""
-        counts = self.candidates()
-        return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Iterating(Progress):
-    """The progress of the method ``pyramid``, after every channel or, for a solid, after every part of a channel.
-
-    The level is always 0. In the picture, channels that are not yet done in this iteration are those of the previous
-    one. The picture of a solid is the block, (depth, rows, cols[, channels]).
-
-    Attributes
-    ----------
-    iteration, iterations : int
-        The current iteration, from 1, and the number of iterations.
-    end_of_iteration : bool
-        Whether the iteration ends with this part.
-    solid : bool
-        Whether the image is a block.
-    """
-
-    iteration: int
-    iterations: int
-    end_of_iteration: bool
+    level: int = 0
+    levels: int = 1
+    fraction: float
+    doing: str
+    stage: str | None = None
+    image: Callable[[], NDArray[Any]]
     solid: bool = False
+    details: dict[str, Any] = field(default_factory=dict)
+    maps: dict[str, Callable[[], NDArray[Any]]] = field(default_factory=dict, repr=False)
+    source: Callable[[], NDArray[np.int32]] | None = None
+    explain: Callable[..., Explanation] | None = None
 
-    @property
-    def doing(self) -> str:  # noqa: D102
-        return f"iteration {self.iteration} of {self.iterations}"
+    def __getattr__(self, name: str) -> Any:
+        """Return the detail or the map of this name."""
+        known = {} if name[0] == "_" else self.details | self.maps  # an empty copy is asked for __setstate__
+        if name in known:
+            return known[name]
+        raise AttributeError(f"this progress has no {name!r}; choose from its details and maps: {', '.join(known)}")
 
-    @property
-    def stage(self) -> str | None:  # noqa: D102
-        return f"iteration{self.iteration:02d}" if self.end_of_iteration else None
-
-    def picture(self) -> NDArray[Any]:
-        """Return the image, or the middle x-y slice of a block."""
-        image = self.image()
-        return image[len(image) // 2] if self.solid else image
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Simulating(Progress):
-    """The progress of `simdtex.simulate`, after every part of a step of a realisation, and at its end.
-
-    Attributes
-    ----------
-    realisation : int
-        The number of the realisation, whose picture it is.
-    complete : bool
-        Whether this realisation is finished.
-    finished, realisations : int
-        The number of finished realisations, and of all.
-    """
-
-    realisation: int
-    complete: bool
-    finished: int
-    realisations: int
-
-    @property
-    def doing(self) -> str:  # noqa: D102
-        return f"{self.finished} of {self.realisations} realisations finished"
-
-    @property
-    def stage(self) -> str | None:  # noqa: D102
-        return f"realisation{self.realisation:04d}" if self.complete else None
+    def within(self, number: int, count: int, job: str) -> Progress:
+        """Return the progress of ``count`` jobs while one, ``number`` from 0, runs; the detail ``job`` describes it."""
+        return replace(self, fraction=(number + self.fraction) / count, details=self.details | {"job": job})
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Tiling(Progress):
-    """The progress of `simdtex.distributed.synthesize`, after every tile.
-
-    The image has every n-th site of the level before the turn, about 1000 on a side. Reading it is slow.
-
-    Attributes
-    ----------
-    phase : str
-        The current turn: ``"begin"`` a level; ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or
-        ``"show"``, write the picture.
-    sweep : int
-        The current sweep of the level, from 1.
-    tile, tiles : int
-        The number of finished tiles, and of all.
-    """
-
-    phase: str
-    sweep: int
-    tile: int
-    tiles: int
-
-    @property
-    def doing(self) -> str:  # noqa: D102
-        sweep = f", sweep {self.sweep}" if self.phase == "sweep" else ""
-        what = "writing the picture" if self.phase == "show" else f"level {self.level}{sweep}"
-        return f"{what}, tile {self.tile} of {self.tiles}"
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Labelling(Progress):
-    """The progress of `simdtex.classify`, after every step.
-
-    The level is always 0. The picture has the labels so far: 1 is the first class, and 0 a pixel not yet compared.
-
-    Attributes
-    ----------
-    work : str
-        The last work done, in words: rows compared with the classes, or a sweep of the field.
-    """
-
-    work: str
-
-    @property
-    def doing(self) -> str:  # noqa: D102
-        return self.work
-
-
-Callback = Callable[[Any], Any]
+Callback = Callable[[Progress], Any]
 
 
 @dataclass(frozen=True, repr=False)
@@ -359,6 +212,38 @@ class OutputWithSource(Output):
     """An `Output` whose ``source`` is an array: that of ``mrf`` and ``multires``."""
 
     source: NDArray[Any]
+
+
+class Observer:
+    """The observer of a run: it reports progress and keeps the stages and reports of levels; it changes nothing."""
+
+    def __init__(self, run: Any, callback: Callback | None) -> None:
+        self._run, self._callback = run, callback
+        self.stages: list[Stage] = []
+        self.reports: list[dict[str, Any]] = []
+        self._began = time.perf_counter()  # of what the next report describes
+
+    def part(self, *seen: Any) -> None:
+        """Receive a part of a long step."""
+
+    def step(self, state: Any, info: Any) -> None:
+        """Receive a step: the state after it, and a description of its work."""
+
+    def report(self, **counts: Any) -> None:
+        """Keep a report, with the seconds since the last one."""
+        now = time.perf_counter()
+        self.reports.append(counts | {"seconds": now - self._began})
+        self._began = now
+
+    def save(self) -> dict[str, Any]:
+        """Return everything received so far, as plain arrays and numbers."""
+        stages = [tuple(vars(stage).values()) for stage in self.stages]
+        return {"stages": stages, "reports": self.reports, "seconds": time.perf_counter() - self._began}
+
+    def load(self, saved: dict[str, Any]) -> None:
+        """Continue from the tree that `save` returned."""
+        self.stages[:], self.reports[:] = [Stage(*stage) for stage in saved["stages"]], saved["reports"]
+        self._began = time.perf_counter() - saved["seconds"]
 
 
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:

@@ -90,7 +90,7 @@ def test_finished_realisations_are_kept(file):
     made = []
 
     def callback(progress):
-        made.extend([progress.realisation] * progress.complete)
+        made.extend([progress.realisation] * bool(progress.stage))
         if len(made) == 2:
             raise Stop
 

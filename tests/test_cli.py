@@ -17,6 +17,7 @@ from simdtex.cli import COMMANDS, WHAT, job
 from simdtex.io import image
 from simdtex.machine import memory
 from simdtex.model.source_map import load_source_map
+from simdtex.run import Progress
 
 # -- The command line, end to end, as its user meets it.
 
@@ -324,7 +325,7 @@ def test_of_rare_callbacks_all_time_counts(clock):
 def test_a_long_run_is_said_once_and_lines_follow_every_ten_seconds(clock, capsys, whole):
     with job.progress_bar(quiet=False) as show:
         for clock[0] in np.arange(0, 25, 0.25):
-            show(clock[0] / whole, "level 2")
+            show(Progress(fraction=clock[0] / whole, doing="level 2", image=print))
     said = ["simdtex: this is expected to last about 90.0 s"] * (whole > 60)
     lines = [f"{now / whole:.0%}, level 2; about {whole - now:.1f} s left" for now in (10, 20)]
     assert capsys.readouterr().err.splitlines() == said + lines

@@ -28,7 +28,7 @@ def feed(recorder, pictures, level=0, phase="free", **more):
             "phase": phase,
             "step": 3 * number,
             "temperature_left": 1 / number,
-            "end_of_sweep": True,
+            "stage": "level0-sweep01",
             "image": lambda picture=picture: picture,
             "temperature": lambda: np.full((2, 2), 0.25),
         }
@@ -72,7 +72,7 @@ def test_levels_are_not_compared_with_one_another():
 def test_only_ends_of_sweeps_are_recorded_and_all_progress_is_passed_on():
     seen = []
     recorder = Recorder(then=seen.append)
-    feed(recorder, [np.zeros((2, 2))] * 3, end_of_sweep=False)
+    feed(recorder, [np.zeros((2, 2))] * 3, stage=None)
     assert len(seen) == 3 and recorder.sweeps == []
 
 
@@ -186,11 +186,11 @@ def test_colour_and_channels_on_any_axis(axis):
 
 def test_progress_runs_from_0_to_1():
     seen, names = [], ("coloring", "coloring-fixed")
-    compare(SAMPLE, (12, 12), names, seeds=(1, 2), callback=lambda *now: seen.append(now), **JOB)
-    fractions = [fraction for fraction, *_ in seen]
+    compare(SAMPLE, (12, 12), names, seeds=(1, 2), callback=seen.append, **JOB)
+    fractions = [one.fraction for one in seen]
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1) and fractions[0] < 0.1
     jobs = [f"run {1 + 2 * s + n} of 4: {names[n]}, seed {s + 1}" for s in range(2) for n in range(2)]
-    assert list(dict.fromkeys(job for _, job, _ in seen)) == jobs
+    assert list(dict.fromkeys(one.job for one in seen)) == jobs
 
 
 @pytest.mark.parametrize(

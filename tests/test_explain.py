@@ -100,7 +100,7 @@ def test_the_progress_explains_the_next_relaxation(machine):
     said, took = {}, {}
 
     def watch(progress):
-        if progress.end_of_sweep and progress.level == 0:
+        if progress.stage and progress.level == 0:
             took[progress.sweep] = progress.source()
             said[progress.sweep] = [progress.explain(row, col) for row, col in ((1, 1), (3, 7))]
 
@@ -121,7 +121,7 @@ def test_a_density_is_the_lcpdf(relaxation):
     seen = []
 
     def watch(progress):
-        if progress.end_of_sweep and progress.level == 0:
+        if progress.stage and progress.level == 0:
             seen.append((progress.image(), progress.temperature(), progress.explain(4, 5)))
 
     sample = texture((14, 15))  # with levels near 0 and 255

@@ -274,7 +274,9 @@ TEXTS = {
     "<NumPy reference>": lambda: simdtex.open_machine("reference"),
     "<0: cpu-x (PoCL), cpu, no>": lambda: DeviceInfo(0, "PoCL", "cpu-x", "cpu", reason="no"),
     "Stage(level=0, image=uint8 40x60)": lambda: Stage(0, BRICK),
-    "Progress(level=0, levels=1, fraction=0.5)": lambda: Progress(level=0, levels=1, fraction=0.5, image=print),
+    "Progress(level=0, levels=1, fraction=0.5, doing='x'": lambda: Progress(
+        fraction=0.5, doing="x", image=print, maps={"use": lambda: 1}
+    ),
     "CartesianGrid(values={'a': 'uint8": lambda: CartesianGrid({"a": BRICK[None]}, (0, 0, 0), (1, 1, 1)),
     "HardData(points=float64 99x2": lambda: HardData(np.zeros((99, 2)), np.zeros((99, 1)), ("v",), tuple(range(99))),
     "Image(pixels=uint8 40x60": lambda: Image(BRICK, None, Metadata(exif=b"0" * 999)),

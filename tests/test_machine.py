@@ -10,6 +10,7 @@ import subprocess
 import sys
 import uuid
 from contextlib import nullcontext
+from copy import copy
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,7 +33,7 @@ from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import PENDING, Log, Reference
 from simdtex.report.tables import profile_summary, profile_table, seconds_text
-from simdtex.run import Iterating, Progress, Relaxing, Sampling, paced
+from simdtex.run import Progress, paced
 
 # -- The memory that is available, the checks before a run, and that a run takes no more than checked.
 
@@ -238,30 +239,11 @@ def test_a_first_range_that_takes_long_is_not_undercut(clock):
     assert sizes == [20, 20, 20]
 
 
-def test_what_progress_says_of_itself():
-    where = {"level": 2, "levels": 4, "fraction": 0.25, "image": lambda: np.zeros((3, 3))}
-    plain = Progress(**where)
-    assert (plain.doing, plain.stage, plain.maps()) == ("level 2", None, {})
-
-    left = {"temperature_left": 0.125, "temperature": lambda: np.ones((3, 3)), "source": lambda: np.zeros((3, 3, 2))}
-    left["explain"] = lambda row, col: None
-    relaxing = [Relaxing(sweep=7, step=9, phase="relax", end_of_sweep=end, **left, **where) for end in (False, True)]
-    assert relaxing[0].doing == "level 2, sweep 7, temperature 0.125"
-    assert [one.stage for one in relaxing] == [None, "level2-sweep07"]
-    assert list(relaxing[0].maps()) == ["temperature"]
-
-    sampling = [
-        Sampling(end_of_level=end, candidates=lambda: np.array([[1, 10, 100]]), **where) for end in (False, True)
-    ]
-    assert [one.stage for one in sampling] == [None, "level2"]
-    np.testing.assert_array_equal(sampling[0].maps()["candidates"], [[0, 0.5, 1]])
-    alone = Sampling(end_of_level=True, candidates=lambda: np.ones((2, 2), np.int32), **where)
-    assert not alone.maps()["candidates"].any()
-
-    iterating = [Iterating(iteration=3, iterations=5, end_of_iteration=end, **where) for end in (False, True)]
-    assert iterating[0].doing == "iteration 3 of 5"
-    assert [one.stage for one in iterating] == [None, "iteration03"]
-    assert iterating[1].maps() == {}
+def test_progress_has_its_details_and_maps_as_attributes():
+    here = Progress(fraction=0.25, doing="", image=print, details={"sweep": 7}, maps={"temperature": lambda: 1})
+    assert (here.sweep, here.temperature(), copy(here)) == (7, 1, here)
+    with pytest.raises(AttributeError, match=r"no 'tile'; choose from its details and maps: sweep, temperature$"):
+        here.tile  # noqa: B018
 
 
 # -- Profiles: the times of kernels, and their table.

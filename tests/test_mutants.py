@@ -292,7 +292,7 @@ def test_a_run_is_counted(given):
     _, output = simdtex.synthesize(
         texture((24, 25), seed=3), (20, 23), rng=5, device=REFERENCE, full_output=True, callback=seen.append, **given
     )
-    assert [(p.level, p.sweep, p.phase, p.temperature_left, p.end_of_sweep) for p in seen] == [
+    assert [(p.level, p.sweep, p.phase, p.temperature_left, bool(p.stage)) for p in seen] == [
         (
             level.number,
             state.cooling + state.free + 1,

@@ -236,16 +236,18 @@ def test_a_callback_sees_every_channel_of_every_iteration():
     seen = []
 
     def callback(progress):
-        seen.append((progress.iteration, progress.iterations, progress.fraction, progress.end_of_iteration))
+        seen.append((progress.iteration, progress.iterations, progress.fraction, progress.stage))
         assert progress.image().shape == (3, 10, 9)
         assert progress.image().dtype == np.uint8
-        assert progress.stage == (f"iteration{progress.iteration:02d}" if progress.end_of_iteration else None)
+        assert progress.doing == f"iteration {progress.iteration} of 2"
         pictures.append(progress.image())
 
     pictures = []
     sample = np.moveaxis(texture((12, 11), 3), -1, 0)
     made = synthesize(sample, (10, 9), channel_axis=0, iterations=2, callback=callback)
-    assert [(i, n, end) for i, n, _, end in seen] == [(i, 2, c == 2) for i in (1, 2) for c in range(3)]
+    assert [(i, n, end) for i, n, _, end in seen] == [
+        (i, 2, f"iteration0{i}" if c == 2 else None) for i in (1, 2) for c in range(3)
+    ]
     assert [f for _, _, f, _ in seen] == pytest.approx([k / 6 for k in range(1, 7)])
     assert_same_bits(pictures[-1], made)
     alone = synthesize(sample, (10, 9), channel_axis=0, iterations=1)

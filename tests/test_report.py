@@ -28,7 +28,7 @@ from simdtex.report.page import Figure, Section, check_folder, figure_png, new_f
 from simdtex.report.sheet import GAP, STRIP, StageWriter, view
 from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
 from simdtex.report.tables import Table, duration_text, number_text, print_table
-from simdtex.run import Relaxing, Sampling
+from simdtex.run import Progress
 
 # -- Reports: a self-contained page, its pictures as files, valid numbers; tables of pages and terminals.
 
@@ -295,30 +295,10 @@ def test_source_colours_tell_positions_apart():
     assert (display.source_colours(source, (16, 24))[3, 4] == 0).all()
 
 
-def moment(level, sweep, full, end_of_sweep=True):
-    """What a run of mrf would tell its callback."""
-    picture = full[:: 2**level, :: 2**level]
-    return Relaxing(
-        level=level,
-        levels=3,
-        fraction=0.5,
-        image=lambda: picture,
-        sweep=sweep,
-        step=sweep,
-        phase="relax",
-        temperature_left=0.5,
-        end_of_sweep=end_of_sweep,
-        temperature=lambda: np.full(picture.shape[:2], 0.5),
-        source=lambda: np.zeros((*picture.shape[:2], 2), np.int32),
-        explain=lambda row, col: None,
-    )
-
-
-def level_of(level, full, counts, end_of_level=True):
-    """What a run of multires would tell its callback."""
-    picture = full[:: 2**level, :: 2**level]
-    where = {"level": level, "levels": 2, "fraction": 0.5, "end_of_level": end_of_level}
-    return Sampling(image=lambda: picture, candidates=lambda: counts, **where)
+def told(name, level, full, ended=True, **maps):
+    """What a run would tell its callback."""
+    picture, stage = full[:: 2**level, :: 2**level], f"level{level}{name}" if ended else None
+    return Progress(fraction=0.5, doing="", stage=stage, image=lambda: picture, maps=maps)
 
 
 @pytest.mark.parametrize(("dtype", "channels"), [("uint8", (3,)), ("uint16", ()), ("float32", (5,))])
@@ -329,8 +309,9 @@ def test_stages(tmp_path, dtype, channels):
     assert not folder.exists()
     for level in (2, 1, 0):
         for sweep in (1, 2):
-            writer(moment(level, sweep, full, end_of_sweep=False))
-            writer(moment(level, sweep, full))
+            for ended in (False, True):
+                half = np.full(full[:: 2**level, :: 2**level].shape[:2], 0.5)
+                writer(told(f"-sweep{sweep:02d}", level, full, ended, temperature=lambda half=half: half))
     names = {f"{kind}level{level}-sweep{sweep:02d}.png" for kind in ("", "temperature-")
              for level in range(3) for sweep in (1, 2)}  # fmt: skip
     assert set(os.listdir(folder)) == names
@@ -348,8 +329,8 @@ def test_stages_of_levels_without_sweeps(tmp_path):
     for level in (1, 0):
         counts = np.ones((20 >> level, 24 >> level), np.int32)
         counts[0, :3] = 1, 10, 100
-        writer(level_of(level, full, counts, end_of_level=False))
-        writer(level_of(level, full, counts))
+        for ended in (False, True):
+            writer(told("", level, full, ended, candidates=lambda counts=counts: counts))
     names = {f"{kind}level{level}.png" for kind in ("", "candidates-") for level in (0, 1)}
     assert set(os.listdir(folder)) == names
     np.testing.assert_array_equal(image.read(folder / "level1.png").pixels, full[::2, ::2])
@@ -362,7 +343,7 @@ def test_a_resumed_run_keeps_the_stages_before(tmp_path):
     full = np.random.default_rng(0).integers(0, 256, (20, 24), dtype=np.uint8)
     for resumed, sweep in ((False, 1), (True, 2), (False, 3)):
         writer = StageWriter(tmp_path / "a", resumed=lambda resumed=resumed: resumed)
-        writer(moment(0, sweep, full))
+        writer(told(f"-sweep{sweep:02d}", 0, full))
         left = sorted(path.name for path in (tmp_path / "a").glob("level*"))
         assert left == [f"level0-sweep{number:02d}.png" for number in {1: (1,), 2: (1, 2), 3: (3,)}[sweep]]
 
@@ -381,7 +362,7 @@ def test_stage_folder_is_checked_and_cleared(tmp_path):
         (folder / name).touch()
     writer = StageWriter(folder)
     assert len(os.listdir(folder)) == 3
-    writer(moment(0, 1, np.zeros((4, 4), bool)))
+    writer(told("-sweep01", 0, np.zeros((4, 4), bool), temperature=lambda: np.ones((4, 4))))
     assert sorted(os.listdir(folder)) == ["level0-sweep01.png", "temperature-level0-sweep01.png"]
     (folder / "notes.txt").touch()
     with pytest.raises(ValueError, match=r"notes\.txt"):

@@ -230,7 +230,7 @@ def test_progress_counts_every_step_and_ends_every_sweep_once(name):
         steps = [progress.step for progress in here]
         assert steps == sorted(steps) and steps[-1] == len(notes)
         ends = [number for number, (_, last) in enumerate(notes, 1) if last]
-        assert [progress.step for progress in here if progress.end_of_sweep] == ends
+        assert [progress.step for progress in here if progress.stage] == ends
         fractions = [progress.fraction for progress in here]
         assert fractions == sorted(fractions) and fractions[-1] <= 1
 
@@ -258,7 +258,7 @@ def test_a_sweep_may_end_with_a_step_of_no_site(machine):
     assert_same_bits(run(Late(get("coloring")), device=machine, callback=seen.append), expected("coloring", "icm"))
     for level in (1, 0):
         here = [progress for progress in seen if progress.level == level]
-        assert [progress.sweep for progress in here if progress.end_of_sweep] == list(range(1, here[-1].sweep + 1))
+        assert [progress.sweep for progress in here if progress.stage] == list(range(1, here[-1].sweep + 1))
 
 
 @pytest.mark.parametrize("name", ["synchronous", "coloring"])
@@ -269,5 +269,5 @@ def test_the_pieces_of_a_step_share_its_number(name):
     assert steps == sorted(steps)
     assert set(steps) == set(range(1, max(steps) + 1))
     assert len(steps) > len(set(steps)), "some step has pieces"
-    ends = [progress.sweep for progress in seen if progress.level == 0 and progress.end_of_sweep]
+    ends = [progress.sweep for progress in seen if progress.level == 0 and progress.stage]
     assert ends == list(range(1, len(ends) + 1))

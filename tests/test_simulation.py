@@ -288,10 +288,10 @@ def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
 
     def look(progress):
         shares.append(progress.fraction)
-        if progress.complete:
+        if progress.stage:
             seen.append((progress, progress.image()))
         else:
-            assert progress.stage is None and progress.image().ndim == 2 + (axis is not None)
+            assert progress.image().ndim == 2 + (axis is not None)
 
     training = TRAINING if axis is None else np.moveaxis(texture((16, 20), 2), -1, 0)
     found = simulate(training, n=3, first=2, jobs=jobs, channel_axis=axis, callback=look)
@@ -299,7 +299,8 @@ def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
     assert len(shares) > 9 and shares == sorted(shares) and (0 < shares[0] < 1 / 3, shares[-1]) == (True, 1.0)
     assert sorted(one.realisation for one, _ in seen) == [2, 3, 4]
     assert {one.realisations for one, _ in seen} == {3}
-    assert len({one.stage for one, _ in seen}) == 3
+    assert {one.stage for one, _ in seen} == {f"realisation000{number}" for number in (2, 3, 4)}
+    assert seen[0][0].doing == "1 of 3 realisations finished"
     for one, picture in seen:
         assert np.array_equal(picture, found.sel(realisation=one.realisation).values)
 

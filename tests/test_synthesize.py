@@ -252,12 +252,14 @@ def test_progress_tells_level_sweep_and_phase():
         sweeps = [progress.sweep for progress in here]
         assert sweeps == sorted(sweeps)
         assert set(sweeps) == set(range(1, max(sweeps) + 1))
-        assert [p.sweep for p in here if p.end_of_sweep] == list(range(1, max(sweeps) + 1)), "one end for each"
-        phases = [progress.phase for progress in here if progress.end_of_sweep]
+        ends = [f"level{level}-sweep{sweep:02d}" for sweep in range(1, max(sweeps) + 1)]
+        assert [p.stage for p in here if p.stage] == ends, "one end for each"
+        phases = [progress.phase for progress in here if progress.stage]
         assert phases == ["relax"] * (len(phases) - 2) + ["free"] * 2
         assert 0 < here[0].temperature_left <= 1
         assert all(progress.temperature_left == 0 for progress in here if progress.phase == "free")
-        assert here[-1].end_of_sweep
+        assert here[-1].stage == ends[-1]
+        assert here[0].doing == f"level {level}, sweep 1, temperature {here[0].temperature_left:.3f}"
 
 
 @pytest.mark.parametrize("axis", [None, 0])
@@ -267,7 +269,7 @@ def test_progress_shows_the_picture_and_its_temperature(axis):
     pictures = []
 
     def look(progress):
-        if progress.end_of_sweep:
+        if progress.stage:
             pictures.append((progress.level, progress.image(), progress.temperature()))
 
     image = simdtex.synthesize(

@@ -193,7 +193,7 @@ def test_a_callback_sees_every_part_of_a_turn():
     seen, shapes = [], set()
 
     def callback(progress):
-        seen.append((progress.iteration, progress.fraction, progress.end_of_iteration))
+        seen.append((progress.iteration, progress.fraction, bool(progress.stage)))
         shapes.add(progress.image().shape)
 
     solid(texture((12, 12), 3), (6, 7, 8), channel_axis=-1, iterations=2, callback=callback)

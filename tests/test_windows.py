@@ -137,7 +137,7 @@ def run(schedule, shape, device):
     seen = []
 
     def watch(progress):
-        if progress.end_of_sweep:
+        if progress.stage:
             seen.append((progress.level, progress.sweep, progress.image(), progress.source(), progress.temperature()))
 
     simdtex.synthesize(BRICK, shape, schedule=schedule, **RULES, device=device, callback=watch)

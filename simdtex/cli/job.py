@@ -22,6 +22,7 @@ from simdtex.cli.options import CHECKPOINT, DEVICE, DRY_RUN, QUIET, SEED, job_op
 
 if TYPE_CHECKING:
     from simdtex.checkpoint import Checkpoint
+    from simdtex.run import Progress
 
 
 CALIBRATION, SURE = 0.1, 1.0
@@ -167,7 +168,7 @@ def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
     forecast, seconds, levels = Forecast(), None, 1
     memory.required.clear()
 
-    def observe(progress: Any) -> None:
+    def observe(progress: Progress) -> None:
         nonlocal seconds, levels
         seconds, levels = forecast.seconds(progress.fraction), progress.levels
         if seconds is not None:
@@ -235,22 +236,21 @@ def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) ->
 
 
 @contextmanager
-def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
+def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Show a progress bar on a terminal; elsewhere print a line every ten seconds, and whenever another job begins.
 
-    Yields ``show(fraction, doing, job="")``: the share of the whole that is done, what is being done, and the job that
-    this is part of if there are several. Once, it says how long a long run is expected to last.
+    Yields the callback that shows a progress. Once, it says how long a long run is expected to last.
     """
     if quiet:
-        yield lambda fraction, doing, job="": None
+        yield lambda progress: None
         return
-    forecast, last, said, next_line = Forecast(), "", False, time.perf_counter() + EVERY
+    forecast, last, said, next_line = Forecast(), None, False, time.perf_counter() + EVERY
 
-    def tell(fraction: float, doing: str, job: str = "") -> None:
+    def tell(progress: Progress) -> None:
         nonlocal last, said, next_line
-        if job != last and not bar:
+        if (job := progress.details.get("job")) != last and not bar:
             click.echo(job, err=True)
-        last, seconds = job, forecast.seconds(fraction, SURE)
+        last, seconds = job, forecast.seconds(progress.fraction, SURE)
         if seconds is None:
             return
         if seconds > LONG and not said:
@@ -258,8 +258,8 @@ def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
             echo(f"simdtex: this is expected to last {duration(seconds)}")
         now = time.perf_counter()
         if now >= next_line and not bar:
-            next_line = now + EVERY
-            click.echo(f"{fraction:.0%}, {doing}; {duration(seconds - (now - forecast.began))} left", err=True)
+            next_line, left = now + EVERY, duration(seconds - (now - forecast.began))
+            click.echo(f"{progress.fraction:.0%}, {progress.doing}; {left} left", err=True)
 
     def duration(seconds: float) -> str:
         from simdtex.report.tables import duration_text
@@ -271,16 +271,17 @@ def progress_bar(quiet: bool) -> Iterator[Callable[..., None]]:
     if not bar:
         yield tell
         return
-    from rich.console import Console  # only where a bar is drawn: it takes long to load
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich import progress as bars  # only where a bar is drawn: it takes long to load
+    from rich.console import Console
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+    columns = (bars.TextColumn("{task.description}"), bars.BarColumn(), bars.TaskProgressColumn())
+    with bars.Progress(*columns, bars.TimeRemainingColumn(), console=Console(stderr=True), transient=True) as shown:
         task, echo = shown.add_task("starting", total=1.0), shown.console.print
 
-        def show(fraction: float, doing: str, job: str = "") -> None:
-            shown.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
-            tell(fraction, doing, job)
+        def show(progress: Progress) -> None:
+            parts = [*filter(None, [progress.details.get("job")]), progress.doing]
+            shown.update(task, completed=progress.fraction, description=", ".join(parts))
+            tell(progress)
 
         yield show
 
@@ -291,7 +292,7 @@ def watching(
     stages: Path | None = None,
     limits: tuple[float, float] = (0.0, 1.0),
     checkpoint: Checkpoint | None = None,
-) -> Iterator[Callable[[Any], None]]:
+) -> Iterator[Callable[[Progress], None]]:
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None
     if stages:
@@ -300,9 +301,9 @@ def watching(
         writer = StageWriter(stages, limits=limits, resumed=lambda: bool(checkpoint and checkpoint.resumed))
     with progress_bar(quiet) as show:
 
-        def callback(progress: Any) -> None:
+        def callback(progress: Progress) -> None:
             nonlocal writer
-            show(progress.fraction, progress.doing)
+            show(progress)
             if writer:
                 working, writer = writer, None
                 with afterwards():  # the picture does not wait for its stages

@@ -11,7 +11,7 @@ import click
 
 from simdtex.cli.command import afterwards, command
 from simdtex.cli.inputs import read_picture
-from simdtex.cli.job import command_line, progress_bar
+from simdtex.cli.job import command_line, watching
 from simdtex.cli.options import DEVICE, QUIET, given, job_options, output_option
 from simdtex.cli.places import FOLDER, READ
 from simdtex.schedules import PARALLEL
@@ -72,17 +72,17 @@ def schedules(
     whole("--seeds", seeds, 1)
     pixels, channel_axis = _sample(sample)
     began = time.perf_counter()
-    with progress_bar(quiet) as show:
+    with watching(quiet) as callback:
         found = compare(
             pixels,
             shape,
             chosen,
             seeds=range(seed, seed + seeds),
             channel_axis=channel_axis,
-            callback=lambda fraction, job, progress: show(fraction, progress.doing, job),
+            callback=callback,
             **given(options),
         )
-        spins = of_schedules(chosen, options["device"], seed, show) if ising else None
+        spins = of_schedules(chosen, options["device"], seed, callback) if ising else None
     with afterwards():
         write_comparison(output, found, command_line(), spins)
     if quiet:

@@ -93,7 +93,7 @@ def synthesize(
     device : str, optional
         As in `simdtex.synthesize`, on every worker.
     callback : callable, optional
-        Called with a `simdtex.run.Tiling` after every tile.
+        Called with a `simdtex.run.Progress` after every tile.
     note : callable, optional
         Receives a sentence while the run waits for workers. None: a warning.
     ended : callable, optional

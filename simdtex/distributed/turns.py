@@ -29,7 +29,7 @@ from simdtex.model.source_map import apply_source_map
 from simdtex.ops.finish import gaussian_offsets
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.use import use_penalty
-from simdtex.run import Callback, Output, Tiling
+from simdtex.run import Callback, Observer, Output, Progress
 
 
 class Context(NamedTuple):
@@ -205,11 +205,11 @@ class Turns:
         return store.save(Turn(number, "show", 0))
 
 
-class Watch:
-    """Calls the callback with a `simdtex.run.Tiling` after every tile."""
+class Watch(Observer):
+    """The observer of a run: it reports every tile, and the store holds the state."""
 
     def __init__(self, run: Turns, callback: Callback | None) -> None:
-        self._run, self._callback = run, callback
+        super().__init__(run, callback)
         self._expected = expected_work(run.lattices)
         self._fraction = 0.0
 
@@ -217,29 +217,20 @@ class Watch:
         """Report that ``done`` tiles have finished a turn."""
         if self._callback is None:
             return
-        level = self._run.work.layout.levels[turn.level]
+        level, sweep = self._run.work.layout.levels[turn.level], turn.cooling + turn.free + 1
         self._fraction = max(self._fraction, self._share(turn, level, done / level.count))
+        what = f"level {turn.level}" + (f", sweep {sweep}" if turn.phase == "sweep" else "")
+        what = "writing the picture" if turn.phase == "show" else what
         self._callback(
-            Tiling(
+            Progress(
                 level=turn.level,
                 levels=self._run.lattices.levels,
                 fraction=self._fraction,
+                doing=f"{what}, tile {done} of {level.count}",
                 image=partial(self._picture, turn, level),
-                phase=turn.phase,
-                sweep=turn.cooling + turn.free + 1,
-                tile=done,
-                tiles=level.count,
+                details={"phase": turn.phase, "sweep": sweep, "tile": done, "tiles": level.count},
             )
         )
-
-    def step(self, turn: Turn, info: None) -> None:
-        """Do nothing: tiles are reported one by one."""
-
-    def save(self) -> None:
-        """Return nothing: the store holds the state."""
-
-    def load(self, saved: None) -> None:
-        """Do nothing: the store holds the state."""
 
     def _share(self, turn: Turn, level: LevelLayout, part: float) -> float:
         """Return the finished share of the expected work."""

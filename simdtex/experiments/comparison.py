@@ -22,7 +22,7 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import Options
 from simdtex.options import resolve
 from simdtex.random import as_seed
-from simdtex.run import Relaxing
+from simdtex.run import Callback, Progress
 from simdtex.schedules import Active, Info, Schedule, Setting, Watched
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
@@ -92,7 +92,7 @@ class Recorder:
     def __init__(
         self,
         channel_axis: int | None = None,
-        then: Callable[[Relaxing], Any] = lambda progress: None,
+        then: Callback = lambda progress: None,
         wait: Callable[[], Any] = lambda: None,
     ) -> None:
         self.sweeps: list[Sweep] = []
@@ -100,10 +100,10 @@ class Recorder:
         self._axis, self._then, self._wait = channel_axis, then, wait
         self._last: list[NDArray[Any]] = []
 
-    def __call__(self, progress: Relaxing) -> None:
+    def __call__(self, progress: Progress) -> None:
         """Record if a sweep has ended."""
         self._then(progress)
-        if not progress.end_of_sweep:
+        if not progress.stage:
             return
         self._wait()
         began = time.perf_counter()
@@ -301,7 +301,7 @@ def compare(
     seeds: Sequence[int] = (1, 2, 3),
     channel_axis: int | None = None,
     device: str | Machine | None = None,
-    callback: Callable[[float, str, Relaxing], Any] | None = None,
+    callback: Callback | None = None,
     **options: Any,
 ) -> Comparison:
     """Return a comparison of several schedules for the same job.
@@ -321,8 +321,7 @@ def compare(
     device : str, optional
         As in `simdtex.synthesize`; all runs are on one machine.
     callback : callable, optional
-        ``callback(fraction, job, progress)``, called several times a second: the finished share of all runs, 0 to 1,
-        the current run in words, and its progress. An exception ends the comparison.
+        As in `simdtex.synthesize`; the fraction is that of all runs.
     **options
         Options of the method ``mrf``, see `simdtex.methods.mrf.Options`, which lists the defaults that differ in
         ``schedules``: ``search`` is ``"exact"``, so that the model decides and not a list of candidates.
@@ -381,10 +380,10 @@ def compare(
     turns = [(seed, name) for seed in keys for name in chosen]  # so that changes of the load affect all alike
     for number, (seed, name) in enumerate(turns):
 
-        def report(progress: Relaxing, number: int = number, seed: int = seed, name: str = name) -> None:
+        def report(progress: Progress, number: int = number, seed: int = seed, name: str = name) -> None:
             if callback:
                 job = f"run {number + 1} of {len(turns)}: {name}, seed {seed}"
-                callback((number + progress.fraction) / len(turns), job, progress)
+                callback(progress.within(number, len(turns), job))
 
         if not found[name]:
             call.build_kernels(chosen[name], size)
@@ -406,7 +405,7 @@ class _Call:
     options: dict[str, Any]
 
     def run(
-        self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Callable[[Relaxing], None]
+        self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Callback
     ) -> tuple[Run, tuple[bool, ...], dict[str, Any]]:
         """Return a run, the schedule's claim of equation (14) at each level, and the options as executed."""
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)

@@ -10,10 +10,10 @@ The exact energy of the Ising model on a torus, J = k_B = 1, no field, is that o
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log, pi, prod, sqrt, tanh
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.ops.snapshot import snapshot
 from simdtex.options import one_of, real, whole
+from simdtex.run import Callback, Progress
 
 CRITICAL = 2 / log(1 + sqrt(2))
 """T_c = 2 / ln(1 + sqrt(2)) = 2.269..., in units of J / k_B."""
@@ -184,7 +185,7 @@ def ising(
     schedule: str | schedules.Schedule,
     *,
     seed: int = 1,
-    callback: Callable[[float], Any] | None = None,
+    callback: Callback | None = None,
 ) -> Chains:
     """Relax Ising spins by a schedule, and return measurements after every sweep.
 
@@ -196,7 +197,7 @@ def ising(
     seed : int
         0 to 2**64 - 1; keys every random number.
     callback : callable, optional
-        Called with the share of the work that is done after every sweep.
+        Called with a `simdtex.run.Progress` after every sweep; the image is the spins of all chains.
 
     Notes
     -----
@@ -219,7 +220,8 @@ def ising(
         if sweep >= burn_in:
             measured[sweep - burn_in] = _measure(run.look())
         if callback:
-            callback((sweep + 1) / (burn_in + sweeps))
+            done, of = sweep + 1, burn_in + sweeps
+            callback(Progress(fraction=done / of, doing=f"sweep {done} of {of}", image=run.look))
     energy, even, odd = np.moveaxis(measured.reshape(sweeps, 3, -1, experiment.seeds), 0, -1)
     return Chains(
         schedule=run.schedule.name,
@@ -427,12 +429,10 @@ class Spins(NamedTuple):
     pictures: list[Chains]
 
 
-def of_schedules(
-    chosen: Sequence[schedules.Schedule], device: str | None, seed: int, show: Callable[[float, str, str], None]
-) -> Spins:
+def of_schedules(chosen: Sequence[schedules.Schedule], device: str | None, seed: int, callback: Callback) -> Spins:
     """Return the Ising model under each schedule: 32 chains at each of `TEMPERATURES`, on a lattice of `SIZE`.
 
-    ``show`` receives the finished share, a text, and the schedule that runs.
+    ``callback`` is called with a `simdtex.run.Progress`, whose fraction is that of all schedules.
     """
     machine = open_machine(device)
     experiment = Experiment(SIZE, TEMPERATURES, seeds=32, sweeps=300, burn_in=600)
@@ -440,8 +440,8 @@ def of_schedules(
     runs, pictures = [], []
     for place, schedule in enumerate(chosen):
 
-        def part(share: float, place: int = place, name: str = schedule.name) -> None:
-            show((place + share) / len(chosen), "", f"Ising spins by {name}")
+        def part(progress: Progress, place: int = place, name: str = schedule.name) -> None:
+            callback(progress.within(place, len(chosen), f"Ising spins by {name}"))
 
         runs.append(ising(machine, experiment, schedule, seed=seed, callback=part))
         pictures.append(ising(machine, once, schedule, seed=seed))

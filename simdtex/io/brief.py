@@ -14,7 +14,7 @@ class Brief:
 
     def __repr__(self) -> str:
         """Return the fields with the shape and the type of arrays, whose values would fill pages, without functions."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
+        values = {one.name: getattr(self, one.name) for one in fields(self) if one.repr}  # type: ignore[arg-type]
         shown = [f"{name}={_short(one)}" for name, one in values.items() if one is not None and not callable(one)]
         return f"{type(self).__name__}({', '.join(shown)})"
 

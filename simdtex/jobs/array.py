@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from math import prod, sqrt
@@ -212,11 +211,17 @@ def _run(
         x, source = values(program.state)[:-1].astype(np.uint16), values(program.source)[0]
         return run.sample.picture(grid.decimated(x), grid.decimated(source))
 
-    follow = _progress(run, callback, lambda k: run.grid(k).decimated(values(program.state)[-1]), picture)
+    expected, seen, left = expected_work(run), (-1, 0), 1.0
     for number in reversed(range(run.levels)):
         for sweep, active in program.relax(level_of(run, number)):
             steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
-            follow(steps[-1])
+            if callback is None:
+                continue
+            if seen != (number, sweep):
+                seen, left = (number, sweep), float(run.grid(number).decimated(values(program.state)[-1]).mean()) / 1024
+            share = fraction_done(expected, number, 1 - sqrt(min(1.0, left)), 0.0)
+            doing, now = f"level {number}, sweep {sweep}", partial(picture, number)
+            callback(Progress(level=number, levels=run.levels, fraction=share, doing=doing, image=now))
         stages.append(Stage(number, picture(number)))
     counts: dict[str, dict[str, Count]] = {}
     for (section, kind), count in mp1.counts.items():
@@ -227,24 +232,3 @@ def _run(
     more: dict[str, Any] = {"counts": counts, "seconds": mp1.seconds(), "steps": steps}
     t = values(program.state)[-1] / 1024
     return stages[-1].image, Execution(source, t, stages, statistics, **more)
-
-
-def _progress(
-    run: Lattices,
-    callback: Callback | None,
-    temperature: Callable[[int], NDArray[Any]],
-    picture: Callable[[int], NDArray[Any]],
-) -> Callable[[Step], None]:
-    """Return a function that reports each step to the callback, with the estimated share of the work that is done."""
-    expected, seen, left = expected_work(run), (-1, 0), 1.0
-
-    def follow(step: Step) -> None:
-        nonlocal seen, left
-        if callback is None:
-            return
-        if seen != step[:2]:
-            seen, left = step[:2], float(temperature(step.level).mean()) / 1024
-        share = fraction_done(expected, step.level, 1 - sqrt(min(1.0, left)), 0.0)
-        callback(Progress(level=step.level, levels=run.levels, fraction=share, image=partial(picture, step.level)))
-
-    return follow

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.driver import drive
+from simdtex.inputs import Classify
 from simdtex.jobs.inputs import Work, check_mask, check_picture, is_several, public
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
@@ -24,7 +25,7 @@ Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
 @public("classify")
-def classify(call: Any) -> Work:
+def classify(call: Classify) -> Work:
     """Return a label for each pixel of a picture: the texture around it, or unknown.
 
     Returns

@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import drive
+from simdtex.inputs import Extend, Fill
 from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
@@ -25,7 +26,7 @@ from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, within_32_bits
-from simdtex.run import Callback, Output, OutputWithSource
+from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 REACH = 128
 """The least distance around its window from which a hole is filled, pixels."""
@@ -79,7 +80,7 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 
 
 @public("fill")
-def fill(call: Any) -> Work:
+def fill(call: Fill) -> Work:
     """Return a picture with its holes filled with the texture around them.
 
     Returns
@@ -126,7 +127,7 @@ def fill(call: Any) -> Work:
 
 
 @public("extend", without="boundary")
-def extend(call: Any) -> Work:
+def extend(call: Extend) -> Work:
     """Return a picture that is continued beyond its edges, or seamless.
 
     Returns
@@ -271,17 +272,21 @@ class Filling:
         sample: WindowSample,
         number: int,
         count: int,
-        progress: Any,
+        progress: Progress,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
         at = (window.rows, window.cols)
         pasted = partial(paste, at=at, hole=self.hole[at], level=progress.level)
-        shown = {
-            "image": lambda: pasted(whole.image, progress.image()),
-            "temperature": lambda: pasted(whole.temperature, progress.temperature()),
-            "source": lambda: pasted(whole.source, shifted(progress.source(), sample.corner)),
-        }
-        return callback(replace(progress, **shown, fraction=(number + progress.fraction) / count))
+        read: Any = progress.source
+        return callback(
+            replace(
+                progress,
+                fraction=(number + progress.fraction) / count,
+                image=lambda: pasted(whole.image, progress.image()),
+                maps={"temperature": lambda: pasted(whole.temperature, progress.temperature())},
+                source=lambda: pasted(whole.source, shifted(read(), sample.corner)),
+            )
+        )
 
     def _blend(self, whole: Whole) -> None:
         """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""

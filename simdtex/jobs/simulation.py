@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from math import prod
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest
 from simdtex.driver import check_shape, check_sides, drive
+from simdtex.inputs import Cells, Estimate, Simulate
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import (
@@ -39,7 +41,7 @@ from simdtex.model.given import Given, Soft
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.options import moderate, require, resolve, whole, within_32_bits
-from simdtex.run import Callback, Output, Progress, Simulating
+from simdtex.run import Callback, Output, Progress
 
 if TYPE_CHECKING:
     import xarray
@@ -49,7 +51,7 @@ MOST_TOGETHER = 4
 
 
 @public("simulate")
-def simulate(call: Any) -> Work:
+def simulate(call: Simulate) -> Work:
     """Return realisations that look like a training image and honour data (multiple-point simulation).
 
     Returns
@@ -149,17 +151,18 @@ def simulate(call: Any) -> Work:
                 with lock:
                     checkpointing.offer(info, state)
 
-        def tell(number: int, progress: Any, image: Callable[[], NDArray[Any]]) -> None:
-            """Report a part of a realisation, or without ``progress`` its end."""
-            shares[number] = progress.fraction if progress else 1
-            shown: dict[str, Any] = {"level": progress.level if progress else 0, "levels": plan.levels, "image": image}
-            shown |= {"realisation": first + number, "realisations": n, "complete": progress is None}
+        def tell(number: int, progress: Progress) -> None:
+            shares[number] = progress.fraction
             with lock:
                 if callback:
-                    callback(Simulating(**shown, fraction=shares.sum() / n, finished=len(finished)))
+                    doing = f"{len(finished)} of {n} realisations finished"
+                    about = {"realisation": first + number, "finished": len(finished), "realisations": n}
+                    callback(replace(progress, fraction=shares.sum() / n, doing=doing, details=about))
 
         def one(number: int, machine: Machine) -> None:
-            told = callback and (lambda progress: tell(number, progress, progress.image))
+            told = callback and (
+                lambda progress: tell(number, replace(progress, stage=None, source=None, explain=None))
+            )
             own = Checkpointing(None, offer_finished)
             picture, output = drive(plan, machine, realisation_seed(seed, first + number), told, own)
             if inputs.given and inputs.given.outside is not None:
@@ -171,7 +174,8 @@ def simulate(call: Any) -> Work:
                     sources[number] = copies.sources(at, columns == 3) if copies else at
                 finished.append(number)
                 checkpointing.offer(None, state)
-            tell(number, None, lambda: picture)
+            name = f"realisation{first + number:04d}"
+            tell(number, Progress(levels=plan.levels, fraction=1.0, doing="", stage=name, image=lambda: picture))
 
         try:
             _in_turn(one, [number for number in range(n) if number not in finished], machines)
@@ -204,7 +208,7 @@ def simulate(call: Any) -> Work:
 
 
 @public("estimate")
-def estimate(call: Any) -> Work:
+def estimate(call: Estimate) -> Work:
     """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
 
     Returns
@@ -268,8 +272,8 @@ def estimate(call: Any) -> Work:
             found[:, here] = probability.T if categorical else _moments(probability, of, own)
             done += here.size
             if callback:
-                now = found.T.reshape(*size, -1).copy
-                callback(Progress(level=0, levels=1, fraction=done / len(sites), image=now))
+                now, doing = found.T.reshape(*size, -1).copy, f"{done} of {len(sites)} cells"
+                callback(Progress(fraction=done / len(sites), doing=doing, image=now))
         told = given.values[given.whole][:, 0]
         certain = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])
         found[:, given.whole.ravel()] = certain
@@ -315,7 +319,7 @@ def realisation_seed(seed: int, number: int) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def placing(call: Any) -> Placing:
+def placing(call: Cells) -> Placing:
     """Return a function that places a table of data in the cells of a call."""
     return partial(place_hard_data, origin=call.origin, cell=call.cell, several=call.several, outside=call.outside)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.driver import with_channels_last
-from simdtex.inputs import options_of
+from simdtex.inputs import Mix, Solid, Synth, options_of
 from simdtex.jobs.inputs import Work, check_inputs, public
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf, pyramid
@@ -33,7 +33,7 @@ NOT_REPLAYED = ("method", "callback", "full_output", "checkpoint", "options")
 
 
 @public("synth")
-def synthesize(call: Any) -> Work:
+def synthesize(call: Synth) -> Work:
     """Synthesise a picture of any size with the texture of a sample.
 
     Returns
@@ -78,7 +78,7 @@ def synthesize(call: Any) -> Work:
 
 
 @public("solid")
-def synthesize_solid(call: Any) -> Work:
+def synthesize_solid(call: Solid) -> Work:
     """Make a solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
 
     Returns
@@ -104,7 +104,7 @@ def synthesize_solid(call: Any) -> Work:
 
 
 @public("mix")
-def mix(call: Any) -> Work:
+def mix(call: Mix) -> Work:
     """Return a mixture of several textures, by pyramid matching.
 
     Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low

@@ -35,6 +35,7 @@ from simdtex.model.display import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
 from simdtex.options import one_of, resolve
+from simdtex.run import Progress
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 
@@ -284,10 +285,10 @@ class Session:
         sample = example("gravel")[:side, :side]
         pictures: list[bytes] = []
 
-        def keep(progress: Any) -> None:
+        def keep(progress: Progress) -> None:
             if self._closed or not self._messages.empty():
                 raise Cancelled
-            if progress.end_of_sweep and (progress.level < progress.levels - 1 or progress.sweep % 4 == 0):
+            if progress.stage and (progress.level < progress.levels - 1 or progress.sweep % 4 == 0):
                 layer = frames.picture(progress.image(), sample, shape)
                 pictures.append(frames.thumbnail(layer, DEMO_SIDE).pixels)
 
@@ -491,7 +492,7 @@ class Session:
         self.send(self._begun, [])
         return levels
 
-    def _watch(self, job: Job, progress: Any) -> None:
+    def _watch(self, job: Job, progress: Progress) -> None:
         """Handle messages during a run, show it, and wait while it is paused: the callback of the run."""
         while True:
             self._handle_all()
@@ -504,7 +505,7 @@ class Session:
                 return
             self._handle(*self._messages.get())
 
-    def _show_run(self, job: Job, progress: Any) -> None:
+    def _show_run(self, job: Job, progress: Progress) -> None:
         """Send the progress of the run, and a frame of it or of the selected result."""
         fields = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
         self.send({"kind": "progress", **fields, "paused": self._paused}, [])
@@ -512,8 +513,8 @@ class Session:
             self._machine.sync()  # so that the frame's time excludes the run's kernels
         began = time.perf_counter()
         if self._selected is None:
-            source, temperature = getattr(progress, "source", None), getattr(progress, "temperature", None)
-            layers = job.layers(progress.picture, source, temperature, ended=False)
+            temperature = progress.maps.get("temperature")
+            layers = job.layers(progress.image, progress.source, temperature, ended=False)
             self._send_frame(layers, "run", smooth=False)
         elif self._stale:
             self._show_selected()

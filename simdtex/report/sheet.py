@@ -223,12 +223,16 @@ class StageWriter:
             return
         if not self._started:
             self._start()
-        values = progress.picture()
+        image = progress.image()
+        values = image[len(image) // 2] if progress.solid else image
         if self._limits is None and values.dtype.kind != "b":
             self._limits = float(values.min()), float(values.max())
         picture = to_display(values, self._limits)
         write(self.folder / f"{name}.png", picture if picture.ndim == 2 else picture[..., :4])
-        for kind, values in progress.maps().items():
+        for kind, read in progress.maps.items():
+            values = read()
+            if values.dtype.kind in "iu":
+                values = np.log(values) / np.log(max(2, values.max()))
             write(self.folder / f"{kind}-{name}.png", temperature_colours(values))
 
     def _start(self) -> None:

@@ -23,7 +23,7 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
 from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Labelling, Output
+from simdtex.run import Callback, Observer, Output, Progress
 
 WORK = 2**32
 """About the number of multiply-adds of a step."""
@@ -88,14 +88,6 @@ class State(NamedTuple):
     changed: tuple[int, ...] = ()
 
 
-class Info(NamedTuple):
-    """A description of a step: the finished ``fraction`` of the work, ``doing`` in words, and the ``labels``."""
-
-    fraction: float
-    doing: str
-    labels: NDArray[np.uint8]
-
-
 class _Segment(NamedTuple):
     """The sites of a label in a strip of the picture.
 
@@ -137,13 +129,15 @@ class Run:
         logs = np.zeros((len(self.model.experts), len(self.plan.names), *shape), np.uint16)
         return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 
-    def step(self, state: State, watch: Callable[..., None]) -> tuple[State, Info]:
+    def step(self, state: State, watch: Callable[..., None]) -> tuple[State, None]:
         """Compare the next rows with the exemplars of every class or, after the last row, relax labels in a sweep."""
-        after = self._compared(state) if state.done < self.grid.rows else self._swept(state)
-        compared = after.done / self.grid.rows
-        sweeps = len(after.changed) / max(1, self.options.sweeps)
-        doing = f"sweep {len(after.changed)}" if after.changed else f"compared {100 * compared:.0f} %"
-        return after, Info(0.9 * compared + 0.1 * sweeps, doing, after.labels)
+        return (self._compared(state) if state.done < self.grid.rows else self._swept(state)), None
+
+    def shown(self, state: State) -> NDArray[np.uint8]:
+        """Return the labels so far, (rows, cols, 1), 0 where pixels are not yet compared."""
+        labels: NDArray[np.uint8] = self.labels[state.labels + np.uint8(1)]
+        labels[state.done :] = 0
+        return labels[..., None]
 
     def _compared(self, state: State) -> State:
         machine, cols = self.machine, self.grid.cols
@@ -280,30 +274,19 @@ class Run:
         return Record(self, callback)
 
 
-class Record:
-    """The progress of a classification: ``callback`` is called with a `simdtex.run.Labelling` after every step."""
+class Record(Observer):
+    """The observer of a classification: the state holds everything that it reports."""
 
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        self._run, self._callback = run, callback
+    _run: Run
 
-    def part(self, *seen: Any) -> None:
-        """Do nothing, since steps are short."""
-
-    def step(self, state: State, info: Info) -> None:
+    def step(self, state: State, info: None) -> None:
         """Report a step."""
         if self._callback:
-            labels = self._run.labels[info.labels + np.uint8(1)]
-            labels[state.done :] = 0  # not compared yet
-            now: dict[str, Any] = {
-                "level": 0,
-                "levels": 1,
-                "fraction": info.fraction,
-                "image": lambda: labels[..., None],
-            }
-            self._callback(Labelling(work=info.doing, **now))
-
-    def save(self) -> None:
-        """Return nothing: the state holds everything."""
-
-    def load(self, saved: None) -> None:
-        """Do nothing: the state holds everything."""
+            compared, sweeps = state.done / self._run.grid.rows, len(state.changed)
+            self._callback(
+                Progress(
+                    fraction=0.9 * compared + 0.1 * sweeps / max(1, self._run.options.sweeps),
+                    doing=f"sweep {sweeps}" if sweeps else f"compared {100 * compared:.0f} %",
+                    image=lambda: self._run.shown(state),
+                )
+            )

@@ -2,7 +2,7 @@
 """The explanation of a site's choice: one relaxation by the engine's own operations, with each of its terms.
 
 `explained` relaxes a site by the twins of the operations, from a copy of the field on the host, and changes nothing. So
-it serves both a run in progress (`simdtex.run.Relaxing.explain`) and a run that is made for the explanation
+it serves both a run in progress (`simdtex.run.Progress.explain`) and a run that is made for the explanation
 (`simdtex.explain`). The twins have the device's bits, so both take the same candidate.
 """
 

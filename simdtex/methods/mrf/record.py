@@ -21,29 +21,25 @@ from simdtex.model.lattice import Grid
 from simdtex.model.source_map import effective_use
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import CandidateList, most_listed
-from simdtex.run import Callback, OutputWithSource, Relaxing, Stage
+from simdtex.run import Callback, Observer, OutputWithSource, Progress, Stage
 
 STEP, LISTED = 200_000, 16
 """What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
 
 
-class Record:
-    """The observer of a run: it receives every part and every end of a sweep, and changes nothing.
+class Record(Observer):
+    """The observer of a run: it reports every part of a sweep, and keeps counts and the stage of every level.
 
-    ``callback`` is called with a `simdtex.run.Relaxing` after every part of a sweep. ``stages`` holds each level's
-    picture at its end, ``reports`` the counts of each level (`simdtex.run.Output`), and ``launches`` the number of
-    kernels that the machine had launched before the run.
+    ``launches`` is the number of kernels that the machine had launched before the run.
     """
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
+        super().__init__(run, callback)
         options = run.options
-        self.stages: list[Stage] = []
-        self.reports: list[dict[str, Any]] = []
         self.account: Account | None = None
         if options.array:
             self.account = Account(parse_array(options.array), run.offsets, run.sample.channels)
         self.launches = run.machine.launches
-        self._run, self._callback = run, callback
         self._expected = expected_work(run)
         self._fraction = 0.0
         self._began, self._first_left = time.perf_counter(), 0.0  # of the current level
@@ -68,19 +64,20 @@ class Record:
         self._ended, self._first_left = part.last, self._first_left or left
         self._advance(level.number, state, left, min(1.0, self._done / max(1, state.active or sites)))
         if self._callback:
-            read = (self._run, level.grid, part.field)
+            read, sweep = (self._run, level.grid, part.field), state.cooling + state.free + 1
             self._callback(
-                Relaxing(
+                Progress(
                     level=level.number,
                     levels=self._run.levels,
                     fraction=self._fraction,
+                    doing=f"level {level.number}, sweep {sweep}, temperature {left:.3f}",
+                    stage=f"level{level.number}-sweep{sweep:02d}" if part.last else None,
                     image=partial(picture, *read),
-                    sweep=state.cooling + state.free + 1,
-                    step=report["steps"],
-                    phase="free" if free else "relax",
-                    temperature_left=left,
-                    end_of_sweep=part.last,
-                    temperature=partial(temperatures, *read),
+                    details={
+                        **{"sweep": sweep, "step": report["steps"]},
+                        **{"phase": "free" if free else "relax", "temperature_left": left},
+                    },
+                    maps={"temperature": partial(temperatures, *read)},
                     source=partial(sources, *read),
                     explain=partial(self._explain, level, state, part),
                 )

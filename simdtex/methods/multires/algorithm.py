@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +33,7 @@ from simdtex.model.source_map import effective_use
 from simdtex.ops.candidates import Sampled, candidates
 from simdtex.ops.pyramids import laplacian_collapse
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Output, OutputWithSource, Sampling, Stage, paced
+from simdtex.run import Callback, Observer, Output, OutputWithSource, Progress, Stage, paced
 
 VALUES = 4
 """The most values per output pixel that kernels index: two counts, with all levels together."""
@@ -82,13 +81,8 @@ class State(NamedTuple):
     picture: Array | None
 
 
-class Info(NamedTuple):
-    """A description of a step: ``done`` pixels of a ``level`` are sampled; at its end, its ``stage`` and ``counts``."""
-
-    level: int
-    done: int
-    stage: Stage | None = None
-    counts: NDArray[np.int32] | None = None
+End = tuple[Stage, NDArray[np.int32]]
+"""The end of a level: its stage, and the numbers (rows, cols, 2) of candidates and of nodes compared."""
 
 
 class Run:
@@ -130,7 +124,7 @@ class Run:
             self._launches = paced(count, least, state.done)
         return state
 
-    def step(self, state: State, watch: Any = None) -> tuple[State, Info]:
+    def step(self, state: State, watch: Any = None) -> tuple[State, End | None]:
         """Sample some pixels of the level, (9) to (12), or collapse it if all are sampled."""
         level, sampled = state.level, Sampled(state.source, state.counts, self._lattice)
         if state.done < pixels([self.shapes[level]]):  # Loop x', y'
@@ -138,7 +132,7 @@ class Run:
             match = self.options.parity == "match"
             sampled = candidates(self.machine, self._structure, sampled, level, range(first, end), match, self.seed)
             self.machine.sync()
-            return state._replace(done=end, source=sampled.source, counts=sampled.counts), Info(level, end)
+            return state._replace(done=end, source=sampled.source, counts=sampled.counts), None
         analysis = self.analysis
         source, counts = read_sources(self.machine, sampled, self.shapes, level)
         picture = self._collapsed(level, source, state.picture)  # CollapsePyramid
@@ -147,7 +141,7 @@ class Run:
         place = places(given, analysis.shapes[level][1])
         stage = Stage(level, image, place, np.ascontiguousarray(counts[..., 0]))
         after = state._replace(level=level - 1, done=0, picture=picture)  # Loop i from top level downto 0
-        return self._entered(after), Info(level, state.done, stage, counts)
+        return self._entered(after), (stage, counts)
 
     def _collapsed(self, level: int, source: NDArray[np.int32], coarse: Array | None) -> Array:
         """Return G of a level of the output, from its source map and G of the level above."""
@@ -190,56 +184,35 @@ class Run:
         return Record(self, callback)
 
 
-class Record:
-    """The stages and reports of a run, and its progress.
+class Record(Observer):
+    """The observer of a run: it reports every launch, and keeps the stage of every level."""
 
-    ``callback`` is called with a `simdtex.run.Sampling` after every launch and at every level's end.
-    """
+    _run: Run
 
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        self.stages: list[Stage] = []
-        self.reports: list[dict[str, Any]] = []
-        self._run, self._callback, self._began = run, callback, perf_counter()
-
-    def part(self, *seen: Any) -> None:
-        """Do nothing, since steps are short."""
-
-    def step(self, state: State, info: Info) -> None:
+    def step(self, state: State, end: End | None) -> None:
         """Report the sampled pixels; at the end of a level, keep its stage and report it."""
-        if info.stage is not None and info.counts is not None:
-            self._end(info.stage, info.counts)
-        if self._callback:
-            shapes, last = self._run.shapes, self.stages[-1]
-            share = (pixels(shapes[info.level + 1 :]) + info.done) / pixels(shapes)
-            now: dict[str, Any] = {"level": info.level, "levels": len(shapes), "fraction": share}
-            now |= {"image": lambda: last.image, "candidates": lambda: last.candidates}
-            self._callback(Sampling(end_of_level=info.stage is not None, **now))
-
-    def _end(self, stage: Stage, counts: NDArray[np.int32]) -> None:
-        """Keep a level's stage; counts (rows, cols, 2) are candidates and nodes compared."""
-        self.stages.append(stage)
-        rows, cols = counts.shape[:2]
-        mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
-        self.reports.append(
-            {
-                **{"level": stage.level, "rows": rows, "cols": cols},
+        if end:
+            stage, counts = end
+            self.stages.append(stage)
+            mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
+            self.report(
+                **{"level": stage.level, "rows": counts.shape[0], "cols": counts.shape[1]},
                 **{"candidates": mean, "most": int(counts[..., 0].max())},
                 **{"nodes": pixels(self._run.analysis.shapes[stage.level + 1 :]), "compared": compared},
-                "seconds": perf_counter() - self._began,
-            }
-        )
-        self._began = perf_counter()
-
-    def save(self) -> dict[str, Any]:
-        """Return everything received so far, as plain arrays and numbers."""
-        stages = [tuple(vars(stage).values()) for stage in self.stages]
-        return {"stages": stages, "reports": self.reports, "seconds": perf_counter() - self._began}
-
-    def load(self, saved: dict[str, Any]) -> None:
-        """Continue from the tree that `save` returned."""
-        self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
-        self.reports[:] = saved["reports"]
-        self._began = perf_counter() - saved["seconds"]
+            )
+        if self._callback:
+            shapes, last, level = self._run.shapes, self.stages[-1], state.level + bool(end)
+            self._callback(
+                Progress(
+                    level=level,
+                    levels=len(shapes),
+                    fraction=(pixels(shapes[state.level + 1 :]) + state.done) / pixels(shapes),
+                    doing=f"level {level}",
+                    stage=f"level{level}" if end else None,
+                    image=lambda: last.image,
+                    maps={"candidates": lambda: np.asarray(last.candidates)},
+                )
+            )
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +26,7 @@ from simdtex.model.stretched import Stretched
 from simdtex.ops.matching import match_ranks
 from simdtex.ops.pyramids import noise
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Iterating, Output
+from simdtex.run import Callback, Observer, Output, Progress
 
 RESIDUE = 8
 """The fewest rows and columns of the low-pass residue, if the number of levels is not given."""
@@ -166,14 +165,6 @@ class State(NamedTuple):
     moved: tuple[Any, ...] = ()
 
 
-class Info(NamedTuple):
-    """A description of a step: ``turns`` done, and at the end of an iteration the histograms' distances by subband."""
-
-    turns: int
-    distances: dict[str, float] | None
-    pictures: tuple[Array, ...]
-
-
 class Run:
     """Match-texture of the paper, for each of the decorrelated channels; a step is one channel's turn.
 
@@ -208,8 +199,13 @@ class Run:
         self.matcher.moved.clear()  # those of the noise
         return State(0, pictures)
 
-    def step(self, state: State, watch: Callable[[State, float], None]) -> tuple[State, Info]:
-        """Match the subbands and the pixels of the next channel: the body of Loop for several iterations."""
+    def step(self, state: State, watch: Callable[[State, float], None]) -> tuple[State, dict[str, float] | None]:
+        """Match the subbands and the pixels of the next channel: the body of Loop for several iterations.
+
+        The description of the step is None or, at the end of an iteration, the histograms' distances by subband.
+        """
+        if not self.busy:
+            return state._replace(turns=state.turns + 1), {}
         c, matcher = state.turns % len(self.busy), self.matcher
         matcher.moved[:] = state.moved
         picture = self._turn(state.pictures[c], self._subbands[c], matcher, lambda share: watch(state, share))
@@ -217,12 +213,11 @@ class Run:
         self.machine.sync()
         pictures = (*state.pictures[:c], picture, *state.pictures[c + 1 :])
         distances = matcher.distances() if c == len(self.busy) - 1 else None
-        after = State(state.turns + 1, pictures, tuple(matcher.moved))
-        return after, Info(after.turns, distances, pictures)
+        return State(state.turns + 1, pictures, tuple(matcher.moved)), distances
 
     def ended(self, state: State) -> bool:
         """Return whether all iterations are done."""
-        return state.turns >= self.options.iterations * len(self.busy)
+        return state.turns >= self.options.iterations * max(1, len(self.busy))
 
     def read(self, pictures: tuple[Array, ...]) -> NDArray[Any]:
         """Return the image of the channels' pictures, read back."""
@@ -236,7 +231,6 @@ class Run:
 
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
         """Return the image (*shape, channels) in the sample's type, and the statistics."""
-        observer.nothing_done(state)
         own, machine = self.texture.own, self.machine
         if own is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
             ranks = machine.put(np.arange(own.size, dtype=np.int32)[None])
@@ -290,52 +284,33 @@ def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
     return channels.reshape(-1, *image.shape[:-1])
 
 
-class Record:
-    """The reports of a run's iterations, and its progress.
+class Record(Observer):
+    """The observer of a run: it reports every channel's turn, every part of a solid's, and iterations."""
 
-    ``callback`` is called with a `simdtex.run.Iterating` after every channel's turn, and after every part of a solid's.
-    """
-
-    def __init__(self, run: Run, callback: Callback | None) -> None:
-        self.reports: list[dict[str, Any]] = []
-        self._run, self._callback, self._began = run, callback, perf_counter()
+    _run: Run
 
     def part(self, state: State, share: float) -> None:
         """Report a share of the current channel's turn."""
-        self._report(state.turns + share, state.pictures, ended=False)
+        self._tell(state, state.turns + share, ended=False)
 
-    def step(self, state: State, info: Info) -> None:
-        """Report a channel's turn, and note the end of an iteration."""
-        self._report(info.turns, info.pictures, ended=info.distances is not None)
-        if info.distances is not None:
-            seconds, self._began = perf_counter() - self._began, perf_counter()
-            number = len(self.reports) + 1
-            self.reports.append({"iteration": number, "seconds": seconds, "distances": info.distances})
+    def step(self, state: State, distances: dict[str, float] | None) -> None:
+        """Report a channel's turn, and keep the distances of an iteration."""
+        self._tell(state, state.turns, ended=distances is not None)
+        if distances is not None:
+            self.report(iteration=len(self.reports) + 1, distances=distances)
 
-    def nothing_done(self, state: State) -> None:
-        """Complete the reports if there was no turn, because no channel varies or there are no iterations."""
-        if not self._run.busy:
-            wanted = range(1, self._run.options.iterations + 1)
-            self.reports[:] = [{"iteration": number, "seconds": 0.0, "distances": {}} for number in wanted]
-        if not state.turns:
-            self._call(1.0, self._run.options.iterations, state.pictures, ended=False)
-
-    def _report(self, done: float, pictures: tuple[Array, ...], ended: bool) -> None:
-        iterations, channels = self._run.options.iterations, len(self._run.busy)
-        iteration = min(iterations, int(done / channels) + (not ended))
-        self._call(done / (iterations * channels), iteration, pictures, ended)
-
-    def _call(self, fraction: float, iteration: int, pictures: tuple[Array, ...], ended: bool) -> None:
+    def _tell(self, state: State, done: float, ended: bool) -> None:
+        """Report ``done`` turns of channels."""
         if self._callback:
-            now: dict[str, Any] = {"level": 0, "levels": 1, "fraction": fraction, "end_of_iteration": ended}
-            now |= {"iteration": iteration, "iterations": self._run.options.iterations}
-            solid = len(self._run.shape) == 3
-            self._callback(Iterating(image=lambda: self._run.read(pictures), solid=solid, **now))
-
-    def save(self) -> dict[str, Any]:
-        """Return everything received so far, as plain arrays and numbers."""
-        return {"reports": self.reports, "seconds": perf_counter() - self._began}
-
-    def load(self, saved: dict[str, Any]) -> None:
-        """Continue from the tree that `save` returned."""
-        self.reports[:], self._began = saved["reports"], perf_counter() - saved["seconds"]
+            turns, iterations = done / max(1, len(self._run.busy)), self._run.options.iterations
+            iteration = min(iterations, int(turns) + (not ended))
+            self._callback(
+                Progress(
+                    fraction=turns / iterations,
+                    doing=f"iteration {iteration} of {iterations}",
+                    stage=f"iteration{iteration:02d}" if ended else None,
+                    image=lambda: self._run.read(state.pictures),
+                    solid=len(self._run.shape) == 3,
+                    details={"iteration": iteration, "iterations": iterations},
+                )
+            )
