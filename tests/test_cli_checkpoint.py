@@ -14,7 +14,7 @@ from commands import refused, run
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint, read
 from simdtex.cli import COMMANDS, load
-from simdtex.cli.tiles import COMMANDS as KEEPING
+from simdtex.cli.textures import COMMANDS as KEEPING
 from simdtex.io import image
 
 SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5")

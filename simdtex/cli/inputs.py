@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import note
-from simdtex.cli.places import Named, check_input, preview_of
+from simdtex.cli.command import Named, check_input, note, preview_of
 from simdtex.inputs import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from simdtex.io.grids import Frame
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image, Metadata
-    from simdtex.model.material import Maps
+    from simdtex.model.source_map import Maps
 
 SHEET = 4096
 """The most pixels a side of a picture of copies; a larger one is reduced."""
@@ -503,7 +502,7 @@ class Folder:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
         from simdtex.io import image
         from simdtex.io.files import atomic_folder
-        from simdtex.model.material import NORMALS, unit_normals
+        from simdtex.model.source_map import NORMALS, unit_normals
 
         lead, *others = self.maps
         if self.found.files[self.lead] in NORMALS and made.ndim == 3:
@@ -587,7 +586,7 @@ def read_lead(
     The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
     folder. The roles of ``--map`` are taken out of the options.
     """
-    from simdtex.model.material import READABLE, ROLES, find_maps
+    from simdtex.model.source_map import READABLE, ROLES, find_maps
 
     picture = pictures[0] if len(pictures) == 1 else Path("-")
     whole = picture.is_dir()

@@ -22,11 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.brief import Brief
 from simdtex.io.files import BYTES, atomic_path, check_size, check_target, explained, reading
 from simdtex.io.image import cast
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
-from simdtex.options import DataWarning, check_real, require, shown
+from simdtex.options import Brief, DataWarning, check_real, require, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 

@@ -20,12 +20,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.brief import Brief
 from simdtex.io.files import BYTES, read_npy, reading
 from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.rasters import axis_of
-from simdtex.options import DataWarning, check_real, one_of
+from simdtex.options import Brief, DataWarning, check_real, one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]

@@ -22,10 +22,9 @@ import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import rasters
-from simdtex.io.brief import Brief
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.files import Refused, Unbuffered, atomic_path, check_target, explained, max_pixels_or_default, reading
-from simdtex.options import check_real, require, unmasked
+from simdtex.options import Brief, check_real, require, unmasked
 
 __all__ = ["Image", "Metadata", "check_sample", "check_writable", "read", "read_mask", "split_alpha", "write"]
 

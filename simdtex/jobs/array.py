@@ -55,7 +55,7 @@ class Execution(Output):
     ----------
     counts : dict of dict of Count
         The instructions of the layers, and the active PEs in them, by section of the program and kind of instruction
-        (`simdtex.maspar.costs.COSTS`).
+        (`simdtex.maspar.machine.COSTS`).
     seconds : dict of dict of float
         The modelled seconds of a MasPar MP-1 in the same order.
     steps : list of Step

@@ -139,7 +139,7 @@ def print_accounting(accounting: dict[str, Any]) -> None:
 
 
 def print_benchmark(results: dict[str, Any]) -> None:
-    """Print the results of `simdtex.bench.run.run`."""
+    """Print the results of `simdtex.experiments.benchmark.run`."""
     host = results["host"]
     print(
         f"{host['cpu']}, {host['cores']} cores; {host['system']}; simdtex {results['simdtex']}, numpy {host['numpy']}; "
