@@ -541,7 +541,7 @@ def test_wells_and_realisations_lie_in_the_coordinates_of_a_raster(tmp_path, out
             assert "UTM zone 33N" in many.spatial_ref.crs_wkt
             assert many.y.values[[0, -1]].tolist() == [8770, 8990]
     assert np.array_equal(found, heights[rows, cols])
-    refused = run(*words[:6])
+    refused = run(*words[:3], tmp_path / "other.nc", *words[4:6])
     assert refused.exit_code == 2 and "outside of a picture" in refused.output and "--outside skip" in refused.output
 
 

@@ -12,7 +12,7 @@ from cases import assert_same_bits, texture
 
 import simdtex
 import simdtex.distributed
-from simdtex.experiments.ensemble import as_ensemble, as_image
+from simdtex.experiments.ensemble import ENSEMBLE, checked
 from simdtex.io import image, volume
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import check_inputs, check_samples, is_several
@@ -362,8 +362,8 @@ REFUSED = {
     "output's guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(PLAIN, masked(PLAIN)), **ON),
     "quality": lambda _: simdtex.quality.coverage(masked(PLAIN), PLAIN),
     "output": lambda _: simdtex.quality.seam(masked(PLAIN)),
-    "image of an ensemble": lambda _: as_image(masked(PLAIN)),
-    "ensemble": lambda _: as_ensemble(masked(np.ones((2, 3, 3)))),
+    "image of an ensemble": lambda _: checked(masked(PLAIN)),
+    "ensemble": lambda _: checked(masked(np.ones((2, 3, 3))), "ensemble", ENSEMBLE),
     "map": lambda _: apply_source_map(PLACES, masked(PLAIN)),
     "source map": lambda folder: save_source_map(folder / "a.npz", masked(PLACES)),
     "picture": lambda folder: image.write(folder / "a.png", masked(PLAIN)),

@@ -484,13 +484,15 @@ class Folder:
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
         from simdtex.io.files import earlier_files
+        from simdtex.io.image import suitable_suffix
 
         for path in sorted(self.found.files, key=lambda path: path != self.lead):
             maps = read_material([path]) if self.maps else lead
             if maps.sizes != lead.sizes:
                 sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
                 raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
-            self.maps.append(Also(maps, self.output / _written(path, maps.pixels[0])))
+            suffix = suitable_suffix(maps.pixels[0].dtype, channels(maps.pixels[0]), path.suffix)
+            self.maps.append(Also(maps, self.output / f"{path.stem}{suffix}"))
         names = [one.out.name for one in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
@@ -620,10 +622,3 @@ def read_lead(
     for path in found.files:
         check_input(Named(output, "folder"), Named(path, "read"))
     return Folder(found, albedos[0], output), read_material(albedos[:1], how)
-
-
-def _written(path: Path, pixels: NDArray[Any]) -> str:
-    """Return the name of a map's file in the output: its own, if its format is written and keeps all pixels."""
-    from simdtex.io.image import suitable_suffix
-
-    return path.stem + suitable_suffix(pixels.dtype, channels(pixels), path.suffix)

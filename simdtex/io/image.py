@@ -520,7 +520,7 @@ def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = 
 def _tags(exif: bytes | None) -> list[tuple[int, str, int, bytes, bool]]:
     """Return the texts of EXIF data, such as camera, date, author and rights, as tags of a TIFF."""
     found = PIL.Image.Exif()
-    found.load(exif)
+    found.load(exif or b"")
     texts = {tag: value.encode("latin-1") for tag, value in found.items() if isinstance(value, str)}
     return [(tag, "s", 0, text, True) for tag, text in texts.items()]
 
@@ -576,15 +576,16 @@ TOP, BOTTOM = (70, 360), (11, 499)
 
 def example(name: str) -> NDArray[np.uint8]:
     """Return a grey picture (rows, cols) of one of `EXAMPLES`; brick is a wall seen from the front, 264 x 216."""
-    from skimage import data, transform
+    import skimage
 
-    loaders: Any = data
-    picture: NDArray[np.uint8] = getattr(loaders, name)()
+    library: Any = skimage  # which has no types
+    picture: NDArray[np.uint8] = getattr(library.data, name)()
     if name != "brick":
         return picture
     rows, cols, last = 2 * WALL[0], 2 * WALL[1], len(picture) - 1  # every pixel is the mean of four
     left, tilt = TOP[0] / TOP[1], BOTTOM[0] / BOTTOM[1] - TOP[0] / TOP[1]
     smaller = 1 / BOTTOM[1] - 1 / TOP[1]  # farther parts look smaller
     front = [(1 / cols, tilt / rows, left), (0, last / BOTTOM[1] / rows, 0), (0, smaller / rows, 1 / TOP[1])]
-    wall = transform.warp(picture.astype(np.float64), np.array(front), output_shape=(rows, cols))
-    return np.rint(transform.downscale_local_mean(wall, (2, 2))).astype(np.uint8)
+    wall = library.transform.warp(picture.astype(np.float64), np.array(front), output_shape=(rows, cols))
+    small: NDArray[np.float64] = library.transform.downscale_local_mean(wall, (2, 2))
+    return np.rint(small).astype(np.uint8)

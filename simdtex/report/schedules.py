@@ -408,11 +408,9 @@ def _lattices(pictures: Sequence[Chains]) -> Figure:
 
 
 def _sublattice(spins: NDArray[np.uint8], odd: int) -> NDArray[np.uint8]:
-    """Return the spins of one sublattice, each drawn over itself and the site to its right."""
+    """Return the spins of one sublattice of an even width, each drawn two sites wide."""
     row, col = np.indices(spins.shape)
-    shown: NDArray[np.uint8] = spins[row, np.clip(col - (row + col + odd) % 2, 0, None)]
-    first = (col == 0) & ((row + odd) % 2 == 1)  # belongs to the site on its right
-    shown[first] = np.roll(spins, -1, 1)[first]
+    shown: NDArray[np.uint8] = spins[row, col // 2 * 2 + (row + odd) % 2]
     return shown
 
 
