@@ -24,21 +24,7 @@ from simdtex.options import DataWarning, require
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
-DRIVERS = (
-    "GTiff",
-    "AAIGrid",
-    "HFA",
-    "EHdr",
-    "ENVI",
-    "GSAG",
-    "GSBG",
-    "GS7BG",
-    "SRTMHGT",
-    "USGSDEM",
-    "SAGA",
-    "RST",
-    "ILWIS",
-)
+DRIVERS = "GTiff AAIGrid HFA EHdr ENVI GSAG GSBG GS7BG SRTMHGT USGSDEM SAGA RST ILWIS".split()
 """The drivers of GDAL in use, since some others read further files or the network, for example VRT."""
 
 RASTERS = (".asc", ".img", ".bil", ".grd", ".hgt", ".dem", ".sdat", ".rst", ".mpr", ".flt")
@@ -125,7 +111,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
         in_memory = isinstance(source, bytes)
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
-        raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
+        raster = closing.enter_context(DatasetReader(where, driver=DRIVERS))
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
         pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)

@@ -134,17 +134,11 @@ def effective_use(
 
     Parameters
     ----------
-    source : array_like of int, (rows, cols, 2) or (rows, cols, 3)
-        For every output pixel, the (row, column) of the sample that it was taken from, or (row, column, sample) of
-        several samples; a pixel whose row and column are -1 has no source and is not counted.
-    sample_shape : (rows, cols)
-        The size of the sample, pixels.
+    source, sample_shape, sample
+        As in `counts`; of several samples the use of one is measured, by the pixels taken from it alone.
     piece : int
         Side of a piece, pixels: each side of the sample is cut into as many parts as come nearest
         to this length, which differ by one pixel at most.
-    sample : int, optional
-        The sample whose use is measured, from 0, by the pixels taken from it alone; required if the source map has
-        several.
 
     Returns
     -------
@@ -274,18 +268,16 @@ def _maps(
 
 
 def _check_size(name: str, values: NDArray[Any], places: SourceMap, shape: tuple[int, ...] | None) -> None:
-    rows, cols = values.shape[:2]
+    (rows, cols), last = values.shape[:2], places[:, :2].max(axis=0, initial=-1)
     if shape is not None and (rows, cols) != tuple(shape[:2]):
-        raise ValueError(
-            f"{name} is {cols} x {rows} pixels (width x height) and the sample "
-            f"{shape[1]} x {shape[0]}: bring it to the sample's size"
-        )
-    last_row, last_col = (int(v) for v in places[:, :2].max(axis=0, initial=-1))
-    if last_row >= rows or last_col >= cols:
-        raise ValueError(
-            f"{name} is {cols} x {rows} pixels (width x height) and the sample at least "
-            f"{last_col + 1} x {last_row + 1}: bring it to the sample's size"
-        )
+        wanted = f"{shape[1]} x {shape[0]}"
+    elif (last >= (rows, cols)).any():
+        wanted = f"at least {last[1] + 1} x {last[0] + 1}"
+    else:
+        return
+    raise ValueError(
+        f"{name} is {cols} x {rows} pixels (width x height) and the sample {wanted}: bring it to the sample's size"
+    )
 
 
 def save_source_map(path: PathLike, source: ArrayLike) -> None:
