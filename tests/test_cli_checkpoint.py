@@ -175,7 +175,7 @@ def test_what_was_begun_elsewhere(place, monkeypatch):
         kept._write(tree)
 
     edited(about["command"] | {"folder": "/nowhere"})
-    refused("/nowhere, the folder in which the run in kept was started, does not exist; restore it", "resume", "kept")
+    refused("/nowhere, the folder of the run in kept, does not exist; restore it", "resume", "kept")
     edited(about["command"] | {"name": "bench"})
     refused("is of a command that cannot be resumed; remove", "resume", "kept")
     edited(None)

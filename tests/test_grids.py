@@ -280,7 +280,7 @@ TEXTS = {
     "no variables": ("3 2 1\n0\n1 2 3 4 5 6\n", "line 2 is '0' and not"),
     "no sizes": (
         "a title\n1\nv\n1\n2\n",
-        "do not say how many cells .* write nx ny nz on the first line, as 250 250 1",
+        "do not say how many cells .* begin with nx ny nz, as 250 250 1",
     ),
     "two sizes": ("3 2\n1\nv\n1\n2\n", "do not say how many cells"),
     "a size in words": ("a\n1 3 two 1\nv\n1\n2\n", "do not say how many cells"),

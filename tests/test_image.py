@@ -306,7 +306,7 @@ def test_openexr(tmp_path):
     exr.File(header, {"height": first}).write(str(tmp_path / "a.exr"))
     np.testing.assert_array_equal(image.read(tmp_path / "a.exr").pixels, first)
     exr.File(header, {"N.X": first, "N.Y": first}).write(str(tmp_path / "a.exr"))
-    with pytest.raises(ValueError, match=r"has 1 parts and the channels N\.X, N\.Y: save R, G and B, or one"):
+    with pytest.raises(ValueError, match=r"has 1 parts and channels N\.X, N\.Y: save R, G and B, or one"):
         image.read(tmp_path / "a.exr")
 
 

@@ -275,7 +275,7 @@ BAD = {
     "nothing known": ({"known": SOME * np.nan}, ValueError, "known has no value; leave it out"),
     "all known": ({"known": np.ones(SHAPE)}, ValueError, "known leaves nothing to do; give NaN or a masked array"),
     "no fraction": ({"known": at(SOME, (0, 0), 2.5)}, ValueError, "known holds 2.5, which the sample's type uint8"),
-    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give values of that type"),
+    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give such values"),
     "beyond 32 bits": ({"sample": FLOAT.astype(np.float32), "known": at(SOME, (0, 0), 1e300)}, ValueError,
                        "known holds 1e[+]300, which the sample's type float32"),
     # where known values are from

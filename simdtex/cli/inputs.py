@@ -412,9 +412,7 @@ def _check_flat(files: Files) -> None:
     path = files.samples.paths[0]
     if files.samples.deep or (files.how.deep and kind_of(path) == "raster"):
         what = "a volume" if files.samples.deep else "a raster, whose rows are counted from the south"
-        raise ValueError(
-            f"{path} is {what}, and --sample-mask and --guide are pictures; use simdtex.simulate in Python"
-        )
+        raise ValueError(f"{path} is {what}; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
 
 
 def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArray[Any]]:

@@ -351,9 +351,7 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
     size = parse_sides(text, "WIDTHxHEIGHT", shape[::-1])[::-1]
     more = [new - old for new, old in zip(size, shape, strict=True)]
     if min(more) < 0:
-        raise ValueError(
-            f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
-        )
+        raise ValueError(f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; crop it first")
     return {"top": 0, "bottom": more[0], "left": 0, "right": more[1]}
 
 
@@ -545,9 +543,7 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
     if command["name"] not in COMMANDS:
         raise ValueError(f"the checkpoint in {path} is of a command that cannot be resumed; remove it")
     if not os.path.isdir(command["folder"]):
-        raise ValueError(
-            f"{command['folder']}, the folder in which the run in {path} was started, does not exist; restore it"
-        )
+        raise ValueError(f"{command['folder']}, the folder of the run in {path}, does not exist; restore it")
     again, given = load(command["name"]), {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
     with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
         context.params |= {name: value for name, value in given.items() if value}

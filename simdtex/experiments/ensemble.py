@@ -612,9 +612,7 @@ def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
     wrong = ~((places >= 0) & (places < (cols, rows)) & (places == np.floor(places))).all(axis=1)
     if wrong.any():
         x, y, _ = points[wrong][0]
-        raise ValueError(
-            f"the datum at x {x:g}, y {y:g} is at no pixel: give columns 0 to {cols - 1}, rows 0 to {rows - 1}"
-        )
+        raise ValueError(f"the datum at x {x:g}, y {y:g} is at no pixel: give x 0 to {cols - 1}, y 0 to {rows - 1}")
     return points
 
 

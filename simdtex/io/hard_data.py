@@ -241,7 +241,7 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         for name in [wanted] if isinstance(wanted, str) else wanted:
             if role not in ROLES or name not in listed:
                 raise ValueError(
-                    f"there is no column {name!r} for {role!r}: name x, y, z and value of {', '.join(listed)}"
+                    f"there is no column {name!r} for {role!r}: name x, y, z, value of {', '.join(listed)}"
                 )
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]

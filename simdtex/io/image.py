@@ -299,9 +299,7 @@ def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...
     if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
         example = "x".join(("640", "480", "100")[: len(sides)])
         more = ", or 2x or 200% of the sample" if own else ""
-        raise ValueError(
-            f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all sides{more}"
-        )
+        raise ValueError(f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all{more}")
     return tuple(int(word) for word in (words * len(sides))[: len(sides)])
 
 

@@ -24,7 +24,10 @@ from simdtex.options import DataWarning, require
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
-DRIVERS = "GTiff AAIGrid HFA EHdr ENVI GSAG GSBG GS7BG SRTMHGT USGSDEM SAGA RST ILWIS".split()
+DRIVERS = (
+    *("GTiff", "AAIGrid", "HFA", "EHdr", "ENVI", "GSAG", "GSBG", "GS7BG"),
+    *("SRTMHGT", "USGSDEM", "SAGA", "RST", "ILWIS"),
+)
 """The drivers of GDAL in use, since some others read further files or the network, for example VRT."""
 
 RASTERS = (".asc", ".img", ".bil", ".grd", ".hgt", ".dem", ".sdat", ".rst", ".mpr", ".flt")
@@ -111,7 +114,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
         in_memory = isinstance(source, bytes)
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
-        raster = closing.enter_context(DatasetReader(where, driver=DRIVERS))
+        raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
         pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
@@ -120,9 +123,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
         scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
     if scaled:
-        warnings.warn(
-            "the scale and the offset of the raster are not applied to its numbers", DataWarning, stacklevel=2
-        )
+        warnings.warn("scale and offset of the raster are not applied to its numbers", DataWarning, stacklevel=2)
     pixels = np.moveaxis(pixels, 0, -1)
     if not np.ma.is_masked(pixels):
         pixels = np.ma.getdata(pixels)
@@ -136,9 +137,7 @@ def read_cells(path: PathLike, most: int) -> Library:
     pixels, geo, names = read_raster(path, most)
     a, b, c, d, e, f = geo.transform
     if b or d:
-        raise Refused(
-            "has rows that are not parallel to the x axis: warp it to north up first, for example by gdalwarp"
-        )
+        raise Refused("has rows that are not parallel to the x axis: warp it to north up first, as by gdalwarp")
     planes: Any = pixels.reshape(*pixels.shape[:2], -1)
     if np.ma.isMaskedArray(planes):
         planes = np.ma.filled(planes.astype(np.float64), np.nan)

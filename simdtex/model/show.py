@@ -101,9 +101,7 @@ def show(
     if hasattr(made, "data_vars") or "realisation" in getattr(made, "coords", ()):
         return draw(made)
     if not pictures or len(titles or pictures) != len(pictures):
-        raise ValueError(
-            f"there are {len(pictures)} pictures and {len(titles)} titles; give pictures, and as many titles"
-        )
+        raise ValueError(f"there are {len(pictures)} pictures and {len(titles)} titles; give as many of both")
     shown = [_pixels(one, channel_axis) for one in pictures]
     if tiled:
         shown = [np.tile(one, (3, 3, 1)) for one in shown]

@@ -103,9 +103,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
     if several and sample is None:
         raise ValueError("the source map is of several samples: say which is counted with sample=0, sample=1 and so on")
     if sample is not None and (sample < 0 or (sample > 0 and not several)):
-        raise ValueError(
-            f"sample is {sample}: {'give 0 or more' if several else 'give None, the source map is of one'}"
-        )
+        raise ValueError(f"sample is {sample}: {'give 0 or more' if several else 'give None for a source map of one'}")
     counted = positions[..., 0] >= 0
     if several:
         counted &= positions[..., 2] == sample
@@ -254,9 +252,7 @@ def _maps(
             f"{len(maps)}: give a list with one for each sample"
         )
     if len(shapes) != len(maps) or any(shape is not None and np.ndim(shape) != 1 for shape in shapes):
-        raise ValueError(
-            f"sample_shape is {sample_shape!r}: give a list with (rows, cols) for each of {len(maps)} maps"
-        )
+        raise ValueError(f"sample_shape is {sample_shape!r}: give a list of (rows, cols) for each of {len(maps)} maps")
     for values in maps:
         if values.ndim not in (2, 3):
             raise ValueError(f"the other map is {values.ndim}-dimensional: give (rows, cols) or (rows, cols, channels)")

@@ -109,9 +109,7 @@ def _kept(found: Summary) -> str:
     if not found.misses.any():
         return f"Every realisation keeps the {data}."
     if len(found.categories) == 0:
-        return (
-            f"Not every realisation keeps the {data}: the largest root mean square error is {found.misses.max():.3g}."
-        )
+        return f"Not every realisation keeps the {data}: the largest RMS error is {found.misses.max():.3g}."
     share, bad = found.misses.sum() / (number * realisations), np.count_nonzero(found.misses)
     return f"Of the {data}, {share:.1%} are missed on average, in {bad} of the {realisations} realisations."
 
