@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of options: the declarations in the fields of a method's `Options`, and the checks of values.
+"""The table of options: the declarations in the fields of a method's `Options`, and checks and texts of values.
 
 An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. The declaration
 gives its check, its entry in the docstring, its type in ``simdtex/__init__.pyi``, and its entries on the
@@ -445,3 +445,21 @@ def within_32_bits(shape: tuple[int, ...], values: int, remedy: str = SMALLER) -
     what = f"an output of {shape[0]} rows x {shape[1]} columns" if len(shape) == 2 else f"a block of {size}"
     each = "" if values == 1 else f", {values} for each {'pixel' if len(shape) == 2 else 'voxel'}"
     raise ValueError(f"{what} is beyond 2**31 values{each}; {remedy}")
+
+
+class Brief:
+    """A base of dataclasses, declared with ``repr=False``, that hold arrays."""
+
+    def __repr__(self) -> str:
+        """Return the fields with the shape and the type of arrays, whose values would fill pages, without functions."""
+        values = {one.name: getattr(self, one.name) for one in fields(self) if one.repr}  # type: ignore[arg-type]
+        told = [f"{name}={_short(one)}" for name, one in values.items() if one is not None and not callable(one)]
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {'x'.join(map(str, value.shape))}"
+    if isinstance(value, dict):
+        value = {name: _short(one) for name, one in value.items()}
+    return shown(value)

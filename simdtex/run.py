@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.brief import Brief
 from simdtex.model.explanation import Explanation
+from simdtex.options import Brief
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -169,7 +169,7 @@ class Output:
     for either mapping; ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site;
     ``active``, the mean number of active PEs per pass; ``utilisation``, its ratio to all PEs; ``sites``, relaxations;
     ``flop``, 32-bit operations in the distances; ``moved`` and ``routed``, words that each PE got through the X-Net and
-    the router; ``instructions`` by kind, as in `simdtex.maspar.costs`; ``model_seconds``, their time on a MasPar MP-1;
+    the router; ``instructions`` by kind, see `simdtex.maspar.machine`; ``model_seconds``, their time on a MasPar MP-1;
     and ``launches``, kernels enqueued on the device.
 
     A level of ``multires`` has the mean number of ``candidates`` of a pixel, and the largest, ``most``; ``nodes``, the

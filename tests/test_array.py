@@ -7,7 +7,7 @@ from cases import REFERENCE, assert_same_bits, opencl, texture
 import simdtex
 from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import ProcessorArray, parse_array
-from simdtex.maspar.costs import COSTS
+from simdtex.maspar.machine import COSTS
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Choice, window
 

@@ -1,4 +1,4 @@
-"""Benchmarks: `simdtex.bench`, figures of benchmarks/ on cases whose fault is known, and the picture of the README."""
+"""Benchmarks: `simdtex bench`, figures of benchmarks/ on cases whose fault is known, and the picture of the README."""
 
 import csv
 import json
@@ -15,9 +15,9 @@ from click.testing import CliRunner
 from scipy.ndimage import gaussian_filter
 
 import simdtex
-from simdtex.bench import run as benchmark
-from simdtex.bench.run import FULL, QUICK, Case, Sizes
 from simdtex.cli import main
+from simdtex.experiments import benchmark
+from simdtex.experiments.benchmark import FULL, QUICK, Case, Sizes
 from simdtex.io.image import example, write
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.reference import Reference

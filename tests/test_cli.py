@@ -179,7 +179,7 @@ def test_ctrl_c_leaves_no_file(folder):
 @pytest.mark.parametrize(
     ("function", "args", "writes", "said"),
     [
-        ("simdtex.bench.run.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
+        ("simdtex.experiments.benchmark.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], [], "nothing was written"),
         ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
         (

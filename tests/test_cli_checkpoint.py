@@ -14,7 +14,7 @@ from commands import refused, run
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint, read
 from simdtex.cli import COMMANDS, load
-from simdtex.cli.tiles import COMMANDS as KEEPING
+from simdtex.cli.textures import COMMANDS as KEEPING
 from simdtex.io import image
 
 SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5")
@@ -175,7 +175,7 @@ def test_what_was_begun_elsewhere(place, monkeypatch):
         kept._write(tree)
 
     edited(about["command"] | {"folder": "/nowhere"})
-    refused("/nowhere, the folder in which the run in kept was started, does not exist; restore it", "resume", "kept")
+    refused("/nowhere, the folder of the run in kept, does not exist; restore it", "resume", "kept")
     edited(about["command"] | {"name": "bench"})
     refused("is of a command that cannot be resumed; remove", "resume", "kept")
     edited(None)

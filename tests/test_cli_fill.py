@@ -225,7 +225,7 @@ def test_bad_extensions_get_one_sentence_and_write_nothing(folder, case):
 
 def test_bad_tiles_get_one_sentence_and_write_nothing(folder):
     refused("--direction z must be x, y or both", "tile", *PHOTO, "--direction", "z", *QUICK)
-    refused("band=12 leaves nothing of a picture of 24x32", "tile", *PHOTO, "--band", 12, *QUICK)
+    refused("band=12 leaves nothing of 24x32", "tile", *PHOTO, "--band", 12, *QUICK)
     image.write(folder / "photo-3x3.png", pixels("grey.png"))
     refused("photo-3x3.png is an input and would be", "tile", "photo-3x3.png", "-o", "photo.png", "--preview", *QUICK)
 

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from simdtex.cli import COMMAND_WORDS, COMMANDS, EXAMPLES, load, main
 from simdtex.cli.command import OPTION_WORDS, entries_of
 from simdtex.cli.options import job_options
-from simdtex.cli.tiles import COMMANDS as RUNS
+from simdtex.cli.textures import COMMANDS as RUNS
 from simdtex.inputs import METHODS
 from simdtex.io import image
 from simdtex.options import Number, Whole, has_presets, is_flag, table

@@ -13,7 +13,7 @@ from simdtex import maspar, schedules
 from simdtex.cli import main
 from simdtex.io.image import read, write
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.report import array as report
+from simdtex.report import schedules as report
 
 
 def test_the_command_writes_what_synth_writes_and_prints_the_times_of_1998(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from commands import refused, run
 
 from simdtex import cli
-from simdtex.cli.places import Pair, Place
+from simdtex.cli.command import Pair, Place
 from simdtex.io import image
 
 COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
@@ -46,7 +46,7 @@ def test_every_path_has_a_role():
                 found += 1
                 assert kind.role in READ + WRITE
                 continue
-            assert not isinstance(kind, click.Path), f"{name} {option.name}: give it a role of simdtex.cli.places"
+            assert not isinstance(kind, click.Path), f"{name} {option.name}: give it a role of simdtex.cli.command"
             if isinstance(kind, click.types.StringParamType):
                 assert option.name in TEXTS, f"{name} {option.name}: give it a role, or name it in this test"
     assert found > 40

@@ -227,7 +227,7 @@ BAD = {
         ["solid.gslib", "-o", "out.npz"],
         "does not fit the sample of 2 layers x 16 rows x 20 columns",
     ),
-    "a grid without sizes": (["unsized.dat", "-o", "out.npz"], "write nx ny nz on the first line"),
+    "a grid without sizes": (["unsized.dat", "-o", "out.npz"], "begin with nx ny nz, as"),
     "a grid cut short": (
         ["cut.gslib", "-o", "out.npz"],
         "too short for what its header says, 20 x 16 x 1 cells of 1 variable, 320 values",
@@ -345,7 +345,7 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--probabilities", "bad.npy", "--categorical"], "row 0, column 0 are 0.4, 1.6; give numbers of 0 or more"),
+        (["--probabilities", "bad.npy", "--categorical"], "row 0, column 0 are 0.4, 1.6; give shares that add up to 1"),
         (["--probabilities", "p.npy"], "probabilities are of categories; give categorical=True"),
         (["--rotation", "angles.tif", "--size", "8x8"], "rotation is 16x20 and has to be 8x8"),
         (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),

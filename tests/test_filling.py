@@ -492,7 +492,7 @@ BAD_EXTEND = {
     "all a band": (
         {"seamless": True, "band": 8},
         ValueError,
-        "band=8 leaves nothing of a picture of 16x20 .* narrower",
+        "band=8 leaves nothing of 16x20 .* narrower",
     ),
     "NaN": ({"image": holding(np.nan), "left": 2}, ValueError, "NaN or infinite, the first at row 3.*: fill them"),
     "a boundary": (

@@ -148,7 +148,7 @@ def test_columns_are_chosen_by_name(tmp_path):
     )
     assert data.points.tolist() == [[1, 2], [4, 5]] and data.values.tolist() == [[3], [6]]
     for columns, words in (
-        ({"x": "X"}, "no column 'X' for 'x': name x, y, z and value of depth, por"),
+        ({"x": "X"}, "no column 'X' for 'x': name x, y, z, value of depth, por"),
         ({"w": "por"}, "for 'w'"),
     ):
         with pytest.raises(ValueError, match=words):

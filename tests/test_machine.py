@@ -32,7 +32,7 @@ from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import PENDING, Log, Reference
-from simdtex.report.tables import profile_summary, profile_table, seconds_text
+from simdtex.report.tables import print_profile, seconds_text
 from simdtex.run import Progress, paced
 
 # -- The memory that is available, the checks before a run, and that a run takes no more than checked.
@@ -309,12 +309,12 @@ def test_statistics_have_kernels_only_where_they_are_measured(any_device):
         assert machine.profile() is None
 
 
-def test_the_table_and_the_sentence():
+def test_the_table_and_the_sentence(capsys):
     entry = {"name": "a", "calls": 1000, "seconds": 0.5, "share": 0.25}
-    table = profile_table({"device": "d", "kernels": [entry]})
-    assert list(table.rows[0].values()) == ["a", "1,000", "500 us", "500 ms", "25.0%"] and all(table.numeric[1:])
-    text = profile_summary({"seconds": 2.0, "device_seconds": 1.0})
-    assert text == "wall time 2 s: kernels 1 s (50.0%)"
+    print_profile({"device": "d", "kernels": [entry], "seconds": 2.0, "device_seconds": 1.0})
+    title, _, row, *_, text = capsys.readouterr().out.splitlines()
+    assert title.strip() == "Kernels on d" and text == "wall time 2 s: kernels 1 s (50.0%)"
+    assert row.split() == ["a", "1,000", "500", "us", "500", "ms", "25.0%"]
     assert [seconds_text(s) for s in (1.234, 0.01234, 1.234e-6, 123.4)] == ["1.23 s", "12.3 ms", "1.23 us", "123 s"]
 
 

@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from simdtex import random
 from simdtex.experiments.ising import Experiment
 from simdtex.experiments.ising import ising as experiment
+from simdtex.maspar.algorithm import ising
 from simdtex.maspar.array import DIRECTIONS, MAPPINGS, ProcessorArray, path
 from simdtex.maspar.coloring import coloring
-from simdtex.maspar.costs import CLOCK, COSTS, FULL
-from simdtex.maspar.ising import ising
-from simdtex.maspar.machine import MP1
+from simdtex.maspar.machine import CLOCK, COSTS, FULL, MP1
 from simdtex.maspar.walk import Walk
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Key

@@ -10,8 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.io.image import read, write
-from simdtex.model.material import ROLES, find_maps, map_role, unit_normals
-from simdtex.model.source_map import apply_source_map, load_source_map, save_source_map
+from simdtex.model.source_map import (
+    ROLES,
+    apply_source_map,
+    find_maps,
+    load_source_map,
+    map_role,
+    save_source_map,
+    unit_normals,
+)
 
 # -- The maps of a material: what a name says, what is in a folder, and normals of length 1.
 

@@ -46,10 +46,10 @@ GROUPS = {
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
 MODULES = {
-    **dict.fromkeys(("synth", "extend", "tile", "fill", "mix", "solid"), "textures"),
+    **dict.fromkeys(("synth", "extend", "tile", "fill", "mix", "solid", "resume"), "textures"),
     **dict.fromkeys(("estimate", "classify"), "simulate"),
     **dict.fromkeys(("live", "demo", "devices", "bench"), "machine"),
-    "resume": "tiles",
+    **dict.fromkeys(("schedules", "maspar"), "studies"),
 }
 """The modules of commands that are not in the one of their name."""
 

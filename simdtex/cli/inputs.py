@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import note
-from simdtex.cli.places import Named, check_input, preview_of
+from simdtex.cli.command import Named, check_input, note, preview_of
 from simdtex.inputs import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from simdtex.io.grids import Frame
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image, Metadata
-    from simdtex.model.material import Maps
+    from simdtex.model.source_map import Maps
 
 SHEET = 4096
 """The most pixels a side of a picture of copies; a larger one is reduced."""
@@ -413,9 +412,7 @@ def _check_flat(files: Files) -> None:
     path = files.samples.paths[0]
     if files.samples.deep or (files.how.deep and kind_of(path) == "raster"):
         what = "a volume" if files.samples.deep else "a raster, whose rows are counted from the south"
-        raise ValueError(
-            f"{path} is {what}, and --sample-mask and --guide are pictures; use simdtex.simulate in Python"
-        )
+        raise ValueError(f"{path} is {what}; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
 
 
 def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArray[Any]]:
@@ -485,13 +482,15 @@ class Folder:
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
         from simdtex.io.files import earlier_files
+        from simdtex.io.image import suitable_suffix
 
         for path in sorted(self.found.files, key=lambda path: path != self.lead):
             maps = read_material([path]) if self.maps else lead
             if maps.sizes != lead.sizes:
                 sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
                 raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
-            self.maps.append(Also(maps, self.output / _written(path, maps.pixels[0])))
+            suffix = suitable_suffix(maps.pixels[0].dtype, channels(maps.pixels[0]), path.suffix)
+            self.maps.append(Also(maps, self.output / f"{path.stem}{suffix}"))
         names = [one.out.name for one in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
@@ -503,7 +502,7 @@ class Folder:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
         from simdtex.io import image
         from simdtex.io.files import atomic_folder
-        from simdtex.model.material import NORMALS, unit_normals
+        from simdtex.model.source_map import NORMALS, unit_normals
 
         lead, *others = self.maps
         if self.found.files[self.lead] in NORMALS and made.ndim == 3:
@@ -587,7 +586,7 @@ def read_lead(
     The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
     folder. The roles of ``--map`` are taken out of the options.
     """
-    from simdtex.model.material import READABLE, ROLES, find_maps
+    from simdtex.model.source_map import READABLE, ROLES, find_maps
 
     picture = pictures[0] if len(pictures) == 1 else Path("-")
     whole = picture.is_dir()
@@ -621,10 +620,3 @@ def read_lead(
     for path in found.files:
         check_input(Named(output, "folder"), Named(path, "read"))
     return Folder(found, albedos[0], output), read_material(albedos[:1], how)
-
-
-def _written(path: Path, pixels: NDArray[Any]) -> str:
-    """Return the name of a map's file in the output: its own, if its format is written and keeps all pixels."""
-    from simdtex.io.image import suitable_suffix
-
-    return path.stem + suitable_suffix(pixels.dtype, channels(pixels), path.suffix)

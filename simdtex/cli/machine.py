@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from simdtex.cli.command import afterwards, command
+from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
 from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import watching
 from simdtex.cli.options import DEVICE, QUIET, output_option
-from simdtex.cli.places import FOLDER, READ, WRITE
 from simdtex.options import require
 
 if TYPE_CHECKING:
@@ -163,7 +162,7 @@ def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> No
 
     All times are from one run. Do not use the machine for other work during the run.
     """
-    from simdtex.bench import run as benchmark
+    from simdtex.experiments import benchmark
     from simdtex.io.files import atomic_path
     from simdtex.io.image import check_writable
     from simdtex.report.tables import print_benchmark

@@ -11,8 +11,20 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import EITHER, FOLDER, READ, READ_NAMED, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.command import (
+    DATA,
+    DEVICE_GROUP,
+    EITHER,
+    FOLDER,
+    JOB,
+    OUTPUTS,
+    READ,
+    READ_NAMED,
+    READ_PAIR,
+    RUNS,
+    WRITE,
+    WRITE_PAIR,
+)
 from simdtex.inputs import SHARED, Input, inputs, options_of
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared

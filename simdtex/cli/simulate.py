@@ -12,11 +12,10 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import DATA, OUTPUTS
+from simdtex.cli.command import DATA, ENTER, OUTPUTS, READ, WRITE
 from simdtex.cli.inputs import Material, output_shape, read_inputs, read_material, size_text, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option, size_option
-from simdtex.cli.places import ENTER, READ, WRITE
 
 TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
 MAPS = ("region", "probabilities", "image_map", "rotation", "scale")

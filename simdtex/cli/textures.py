@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex synth``, ``extend``, ``tile``, ``fill``, ``mix`` and ``solid``: textures."""
+"""``simdtex synth``, ``extend``, ``tile``, ``fill``, ``mix`` and ``solid``: textures, also in tiles; and ``resume``."""
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Sequence
+from contextlib import chdir
 from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +16,9 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import OUTPUTS
+from simdtex.cli.command import EITHER, ENTER, OUTPUTS, READ, RESUME, RUNS, WRITE, command, note
 from simdtex.cli.inputs import (
+    Also,
     Folder,
     Reading,
     arranged,
@@ -28,13 +34,16 @@ from simdtex.cli.inputs import (
     size_text,
     take_reading,
 )
-from simdtex.cli.job import Task, job, write_page
+from simdtex.cli.job import Task, command_line, job, observed, short_seed, watching, write_page
 from simdtex.cli.options import (
+    DEVICE,
     DIRECTION,
     DIRECTIONS,
     OUTPUT,
     PREVIEW,
     PROFILE,
+    QUIET,
+    Parsed,
     given,
     input_options,
     material_options,
@@ -43,10 +52,130 @@ from simdtex.cli.options import (
     report_option,
     size_option,
     stages_option,
+    together,
 )
-from simdtex.cli.places import EITHER, ENTER, READ, WRITE
-from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 from simdtex.model.pictures import unknown_in
+
+ALONE = ("stages", "profile", "array", "preview", "checkpoint")
+"""Options that are of a picture which one process holds."""
+
+CALIBRATED = 512
+"""The side of the output, in pixels, from which the time of tiles is estimated."""
+
+
+workers_option = option(
+    "--workers",
+    group=RUNS,
+    metavar="N|ADDRESS",
+    type=Parsed(lambda text: text if "://" in text else int(text), "a number or an address such as tcp://HOST:8786"),
+    help="Use N processes on this machine for the tiles, or the workers of the Dask scheduler at tcp://HOST:8786.",
+)
+tiles_options = together(
+    option(
+        "--tiles",
+        group=RUNS,
+        type=int,
+        metavar="SIDE",
+        help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
+        "one machine. The pixels are the same. Then --source-map is STORE/source, and --also MAP=STORE/NAME.",
+    ),
+    workers_option,
+)
+
+
+def check_tiles(context: click.Context) -> None:
+    """Raise if options exclude one another."""
+    given = context.params
+    if given["tiles"] is None:
+        if given["workers"] is not None:
+            raise ValueError("--workers requires --tiles; give the side of a tile, such as --tiles 2048")
+        return
+    if given["method"] != "mrf":
+        raise ValueError(f"the method {given['method']} needs the whole output at once; leave --tiles out")
+    for name in ALONE:
+        if given.get(name):
+            raise ValueError(f"--{name.replace('_', '-')} cannot be used with --tiles; leave out one of them")
+    if given["output"].suffix.lower() != ".zarr":
+        raise ValueError(f"{given['output']} is not a .zarr store, which --tiles requires; end its name in .zarr")
+    if given["source_map"] not in (None, given["output"] / "source"):
+        raise ValueError(
+            f"with --tiles the source map is an array of the store; give --source-map {given['output'] / 'source'}"
+        )
+
+
+def synthesize_in_tiles(
+    context: click.Context, sample: Any, shape: tuple[int, int], others: Sequence[Also], options: dict[str, Any]
+) -> None:
+    """Make an output in tiles and other maps in its arrangement; ``options`` are keywords of `distributed.plan`."""
+    from simdtex import distributed, synthesize
+    from simdtex.report.tables import duration_text
+
+    given, began = context.params, time.perf_counter()
+    output: Path = given["output"]
+    for one in others:
+        if one.out.parent != output:
+            raise ValueError(f"{one.out} is not an array of the store; end --also in ={output / one.out.stem}")
+    options |= {"source_map": given["source_map"] is not None}
+    options |= {"maps": {one.out.name: one.maps.array for one in others}}
+    plan = distributed.plan(sample, shape, tiles=given["tiles"], **options)
+    if given["dry_run"] or not given["quiet"]:
+        for line in plan.lines():
+            click.echo(line, err=not given["dry_run"])
+    if given["dry_run"]:
+        if options["known"] is None and options["guide"] is None:  # which have the size of the output
+            side = min(CALIBRATED, *shape)
+            own = {name: value for name, value in options.items() if name not in ("source_map", "maps")}
+            seconds, _ = observed(partial(synthesize, sample, (side, side), **own), given["device"])
+            click.echo(f"one process needs about {duration_text(seconds * prod(shape) / side**2)}; nothing was written")
+        return
+    options |= {"rng": short_seed() if given["seed"] is None else given["seed"], "ended": _write_report, "note": note}
+    options |= {name: given[name] for name in ("tiles", "workers", "device")}
+    if given["report"]:
+        options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
+    context.meta[RESUME] = output
+    with watching(given["quiet"]) as callback:
+        distributed.synthesize(sample, shape, output, callback=callback, **options)
+    _done(output, given["quiet"], began)
+
+
+def resume_tiles(store: Path, workers: int | str | None, device: str | None, quiet: bool) -> None:
+    """Go on with an output in tiles."""
+    from simdtex import distributed
+
+    began, finished = time.perf_counter(), distributed.finished(store)
+    click.get_current_context().meta[RESUME] = store
+    with watching(quiet) as callback:
+        distributed.resume(store, workers=workers, device=device, callback=callback, note=note, ended=_write_report)
+    if finished:
+        click.echo(f"{store} is finished already")
+    else:
+        _done(store, quiet, began)
+
+
+def _write_report(samples: list[Any], image: Any, output: Any, command: dict[str, str] | None) -> None:
+    """Write the report of an output that is complete, if the command that began it has ``--report``."""
+    if command is None:
+        return
+    from simdtex.report.page import check_folder
+    from simdtex.report.synthesis import write_synthesis
+
+    try:
+        check_folder(command["report"])
+    except ValueError as error:
+        store = click.get_current_context().meta[RESUME]
+        raise ValueError(f"{error}; then go on with: simdtex resume {store}") from None
+    write_synthesis(command["report"], samples[0], image, output, command["line"])
+
+
+def _done(store: Path, quiet: bool, began: float) -> None:
+    if quiet:
+        return
+    import zarr
+
+    root: Any = zarr.open_group(store, mode="r")
+    (rows, cols), seed = root["image"].shape[:2], root.attrs["simdtex"]["seed"]
+    click.echo(f"{store}: {cols}x{rows} in {time.perf_counter() - began:.1f} s, seed {seed}; the array is called image")
+
 
 SIDES = ("top", "bottom", "left", "right")
 REPORTED = "its pictures, and how evenly it uses the picture"
@@ -222,9 +351,7 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
     size = parse_sides(text, "WIDTHxHEIGHT", shape[::-1])[::-1]
     more = [new - old for new, old in zip(size, shape, strict=True)]
     if min(more) < 0:
-        raise ValueError(
-            f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
-        )
+        raise ValueError(f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; crop it first")
     return {"top": 0, "bottom": more[0], "left": 0, "right": more[1]}
 
 
@@ -379,3 +506,45 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | No
         material.limits,
         lambda made, output: click.echo(last_iteration(output.statistics)),
     )
+
+
+COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "tile")
+"""Those that keep checkpoints."""
+
+
+@command(
+    ("resume state", "Continue the run of --checkpoint state."),
+    ("resume more.zarr --workers 4", "Continue an output in tiles with four processes."),
+)
+@click.argument("path", metavar="FILE", type=ENTER)
+@workers_option
+@DEVICE
+@QUIET
+def resume(path: Path, workers: int | str | None, device: str | None, quiet: bool) -> None:
+    """Continue the run whose state is in FILE, and write the outputs of its command.
+
+    FILE is the file of --checkpoint, or the .zarr store of --tiles.
+    """
+    from simdtex.checkpoint import read
+    from simdtex.cli import load
+
+    if (path / "zarr.json").is_file() or (path / "work").is_dir():
+        resume_tiles(path, workers, device, quiet)
+        return
+    if workers is not None:
+        raise ValueError("--workers requires the .zarr store of --tiles; leave it out")
+    if not path.exists():
+        raise ValueError(f"{path} does not exist: check the path (a finished run has no checkpoint)")
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder; give the file of --checkpoint, or the store of --tiles")
+    command: dict[str, Any] | None = read(path)[0]["command"]
+    if command is None:
+        raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
+    if command["name"] not in COMMANDS:
+        raise ValueError(f"the checkpoint in {path} is of a command that cannot be resumed; remove it")
+    if not os.path.isdir(command["folder"]):
+        raise ValueError(f"{command['folder']}, the folder of the run in {path}, does not exist; restore it")
+    again, given = load(command["name"]), {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
+    with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
+        context.params |= {name: value for name, value in given.items() if value}
+        again.invoke(context)

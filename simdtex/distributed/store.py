@@ -92,7 +92,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     options = resolve(Options, "synth", tree["options"])
     unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
     pictures = options.of(Pictures(tuple(tree["pixels"]), unknown, usable))
-    guides = [Ready(tree["guides"])] if tree["guides"] else []
+    guides: list[Any] = [Ready(tree["guides"])] if tree["guides"] else []
     phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
     sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)

@@ -31,26 +31,15 @@ Array = NDArray[Any]
 MOST_CATEGORIES = 16  # integers with more values are continuous
 
 
-def as_image(array: ArrayLike, name: str = "image") -> Array:
-    """Return an image (rows, cols), checked."""
-    return _checked(array, name, (2,), "(rows, cols)")
+IMAGE, VOLUME, ENSEMBLE = "(rows, cols)", "(layers, rows, cols)", "(realisations, rows, cols)"
 
 
-def as_map(array: ArrayLike) -> Array:
-    """Return an image (rows, cols) or a volume (layers, rows, cols), checked."""
-    return _checked(array, "image", (2, 3), "(rows, cols) or (layers, rows, cols)")
-
-
-def as_ensemble(array: ArrayLike) -> Array:
-    """Return an ensemble (realisations, rows, cols), checked."""
-    return _checked(array, "ensemble", (3,), "(realisations, rows, cols)")
-
-
-def _checked(given: ArrayLike, name: str, axes: tuple[int, ...], shape: str) -> Array:
+def checked(given: ArrayLike, name: str = "image", *shapes: str) -> Array:
+    """Return an array of one of some shapes, by default an image, checked."""
     unmasked(f"the {name}", given)
-    array = np.asarray(given)
-    if array.ndim not in axes or array.size == 0:
-        raise ValueError(f"the {name} has the shape {array.shape}: give {shape}, none of them 0")
+    array, shapes = np.asarray(given), shapes or (IMAGE,)
+    if array.size == 0 or array.ndim not in [shape.count(",") + 1 for shape in shapes]:
+        raise ValueError(f"the {name} has the shape {array.shape}: give {' or '.join(shapes)}, none of them 0")
     if array.dtype.kind not in "biuf":
         raise TypeError(f"the {name} holds {array.dtype}: give integers or floats")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
@@ -98,7 +87,7 @@ def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) 
     ValueError
         The training image is not (rows, cols), or holds a value that is none of the categories.
     """
-    image = as_image(training, "training image")
+    image = checked(training, "training image")
     if categories is not None and len(categories):
         as_index(image, categories, "training image")
         return np.asarray(categories)
@@ -160,7 +149,7 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
     channel and the ground on both sides of it would each cross the other. Two pieces that meet outside of the image are
     two. Cost: a few passes over the image, and two for each lag.
     """
-    pixels = as_map(image)
+    pixels = checked(image, "image", IMAGE, VOLUME)
     if not 1 <= max_lag < min(pixels.shape):
         raise ValueError(f"max_lag is {max_lag}: give 1 to {min(pixels.shape) - 1}, less than a side of the image")
     labels, count = ndimage.label(pixels == category)
@@ -211,7 +200,7 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     lobes of much wider ones count as ends. For the ground between channels, or for noise, the number has no plain
     meaning, but it can be compared.
     """
-    pixels = as_image(image)
+    pixels = checked(image)
     if min(pixels.shape) <= 2 * MARGIN:
         raise ValueError(f"the image has a side of {min(pixels.shape)} pixels: give more than {2 * MARGIN}")
     beyond = 2 * MARGIN
@@ -289,7 +278,7 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
     pixel, and a look-up, about 20 ms for 250 x 250 pixels; memory: 50 bytes for every pixel of the training image and
     of one realisation, beside the result.
     """
-    array, image = as_ensemble(ensemble), as_image(training, "training image")
+    array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     if not 1 <= side <= min(*array.shape[1:], *image.shape):
         raise ValueError(f"side is {side}: give 1 to {min(*array.shape[1:], *image.shape)}, a side of the images")
     values = np.unique(image)
@@ -400,7 +389,7 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
     compare ensembles of the same numbers of pixels. About a second for 50 realisations of 250 x 250 pixels of
     channels, and up to half a minute for noise, which has every pattern.
     """
-    array, image = as_ensemble(ensemble), as_image(training, "training image")
+    array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     values = categories_of(image, categories)
     if len(values):
         index, count = as_index(array, values, "ensemble")
@@ -551,7 +540,7 @@ def summary(
     -----
     About 8 s for 50 realisations of 250 x 250 pixels in two categories.
     """
-    array, image = as_ensemble(ensemble), as_image(training, "training image")
+    array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     known = categories_of(image, categories)
     points = _checked_data(data, array.shape[1:])
     shortest = min(*array.shape[1:], *image.shape)
@@ -623,9 +612,7 @@ def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
     wrong = ~((places >= 0) & (places < (cols, rows)) & (places == np.floor(places))).all(axis=1)
     if wrong.any():
         x, y, _ = points[wrong][0]
-        raise ValueError(
-            f"the datum at x {x:g}, y {y:g} is at no pixel: give columns 0 to {cols - 1}, rows 0 to {rows - 1}"
-        )
+        raise ValueError(f"the datum at x {x:g}, y {y:g} is at no pixel: give x 0 to {cols - 1}, y 0 to {rows - 1}")
     return points
 
 

@@ -93,25 +93,9 @@ class Found(NamedTuple):
 def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apart: int = 0) -> Found:
     """Return, for the patches ``asked`` of a picture, the nearest of all patches of another.
 
-    Parameters
-    ----------
-    queries, candidates : float32 array, (rows, cols, channels)
-    asked : (n,) int array
-        The patches of `queries` to look up, by the number of their first pixel in raster order.
-    side : int
-        Side of a patch, pixels.
-    apart : int
-        A candidate counts only if its row or its column differs from the query's by at least ``apart`` pixels.
-
-    Returns
-    -------
-    Found
-        Distances are the root of the mean squared difference over the side^2 x channels values; of equally near
-        candidates, the first.
-
-    Notes
-    -----
-    Cost: queries x candidates x 2 side^2 channels operations in single precision; memory under 200 MB beyond the
+    ``asked`` (n,) are the numbers of first pixels in raster order. Distances are the root of the mean squared
+    difference over the side^2 x channels values; of equally near candidates the first is found. A candidate counts only
+    if its row or its column differs from the query's by at least ``apart`` pixels. Memory: under 200 MB beyond the
     pictures, for any size.
     """
     size = side * side * queries.shape[2]

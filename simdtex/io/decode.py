@@ -286,9 +286,7 @@ def _read_exr(data: bytes, most: int) -> _Found:
     check_array((int(bottom) - top + 1, int(right) - left + 1, len(names)), 4, most)
     order = [name for name in "RGBYA" if name in names] if len(names) > 1 else list(names)
     if len(head.parts) > 1 or len(order) < len(names) or "".join(order) not in (*names, "RGB", "RGBA", "YA"):
-        raise Refused(
-            f"has {len(head.parts)} parts and the channels {', '.join(sorted(names))}: save R, G and B, or one"
-        )
+        raise Refused(f"has {len(head.parts)} parts and channels {', '.join(sorted(names))}: save R, G and B, or one")
     channels = OpenEXR.File(io.BytesIO(data), separate_channels=True).channels()
     pixels = np.stack([channels[name].pixels for name in order], -1)
     if len(order) == 1:

@@ -22,11 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.brief import Brief
 from simdtex.io.files import BYTES, atomic_path, check_size, check_target, explained, reading
 from simdtex.io.image import cast
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
-from simdtex.options import DataWarning, check_real, require, shown
+from simdtex.options import Brief, DataWarning, check_real, require, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
@@ -308,9 +307,7 @@ def _gslib(file: BufferedReader, most: int) -> Read:
             if not names[-1]:
                 raise ValueError(f"line {number} has no name of a variable: it is cut short, or line 2 is wrong")
     if len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
-        raise ValueError(
-            "its first two lines do not say how many cells it has: write nx ny nz on the first line, as 250 250 1"
-        )
+        raise ValueError("its first two lines do not say how many cells it has: begin with nx ny nz, as 250 250 1")
     if not all(map(_is_count, (*found[:3], *found[9:]))):
         raise ValueError(f"its header says {' x '.join(found[:3])} cells: give whole numbers of 1 or more")
     *sides, realisations = (int(word) for word in (*found[:3], *(found[9:] or "1")))
@@ -380,9 +377,7 @@ def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[n
     if at < count:
         raise ValueError(f"it has {at} values and its header says {what}: get it again, or correct the header")
     if not lines[-1][-1:].isspace():
-        raise ValueError(
-            "it ends without the end of a line, as if it were cut short: get it again, or add the end of the line"
-        )
+        raise ValueError("it ends without the end of a line, as if cut short: get it again, or add the end of the line")
     return found
 
 

@@ -20,12 +20,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.brief import Brief
 from simdtex.io.files import BYTES, read_npy, reading
 from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.rasters import axis_of
-from simdtex.options import DataWarning, check_real, one_of
+from simdtex.options import Brief, DataWarning, check_real, one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
@@ -242,7 +241,7 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         for name in [wanted] if isinstance(wanted, str) else wanted:
             if role not in ROLES or name not in listed:
                 raise ValueError(
-                    f"there is no column {name!r} for {role!r}: name x, y, z and value of {', '.join(listed)}"
+                    f"there is no column {name!r} for {role!r}: name x, y, z, value of {', '.join(listed)}"
                 )
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]

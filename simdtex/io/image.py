@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import os
 import re
-import struct
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +21,9 @@ import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import rasters
-from simdtex.io.brief import Brief
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.files import Refused, Unbuffered, atomic_path, check_target, explained, max_pixels_or_default, reading
-from simdtex.options import check_real, require, unmasked
+from simdtex.options import Brief, check_real, require, unmasked
 
 __all__ = ["Image", "Metadata", "check_sample", "check_writable", "read", "read_mask", "split_alpha", "write"]
 
@@ -301,9 +299,7 @@ def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...
     if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
         example = "x".join(("640", "480", "100")[: len(sides)])
         more = ", or 2x or 200% of the sample" if own else ""
-        raise ValueError(
-            f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all sides{more}"
-        )
+        raise ValueError(f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all{more}")
     return tuple(int(word) for word in (words * len(sides))[: len(sides)])
 
 
@@ -352,9 +348,6 @@ _FORMATS = {
 
 LOSSY = (".jpg", ".jpeg")
 """The suffixes of a format that changes pixels."""
-
-_ENTRY = np.dtype([("tag", "<u2"), ("value", "V10")])
-"""An entry of a directory of TIFF."""
 
 
 def check_writable(
@@ -415,7 +408,7 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         grey and colour with alpha; WebP turns grey into equal RGB.
     metadata : Metadata, optional
         The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
-        and the EXIF data (TIFF up to 4 GB); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
+        and the EXIF data (TIFF its texts); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
         keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
 
     Raises
@@ -517,30 +510,17 @@ def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = 
                 iccprofile=metadata.profile,
                 resolution=metadata.dpi,
                 resolutionunit="inch" if metadata.dpi else None,
+                software=False,  # not the name of the library
+                extratags=_tags(metadata.exif),
             )
-    if metadata.exif and not big:
-        _add_exif(path, metadata.exif)
 
 
-def _add_exif(path: Path, exif: bytes) -> None:
-    """Add EXIF data to the only page of a little-endian TIFF, whose directory moves to the end of the file."""
+def _tags(exif: bytes | None) -> list[tuple[int, str, int, bytes, bool]]:
+    """Return the texts of EXIF data, such as camera, date, author and rights, as tags of a TIFF."""
     found = PIL.Image.Exif()
-    found.load(exif)
-    found.update([(tag, value.encode("latin-1")) for tag, value in found.items() if isinstance(value, str)])
-    found.endian = "<"
-    with path.open("r+b") as file:
-        file.seek(*struct.unpack("<4xI", file.read(8)))
-        own = np.frombuffer(file.read(12 * int.from_bytes(file.read(2), "little")), _ENTRY)
-        own = own[~np.isin(own["tag"], list(found))]
-        place = -(-file.seek(0, os.SEEK_END) // 2) * 2
-        added = found.tobytes(place + own.nbytes)[14:]  # after two headers
-        more = np.frombuffer(added, _ENTRY, int.from_bytes(added[:2], "little"), 2)
-        entries = np.concatenate([own, more])
-        file.seek(place)
-        file.write(struct.pack("<H", len(entries)) + entries[entries["tag"].argsort()].tobytes())
-        file.write(added[2 + more.nbytes :])
-        file.seek(4)
-        file.write(struct.pack("<I", place))
+    found.load(exif or b"")
+    texts = {tag: value.encode("latin-1") for tag, value in found.items() if isinstance(value, str)}
+    return [(tag, "s", 0, text, True) for tag, text in texts.items()]
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:
@@ -585,30 +565,25 @@ def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> N
 EXAMPLES = ("brick", "grass", "gravel")
 """The names of the samples."""
 
-TOP, BOTTOM = (70, 360), (11, 499)
-"""First column and width of a rectangle of the wall in the first and in the last row of scikit-image's brick."""
-
 WALL = (264, 216)
-"""Rows and columns of that rectangle, seen from the front: bricks 18 pixels wide."""
+"""Rows and columns of the wall in scikit-image's brick, seen from the front: bricks 18 pixels wide."""
+
+TOP, BOTTOM = (70, 360), (11, 499)
+"""First column and width of the wall in the first and in the last row of the photograph."""
 
 
 def example(name: str) -> NDArray[np.uint8]:
     """Return a grey picture (rows, cols) of one of `EXAMPLES`; brick is a wall seen from the front, 264 x 216."""
-    from skimage import data
+    import skimage
 
-    loaders: Any = data
-    picture: NDArray[np.uint8] = getattr(loaders, name)()
-    return straightened(picture) if name == "brick" else picture
-
-
-def straightened(photograph: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the wall in scikit-image's brick without its perspective, which would fit no lattice."""
-    from scipy.ndimage import map_coordinates
-
-    row, col = ((np.arange(2 * side) + 0.5) / (2 * side) for side in WALL)  # every pixel is the mean of four
-    above, below = ((1 - row) / TOP[1])[:, None], (row / BOTTOM[1])[:, None]  # farther parts look smaller
-    x = (above * (TOP[0] + TOP[1] * col) + below * (BOTTOM[0] + BOTTOM[1] * col)) / (above + below)
-    y = np.broadcast_to(below * (len(photograph) - 1) / (above + below), x.shape)
-    wall = map_coordinates(photograph.astype(np.float64), (y, x), order=1)
-    found: NDArray[np.uint8] = np.rint(wall.reshape(WALL[0], 2, WALL[1], 2).mean((1, 3))).astype(np.uint8)
-    return found
+    library: Any = skimage  # which has no types
+    picture: NDArray[np.uint8] = getattr(library.data, name)()
+    if name != "brick":
+        return picture
+    rows, cols, last = 2 * WALL[0], 2 * WALL[1], len(picture) - 1  # every pixel is the mean of four
+    left, tilt = TOP[0] / TOP[1], BOTTOM[0] / BOTTOM[1] - TOP[0] / TOP[1]
+    smaller = 1 / BOTTOM[1] - 1 / TOP[1]  # farther parts look smaller
+    front = [(1 / cols, tilt / rows, left), (0, last / BOTTOM[1] / rows, 0), (0, smaller / rows, 1 / TOP[1])]
+    wall = library.transform.warp(picture.astype(np.float64), np.array(front), output_shape=(rows, cols))
+    small: NDArray[np.float64] = library.transform.downscale_local_mean(wall, (2, 2))
+    return np.rint(small).astype(np.uint8)

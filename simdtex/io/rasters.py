@@ -25,19 +25,8 @@ Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
 DRIVERS = (
-    "GTiff",
-    "AAIGrid",
-    "HFA",
-    "EHdr",
-    "ENVI",
-    "GSAG",
-    "GSBG",
-    "GS7BG",
-    "SRTMHGT",
-    "USGSDEM",
-    "SAGA",
-    "RST",
-    "ILWIS",
+    *("GTiff", "AAIGrid", "HFA", "EHdr", "ENVI", "GSAG", "GSBG", "GS7BG"),
+    *("SRTMHGT", "USGSDEM", "SAGA", "RST", "ILWIS"),
 )
 """The drivers of GDAL in use, since some others read further files or the network, for example VRT."""
 
@@ -134,9 +123,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
         scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
     if scaled:
-        warnings.warn(
-            "the scale and the offset of the raster are not applied to its numbers", DataWarning, stacklevel=2
-        )
+        warnings.warn("scale and offset of the raster are not applied to its numbers", DataWarning, stacklevel=2)
     pixels = np.moveaxis(pixels, 0, -1)
     if not np.ma.is_masked(pixels):
         pixels = np.ma.getdata(pixels)
@@ -150,9 +137,7 @@ def read_cells(path: PathLike, most: int) -> Library:
     pixels, geo, names = read_raster(path, most)
     a, b, c, d, e, f = geo.transform
     if b or d:
-        raise Refused(
-            "has rows that are not parallel to the x axis: warp it to north up first, for example by gdalwarp"
-        )
+        raise Refused("has rows that are not parallel to the x axis: warp it to north up first, as by gdalwarp")
     planes: Any = pixels.reshape(*pixels.shape[:2], -1)
     if np.ma.isMaskedArray(planes):
         planes = np.ma.filled(planes.astype(np.float64), np.nan)

@@ -10,7 +10,6 @@ the libraries: ``pip install 'simdtex[simulate]'``.
 from __future__ import annotations
 
 import bz2
-import hashlib
 import io
 import json
 import os
@@ -403,9 +402,6 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
             image.encode(path / f"slice-{number:0{digits}}.png", ".png", picture)
 
 
-MARK = "simdtex_realisations"
-"""The attribute that holds the checksum of a Zarr store written here; only an unchanged store is replaced."""
-
 _NEEDED = {
     ".zarr": ("xarray", "zarr"),
     ".nc": ("xarray", "h5netcdf", "h5py"),
@@ -431,16 +427,9 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
     if source and suffix in SUFFIXES:
         raise ValueError(f"{target} is a grid, which holds no source map: end its name in .zarr, .nc or .npz")
     require("simulate", *_NEEDED[suffix])
-    if suffix == ".zarr" and target.is_dir():
-        if not _own(target):
-            raise ValueError(
-                f"{target} is a folder and not a store of realisations alone: remove it, or give a new name"
-            )
-        check_folder_writable(target)
-        return suffix
+    if suffix == ".zarr" and target.exists():  # a store may hold what others have added
+        raise ValueError(f"{target} exists already: remove it, or give a new name for the store")
     check_target(target)
-    if suffix == ".zarr" and target.exists():
-        raise ValueError(f"{target} is a file: give another name for the folder of the store")
     return suffix
 
 
@@ -454,9 +443,8 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
         ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
         ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
-        attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and a
-        Zarr store if it was written here and nothing in it was added or changed, as its attribute
-        ``simdtex_realisations``, a checksum, shows.
+        attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and an
+        existing store is an error.
     array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
         The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
         x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
@@ -497,27 +485,6 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
         whole.to_zarr(store, mode="w-", zarr_format=3)
-        about = json.loads((store / "zarr.json").read_bytes())
-        about["attributes"][MARK] = _checksum(store, about)
-        (store / "zarr.json").write_text(json.dumps(about, indent=2))
-
-
-def _checksum(store: Path, about: dict[str, Any]) -> str:
-    """Return the SHA-256 of a Zarr store: of its description ``about``, and of the names and contents of its files."""
-    found = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
-    for path in sorted(store.rglob("*")):
-        content = path.read_bytes() if path.is_file() and path != store / "zarr.json" else b""
-        found.update(repr((path.relative_to(store).parts, hashlib.sha256(content).digest())).encode())
-    return found.hexdigest()
-
-
-def _own(store: Path) -> bool:
-    """Return whether a folder holds only what `write_realisations` wrote."""
-    try:
-        about = json.loads((store / "zarr.json").read_bytes())
-        return bool(about["attributes"].pop(MARK) == _checksum(store, about))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return False
 
 
 def _variables(array: Any) -> Iterator[tuple[str, Any]]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 from math import prod, sqrt
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +54,7 @@ class Execution(Output):
     ----------
     counts : dict of dict of Count
         The instructions of the layers, and the active PEs in them, by section of the program and kind of instruction
-        (`simdtex.maspar.costs.COSTS`).
+        (`simdtex.maspar.machine.COSTS`).
     seconds : dict of dict of float
         The modelled seconds of a MasPar MP-1 in the same order.
     steps : list of Step
@@ -66,14 +66,6 @@ class Execution(Output):
     steps: list[Step] = field(default_factory=list)
 
 
-@overload
-def synthesize(
-    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Any
-) -> tuple[NDArray[Any], Execution]: ...
-@overload
-def synthesize(
-    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Any
-) -> NDArray[Any]: ...
 def synthesize(
     sample: ArrayLike,
     shape: tuple[int, int],
@@ -87,7 +79,7 @@ def synthesize(
     callback: Callback | None = None,
     full_output: bool = False,
     **options: Any,
-) -> NDArray[Any] | tuple[NDArray[Any], Execution]:
+) -> Any:
     """Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, the array of the 1998 paper.
 
     Parameters
@@ -153,8 +145,7 @@ def synthesize(
             )
     made = mrf.plan(inputs.pictures, size, chosen)
     run = partial(_run, made, pes, MEMORY[memory])
-    found = execute("maspar.synthesize", run, dict, channel_axis, rng, device, callback, full_output, None)
-    return found  # type: ignore[return-value]
+    return execute("maspar.synthesize", run, dict, channel_axis, rng, device, callback, full_output, None)
 
 
 def problem(run: Lattices) -> Problem:

@@ -14,9 +14,9 @@ from simdtex.driver import drive
 from simdtex.inputs import Classify
 from simdtex.jobs.inputs import Work, check_mask, check_picture, is_several, public
 from simdtex.machine import Machine, open_machine
+from simdtex.methods.classifier import Options
 from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, FEWEST_NEIGHBOURHOODS, Model, Region, learn
-from simdtex.methods.classifier.options import Options
 from simdtex.model.pictures import Mask, check_alike, completed
 from simdtex.options import lists, option_parameters, real_array, resolve, table
 from simdtex.random import as_seed

@@ -294,9 +294,7 @@ def check_known(
     kept = np.where(there, values, np.zeros((), values.dtype))
     found, wrong = cast(kept, dtype)
     if wrong.any():
-        raise ValueError(
-            f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type"
-        )
+        raise ValueError(f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give such values")
     _warn_beyond(found, there, pictures)
     return Given(found, there, None if source is None else _check_source(source, there, pictures))
 
@@ -356,9 +354,7 @@ def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> Guide
                 "give as many"
             )
         if unknown_in(one).any():
-            raise ValueError(
-                "the guide of the sample has NaN; give a number everywhere, and NaN in that of the output alone"
-            )
+            raise ValueError("the guide of the sample has NaN; give a number everywhere; NaN is for that of the output")
     _check_size("the guide of the output", output.shape[:-1], "the output", shape)
     return samples, output
 
@@ -476,9 +472,7 @@ class Maps(NamedTuple):
         if off.any():
             at = np.argwhere(off)[0]
             told = ", ".join(f"{p:g}" for p in found[(slice(None), *at)])
-            raise ValueError(
-                f"the probabilities of {_cell(at)} are {told}; give numbers of 0 or more that add up to 1, or NaN"
-            )
+            raise ValueError(f"the probabilities of {_cell(at)} are {told}; give shares that add up to 1, or NaN")
         found[:, unknown] = np.nan
         return np.asarray(found / total)
 

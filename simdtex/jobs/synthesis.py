@@ -23,7 +23,7 @@ from simdtex.methods.pyramid.mixtures import mixture
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
-from simdtex.options import SMALLER, lists, one_of, option_parameters, real, resolve, unmasked, whole
+from simdtex.options import SMALLER, lists, one_of, option_parameters, real, real_array, resolve, whole
 from simdtex.random import as_seed
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
@@ -301,9 +301,7 @@ def lcpdf(
     from simdtex.methods.mrf.density import lcpdf_at
     from simdtex.ops.neighbourhood import Field
 
-    whole("greys", greys, 2)
-    if greys > 4096:
-        raise ValueError(f"greys is {greys}; give 4096 or fewer")
+    whole("greys", greys, 2, 4096)
     real("bandwidth", bandwidth, 0, above=True)
     one_of("estimator", estimator, ("parzen", "histogram"))
     one_of("boundary", boundary, ("torus", "open"))
@@ -324,11 +322,10 @@ def lcpdf(
 
 
 def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:
-    unmasked(name, array)
-    a = np.asarray(array)
+    a = real_array(name, array)
     if a.ndim != 2 or not a.size:
         raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
-    if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
+    if a.dtype.kind == "f":
         raise TypeError(f"{name} must hold integers 0 to {greys - 1}, not {a.dtype}")
     if a.min() < 0 or a.max() >= greys:
         raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {greys - 1}; give more greys or rescale it")
@@ -336,23 +333,20 @@ def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:
 
 
 def _check_sites(sites: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.int32]:
-    unmasked("sites", sites)
-    a = np.asarray(sites)
+    a = real_array("sites", sites)
     if a.size == 0:
         return np.zeros(0, np.int32)
-    if a.ndim != 2 or a.shape[1] != 2 or not np.issubdtype(a.dtype, np.integer):
+    if a.ndim != 2 or a.shape[1] != 2 or a.dtype.kind not in "iu":
         raise ValueError(f"sites must be an (S, 2) array of whole (row, column), not {a.dtype} {a.shape}")
     if (a < 0).any() or (a >= np.array(shape)).any():
         raise ValueError(f"a site lies outside the image of {shape[0]} rows x {shape[1]} columns")
-    flat: NDArray[np.int32] = (a[:, 0] * shape[1] + a[:, 1]).astype(np.int32)
-    return flat
+    return np.asarray(np.ravel_multi_index(tuple(a.T), shape), np.int32)
 
 
 def _check_temperature(temperature: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.uint16]:
-    unmasked("temperature", temperature)
-    t = np.zeros(shape) if temperature is None else np.asarray(temperature, np.float64)
+    t = np.zeros(shape) if temperature is None else real_array("temperature", temperature).astype(np.float64)
     if t.shape != shape:
         raise ValueError(f"temperature has shape {t.shape}; give the image's, {shape}")
-    if not ((t >= 0) & (t <= 1)).all():
+    if t.min() < 0 or t.max() > 1:
         raise ValueError("temperatures must lie between 0 and 1")
     return np.rint(t * 1024).astype(np.uint16)

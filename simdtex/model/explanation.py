@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.brief import Brief
+from simdtex.options import Brief
 
 SHOWN = 8
 """Number of candidates that a table or a notebook shows, in addition to the taken one."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,19 +35,6 @@ class Planes(NamedTuple):
 
     samples: list[NDArray[np.uint16]]
     output: NDArray[np.uint16]
-
-
-class AnyGuide(Protocol):
-    """A guide, whose planes are matched with those of the pixels."""
-
-    @property
-    def channels(self) -> int:
-        """The largest number of channels."""
-        ...
-
-    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """Return the working levels, 0..top; ``spread`` is the variance of the pixels', summed over channels."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +163,10 @@ class Surroundings:
             )
         )
         return Planes([sample], output)
+
+
+AnyGuide = Guide | Colocated | Surroundings
+"""A guide, whose planes are matched with those of the pixels."""
 
 
 def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.uint16]:

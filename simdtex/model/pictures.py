@@ -215,15 +215,8 @@ def turned(
 ) -> Turned:
     """Return the copies that any site requires, and their probabilities.
 
-    Parameters
-    ----------
-    pictures : Pictures
-    images : (pictures, H, W) float64 array
-        The probability of each picture, adding up to 1, or NaN.
-    rotation : (H, W) float64 array, optional
-        Degrees from x to y; NaN: any rotation of another site.
-    scale : (H, W) float64 array, optional
-        1/2 to 2; NaN: any scale of another site.
+    ``images`` (pictures, H, W) is the probability of each picture, adding up to 1, or NaN. ``rotation`` (H, W) is in
+    degrees from x to y, and ``scale`` (H, W) 1/2 to 2; NaN takes any of another site.
     """
     shape = images.shape[1:]
     turns = np.zeros(shape) if rotation is None else np.floor(rotation / (360 / EIGHTHS) + 0.5) % EIGHTHS

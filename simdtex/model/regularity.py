@@ -219,19 +219,9 @@ def phases(
 ) -> Phases | None:
     """Return the phases that guide an output; None if the sample has no lattice, or ``"auto"`` finds none that fits.
 
-    Parameters
-    ----------
-    pictures : Pictures
-        The sample.
-    shape : (int, int)
-        Rows and columns of the output.
-    torus : bool
-        Whether the output wraps around; its lattice is then deformed to fit.
-    lattice : "auto" or Lattice
-        The lattice of the largest picture; ``"auto"`` finds it in its autocorrelation.
-    known : tuple, optional
-        Values (H, W, C) of the output, the mask (H, W) of known ones, and their positions in the sample (H, W, 2 or 3),
-        -1 or None if they are from elsewhere. They determine the phases of the output.
+    ``shape`` is that of the output; on a torus its lattice is deformed to fit. ``lattice`` is that of the largest
+    picture, or ``"auto"``. ``known`` are values (H, W, C) of the output, the mask (H, W) of known ones, and their
+    positions in the sample (H, W, 2 or 3), -1 or None if they are from elsewhere; they determine the output's phases.
     """
     planes, masks = plain(pictures)
     largest = max(range(len(planes)), key=lambda number: (planes[number].size, -number))

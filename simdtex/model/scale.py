@@ -190,30 +190,13 @@ def structure(
 ) -> list[NDArray[np.uint16]]:
     """Return the signed distance to the border between the bright and the dark of a sample, as working levels.
 
-    Parameters
-    ----------
-    pictures : sequence of (C, rows, cols) arrays of integers
-        Working levels.
-    weight : float
-        Standard deviation of the channel, in units of the sample's.
-    variance : float
-        Variance of the sample, in working levels squared.
-    top : int
-        Highest working level.
+    ``pictures`` (C, rows, cols) are working levels up to ``top``, of this ``variance``; the standard deviation of the
+    result is ``weight`` times the sample's, or less so that it fits 0..top. It has (rows, cols) for each picture, on
+    one scale: 0 in the middle of the widest dark part; constant if no pixel is brighter than its surroundings.
 
-    Returns
-    -------
-    list of (rows, cols) uint16 arrays
-        One array for each picture, on one scale: 0 in the middle of the widest dark part; constant if no pixel is
-        brighter than its surroundings.
-
-    Notes
-    -----
-    A pixel is bright if the first principal component of the sample, smoothed by (1 4 6 4 1)/16 along rows and columns,
-    exceeds the mean of its surroundings, nearly a Gaussian of standard deviation 10. The value of a bright pixel is the
-    distance to the nearest dark one, less half a pixel; the value of a dark pixel is minus the distance to the nearest
-    bright one, plus half a pixel. Both are limited to `REACH`. If the channel would leave 0..top, its weight is
-    reduced. Cost: 4 `REACH` passes over the sample.
+    A pixel is bright if the first principal component of the sample, smoothed, exceeds the mean of its surroundings.
+    The value of a bright pixel is the distance to the nearest dark one, less half a pixel; the value of a dark pixel is
+    minus the distance to the nearest bright one, plus half a pixel. Both are limited to `REACH`.
     """
     smooth = [np.stack([smoothed(channel) for channel in levels]) for levels in pictures]
     by = principal(smooth)

@@ -101,9 +101,7 @@ def show(
     if hasattr(made, "data_vars") or "realisation" in getattr(made, "coords", ()):
         return draw(made)
     if not pictures or len(titles or pictures) != len(pictures):
-        raise ValueError(
-            f"there are {len(pictures)} pictures and {len(titles)} titles; give pictures, and as many titles"
-        )
+        raise ValueError(f"there are {len(pictures)} pictures and {len(titles)} titles; give as many of both")
     shown = [_pixels(one, channel_axis) for one in pictures]
     if tiled:
         shown = [np.tile(one, (3, 3, 1)) for one in shown]
@@ -201,9 +199,8 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     size = (across * (inches * cols * wide + 0.8) + 1, down * (inches * rows * high + 0.7))
     figure = new_figure(*size, layout="compressed")
     grid = figure.subplots(down, across, squeeze=False).ravel()
-    smooth = (
-        "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
-    )  # smaller maps have a pixel for each cell
+    # smaller maps have a pixel for each cell
+    smooth = "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
     where = {"origin": "lower" if ground else "upper", "extent": extent, "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
         own = how if isinstance(how, dict) else how[n]
@@ -221,19 +218,13 @@ class _ArrayPlot(DataArrayPlotAccessor):
     def __call__(self, **keywords: Any) -> Any:  # type: ignore[override]
         """Return a figure of the first ``number`` realisations, by default 8; xarray draws all else."""
         own = keywords.keys() <= {"number"} and "realisation" in self._da.coords and {"y", "x"} <= set(self._da.dims)
-        return _draw(self._da, **keywords) if own else super().__call__(**keywords)
+        return draw(self._da, **keywords) if own else super().__call__(**keywords)
 
 
 class _DatasetPlot(DatasetPlotAccessor):
     def __call__(self, **keywords: Any) -> Any:
         """Return a figure of the maps, or of the first ``number`` realisations or largest categories, by default 8."""
-        return _draw(self._ds, **keywords)
-
-
-def _draw(made: Any, **keywords: Any) -> Any:
-    pass  # MERGED
-
-    return draw(made, **keywords)
+        return draw(self._ds, **keywords)
 
 
 class Realisations(xr.DataArray):  # type: ignore[no-untyped-call]

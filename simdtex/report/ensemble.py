@@ -29,6 +29,7 @@ MOST_PANELS = 6  # categories drawn, those with the largest shares of the traini
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
+ACROSS = {1: "to the right", 0: "down"}  # the axes of a picture
 
 
 def write_ensemble(
@@ -108,9 +109,7 @@ def _kept(found: Summary) -> str:
     if not found.misses.any():
         return f"Every realisation keeps the {data}."
     if len(found.categories) == 0:
-        return (
-            f"Not every realisation keeps the {data}: the largest root mean square error is {found.misses.max():.3g}."
-        )
+        return f"Not every realisation keeps the {data}: the largest RMS error is {found.misses.max():.3g}."
     share, bad = found.misses.sum() / (number * realisations), np.count_nonzero(found.misses)
     return f"Of the {data}, {share:.1%} are missed on average, in {bad} of the {realisations} realisations."
 
@@ -217,28 +216,27 @@ def _variograms(found: Summary) -> Figure:
         of = "each category's indicator" + (" (of two categories both are the same)" if len(shown) == 1 else "")
     return Figure(
         "variograms.png",
-        _lagged(found, table, names, "variogram"),
+        _lagged(found.lags, table, names, "variogram", ACROSS, "pixels"),
         f"Variograms of {of} along both axes: half the mean squared difference of two pixels at a lag. The training "
         "image's line should run inside the band of the realisations. A band that rises later means bodies that are "
         "too large, one that rises earlier bodies that are too small or noise; waves are regular distances.",
     )
 
 
-def _lagged(found: Summary, table: Floats, names: Sequence[str], label: str) -> Plot:
-    """Plot functions of the lag, (2, K, n + 1, L): a row for each name, a column for each axis."""
-    figure = new_figure(8.2, 0.5 + 2.35 * len(names))
-    grid = figure.subplots(len(names), 2, sharey="row", sharex=True, squeeze=False)
+def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, ways: dict[int, str], unit: str) -> Plot:
+    """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each of some axes."""
+    figure = new_figure(2.2 + 3.0 * len(ways), 0.5 + 2.35 * len(names))
+    grid = figure.subplots(len(names), len(ways), sharey="row", sharex=True, squeeze=False)
     for row, (name, panels) in enumerate(zip(names, grid, strict=True)):
-        for axis, way, axes in zip((1, 0), ("to the right", "down"), panels, strict=True):
+        for (axis, way), axes in zip(ways.items(), panels, strict=True):
             theirs, own = table[axis, row, :-1], table[axis, row, -1]
             known = np.isfinite(theirs).any(axis=0)
-            lags = found.lags[known]
             low, middle, high = (how(theirs[:, known], axis=0) for how in (np.nanmin, np.nanmedian, np.nanmax))
-            axes.fill_between(lags, low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all")
-            axes.plot(lags, middle, color=THEIRS, linewidth=1.3, label="realisations, median")
-            axes.plot(found.lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
+            axes.fill_between(lags[known], low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all")
+            axes.plot(lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
+            axes.plot(lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
             title = f"{name}, {way}" if name else way
-            tidy(axes, title, "lag, pixels" if row == len(names) - 1 else "", label if axis == 1 else "")
+            tidy(axes, title, f"lag, {unit}" if row == len(names) - 1 else "", label if axes is panels[0] else "")
         panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
     legend(figure, grid[0, 0])
     return figure
@@ -253,26 +251,28 @@ def _connectivity(found: Summary) -> list[Part]:
         "Share of the largest": found.largest,
         "Dead ends in 10,000 pixels": found.dead_ends,
     }
-    rows = [
-        {"Category": f"{category}, {name}"} | {head: _spread(table[k, column]) for head, table in figures.items()}
-        for k, category in enumerate(found.categories)
-        for name, column in (("training image", slice(-1, None)), ("realisations", slice(0, -1)))
-    ]
-    note = (
-        "Realisations: mean ± standard deviation. Many components are specks, and many dead ends are channels that "
-        "break off."
-    )
+    note = " Many components are specks, and many dead ends are channels that break off."
     return [
         Figure(
             "connectivity.png",
-            _lagged(found, found.connectivity[:, shown], names, "connectivity"),
+            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", ACROSS, "pixels"),
             "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
             "connected component (pixels are connected by their sides). A variogram cannot tell whole channels from "
             "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
             "above that they merge. A smaller image cuts bodies apart, so compare images of one size if you can.",
         ),
-        Table("Figures of the categories", rows, note),
+        _figures(found.categories, figures, note),
     ]
+
+
+def _figures(categories: Array, figures: dict[str, Floats], note: str) -> Table:
+    """Return a table of figures (K, n + 1) of categories, by their headings."""
+    rows = [
+        {"Category": f"{category}, {name}"} | {head: _spread(table[k, column]) for head, table in figures.items()}
+        for k, category in enumerate(categories)
+        for name, column in (("training image", slice(-1, None)), ("realisations", slice(0, -1)))
+    ]
+    return Table("Figures of the categories", rows, f"Realisations: mean ± standard deviation.{note}")
 
 
 def _spread(values: Floats) -> str:
@@ -370,102 +370,52 @@ def write_volumes(
 ) -> None:
     """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
 
-    Parameters
-    ----------
-    folder : path
-        See `simdtex.report.page.check_folder`.
-    training : (layers, rows, cols) array
-    ensemble : (realisations, layers, rows, cols) array
-    categorical : bool
-        Whether values are categories, of which the last one is drawn.
-    command : str
-        The command line, if there is one.
-    upward : bool
-        Draw y, or z, upward, as of a map.
-
-    Notes
-    -----
-    Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
+    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols). Of categories the last is
+    drawn. ``upward``: y, or z, is drawn upward, as of a map. Cost: a few passes over each realisation for every lag, up
+    to a third of the shortest side.
     """
-    names = np.unique(training) if categorical else np.zeros(0, training.dtype)
-    last = names[-1] if categorical else None
-    fields = [(one == last if categorical else one).astype(np.float64) for one in (training, *ensemble)]
-    own, theirs = fields[0], fields[1:]
-    mean = np.mean(theirs, 0)
-    what = f"category {last}" if categorical else "the values"
-    limits = (float(own.min()), float(own.max()))
+    images, names = [*ensemble, training], np.unique(training) if categorical else np.zeros(0, training.dtype)
+    fields = [(one == names[-1] if categorical else one).astype(np.float64) for one in images]
+    what = f"category {names[-1]}" if categorical else "the values"
+    limits = (float(fields[-1].min()), float(fields[-1].max()))
+    shown = {"training image": fields[-1], f"mean of {len(ensemble)}": np.mean(fields[:-1], 0)}
+    shown |= {f"realisation {k}": one for k, one in enumerate(fields[:-1][:SLICED])}
     sheet = [
         (f"{name}, {AXES[axis]} = {n // 2}", to_display(one.take(n // 2, axis)[:: -1 if upward else 1], limits))
-        for name, one in (
-            ("training image", own),
-            (f"mean of {len(theirs)}", mean),
-            *((f"realisation {k}", one) for k, one in enumerate(theirs[:SLICED])),
-        )
+        for name, one in shown.items()
         for axis, n in enumerate(one.shape)
     ]
-    most = max(1, min(*training.shape, *ensemble.shape[1:]) // 3)
-    variograms = [np.array([variogram(one, axis, most) for axis in range(3)]) for one in fields]
-    sections = [
-        Section(
-            "Slices",
-            [
-                Figure(
-                    "slices.png",
-                    contact_sheet(sheet, columns=3, scale=-(-LEAST_SIDE // max(training.shape))),
-                    f"The middle slices across z, y and x of {what}: the training image, the mean of the realisations, "
-                    "and realisations. In the mean, grey is uncertain.",
-                )
-            ],
-        ),
-        Section(
-            "Variograms", [_lagged_volumes("variograms.png", variograms, f"Variograms of {what} along z, y and x")]
-        ),
-    ]
-    results: dict[str, Any] = {
-        "shape": ensemble.shape,
-        "training_shape": training.shape,
-        "variograms": variograms,
-    }
-    if categorical:
-        found = [[connectivity(one, name, most) for one in (training, *ensemble)] for name in names]
-        functions = [one.function for one in found[-1]]
-        rows = [
-            {
-                "Category": f"{name}, {who}",
-                "Share": _mean([(one == name).mean() for one in those]),
-                "Components in 10,000 voxels": _mean([one.components for one in figures]),
-                "Share of the largest": _mean([one.largest for one in figures]),
-            }
-            for name, every in zip(names, found, strict=True)
-            for who, those, figures in (
-                ("training image", [training], every[:1]),
-                ("realisations", list(ensemble), every[1:]),
-            )
-        ]
-        note = "Means over the realisations. Voxels are connected by their faces."
-        plot = _lagged_volumes("connectivity.png", functions, f"Connectivity of {what} along z, y and x")
-        sections.append(
-            Section("Connectivity of the categories", [plot, Table("Figures of the categories", rows, note)])
+    lags = np.arange(max(1, min(*training.shape, *ensemble.shape[1:]) // 3) + 1)
+    along = {axis: f"along {name}" for axis, name in enumerate(AXES)}
+
+    def lagged(label: str, functions: list[Any]) -> Figure:
+        table = np.moveaxis(np.array(functions), 1, 0)[:, None]
+        caption = (
+            f"{label.capitalize()} of {what} along z, y and x. The training image's line should run inside the band."
         )
-        results |= {"connectivity": functions, "categories": names}
+        return Figure(f"{label}.png", _lagged(lags, table, [""], label, along, "voxels"), caption)
+
+    variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]
+    slices = Figure(
+        "slices.png",
+        contact_sheet(sheet, columns=3, scale=-(-LEAST_SIDE // max(training.shape))),
+        f"The middle slices across z, y and x of {what}: the training image, the mean of the realisations, and "
+        "realisations. In the mean, grey is uncertain.",
+    )
+    sections = [Section("Slices", [slices]), Section("Variograms", [lagged("variograms", variograms)])]
+    results: dict[str, Any] = {"shape": ensemble.shape, "training_shape": training.shape}
+    results["variograms"] = [variograms[-1], *variograms[:-1]]
+    if categorical:
+        found = [[connectivity(one, name, len(lags) - 1) for one in images] for name in names]
+        figures = {
+            "Share": np.array([[(one == name).mean() for one in images] for name in names]),
+            "Components in 10,000 voxels": np.array([[one.components for one in row] for row in found]),
+            "Share of the largest": np.array([[one.largest for one in row] for row in found]),
+        }
+        functions = [one.function for one in found[-1]]
+        table = _figures(names, figures, " Voxels are connected by their faces.")
+        sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table]))
+        results |= {"connectivity": [functions[-1], *functions[:-1]], "categories": names}
     size = " x ".join(str(side) for side in ensemble.shape[:0:-1])
     lead = f"{len(ensemble)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
     write_report(folder, "Realisations of a volume", lead, sections, results, command)
-
-
-def _lagged_volumes(file: str, tables: list[NDArray[np.float64]], caption: str) -> Figure:
-    """Return the plot of functions of the lag, (axes, lags): the first of the training image, the others' range."""
-    figure: Plot = new_figure(9.0, 2.9)
-    theirs, lags = np.array(tables[1:]), np.arange(tables[0].shape[1])
-    panels = figure.subplots(1, len(AXES), sharey="row")
-    for axis, (name, axes) in enumerate(zip(AXES, panels, strict=True)):
-        some = theirs[:, axis]
-        axes.fill_between(lags, some.min(0), some.max(0), alpha=0.25, linewidth=0, label="realisations, all")
-        axes.plot(lags, tables[0][axis], color="#D55E00", linestyle="--", label="training image")
-        tidy(axes, f"along {name}", "lag, voxels")
-    legend(figure, panels[0])
-    return Figure(file, figure, f"{caption}. The training image's line should run inside the band.")
-
-
-def _mean(values: list[float]) -> str:
-    return number_text(float(np.nanmean(values)))

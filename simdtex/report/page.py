@@ -12,7 +12,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 
 from simdtex import __version__
 from simdtex.io.files import atomic_folder, earlier_files
+from simdtex.model.display import OKABE_ITO
 from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns
 
@@ -32,34 +32,20 @@ INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
 DPI = 140
 
 
-# The palette of Okabe and Ito, distinct for every kind of colour vision, its yellow darkened for a white background.
-_KNOWN = {
-    "coloring": ("#0072B2", "o"),
-    "coloring-fixed": ("#56B4E9", "s"),
-    "luby": ("#009E73", "^"),
-    "checkerboard": ("#E69F00", "D"),
-    "synchronous": ("#D55E00", "v"),
-    "random-subset": ("#CC79A7", "P"),
-    "raster": ("#000000", "<"),
-    "random-scan": ("#7A7A7A", ">"),
-    "block": ("#8A6D00", "X"),
-}
-_SPARE = [("#882255", "*"), ("#332288", "h"), ("#117733", "p"), ("#AA4499", "d"), ("#661100", "8"), ("#6699CC", "H")]
+MARKERS = "os^DvP<>X*hpd8H"
 
 
 def styles(schedules: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
     """Return the keywords of `matplotlib.axes.Axes.plot` for each schedule, given whether it keeps equation (14).
 
-    A schedule of the package always has the same colour and marker; others take the remaining ones in order. Lines are
-    dashed and markers hollow if it breaks equation (14).
+    Lines are dashed and markers hollow if it breaks equation (14).
     """
-    taken = {_KNOWN[name] for name in schedules if name in _KNOWN}
-    spare = cycle([style for style in [*_SPARE, *_KNOWN.values()] if style not in taken])
     found = {}
-    for name, keeps in schedules.items():
-        color, marker = _KNOWN.get(name) or next(spare)
-        line, inside = ("-", color) if keeps else ("--", "white")
-        found[name] = {"color": color, "marker": marker, "linestyle": line, "markerfacecolor": inside}
+    for number, (name, keeps) in enumerate(schedules.items()):
+        colour = "#" + bytes(OKABE_ITO[-1 - number % len(OKABE_ITO)]).hex()
+        line, inside = ("-", colour) if keeps else ("--", "white")
+        marker = MARKERS[number % len(MARKERS)]
+        found[name] = {"color": colour, "marker": marker, "linestyle": line, "markerfacecolor": inside}
     return found
 
 

@@ -1,26 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of a comparison of schedules, with the Ising model under them."""
+"""The reports of schedules: a comparison, with the Ising model, and an execution on the processor array of 1998."""
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
+import PIL.Image
+import PIL.ImageDraw
+import PIL.ImageFont
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Plot
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from simdtex import __version__
+from simdtex import __version__, schedules
 from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
 from simdtex.experiments.ising import LEVEL, Chains, Finding, Spins
 from simdtex.io.image import to_display
+from simdtex.jobs.array import Execution
+from simdtex.machine.reference import Reference
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.report.page import INK, Figure, Part, Section, legend, new_figure, styles, tidy, write_report
-from simdtex.report.sheet import contact_sheet
-from simdtex.report.tables import Table, number_text
+from simdtex.report.sheet import TEXT, contact_sheet
+from simdtex.report.tables import Table, duration_text, number_text, seconds_text
+from simdtex.schedules.schedule import Masked, Setting
 
 SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
 
@@ -400,9 +408,139 @@ def _lattices(pictures: Sequence[Chains]) -> Figure:
 
 
 def _sublattice(spins: NDArray[np.uint8], odd: int) -> NDArray[np.uint8]:
-    """Return the spins of one sublattice, each drawn over itself and the site to its right."""
+    """Return the spins of one sublattice of an even width, each drawn two sites wide."""
     row, col = np.indices(spins.shape)
-    shown: NDArray[np.uint8] = spins[row, np.clip(col - (row + col + odd) % 2, 0, None)]
-    first = (col == 0) & ((row + odd) % 2 == 1)  # belongs to the site on its right
-    shown[first] = np.roll(spins, -1, 1)[first]
+    shown: NDArray[np.uint8] = spins[row, col // 2 * 2 + (row + odd) % 2]
     return shown
+
+
+Steps = Iterator[NDArray[np.bool_]]
+"""The sites that relax together, step by step, each (rows, cols)."""
+
+FRAMES, PAUSE = 60, 200
+"""The frames of a film, and the milliseconds between two."""
+
+SIDE, GAP = 200, 14
+"""The least side of a lattice in a film, and the space around it, pixels."""
+
+COLOURS = np.array([(34, 38, 43), (60, 92, 130), (255, 190, 60)], np.uint8)
+"""The colours of a PE that waits, of one that has relaxed its site in this sweep, and of one that does so now."""
+
+SHOWN = "The sample, and the picture that the array made. It has the bytes of simdtex synth --preset paper."
+ACTIVE = (
+    "The share of PEs that relax a site, step by step. The others wait under the mask: their sites have another colour "
+    "or the temperature 0, or, at coarse levels, they have no site."
+)
+FILM = "PEs that relax a site now (light), and that have done so in this sweep (blue). A frame is a step."
+WHY = (
+    "The paper relaxes sites together only if none is a neighbour of another, equation (14), because a site must see "
+    "the present values of its neighbours. coloring does so in as few steps as there are colours. raster keeps the "
+    "rule too, one site a step. synchronous relaxes all sites in one step and checkerboard in two, but neighbours "
+    "among them: what they draw need not have the distribution of the model (see simdtex schedules --ising)."
+)
+
+
+def write_array(
+    folder: str | os.PathLike[str],
+    sample: NDArray[Any],
+    made: NDArray[Any],
+    run: Execution,
+    names: Sequence[str],
+    command: str = "",
+) -> None:
+    """Write a page on an execution: its seconds, its active PEs, and a film of the schedules ``names``."""
+    facts = run.statistics
+    total = sum(sum(section.values()) for section in run.seconds.values())
+    grid = Grid.of((made.shape[0], made.shape[1]))
+    moving = film({name: steps(name, grid, facts["options"]["order"], facts["seed"]) for name in names})
+    lead = (
+        f"{made.shape[1]} x {made.shape[0]} pixels on {facts['array']} PEs ({facts['mapping']}, {facts['layers']} "
+        f"virtual layers): by the model a MasPar MP-1 would have taken {duration_text(total)}."
+    )
+    seen = contact_sheet([("sample", sample), ("the picture", made)])
+    page = [
+        Section("The picture", [Figure("pictures.png", seen, SHOWN)]),
+        Section("Seconds of 1998", [section_table(run)]),
+        Section("PEs at work", [Figure("active.png", _utilisation(run), ACTIVE)]),
+        Section("Schedules", [WHY, Figure("film.png", moving, FILM)]),
+    ]
+    results = {"seconds": run.seconds, "statistics": facts, "utilisation": [one.active.mean() for one in run.steps]}
+    write_report(folder, "The processor array of 1998", lead, page, results, command)
+
+
+def section_table(run: Execution) -> Table:
+    """Return a table of modelled seconds by section of the program and kind of instruction, and of idle PEs."""
+    seconds, kinds = dict(run.seconds), sorted({kind for section in run.seconds.values() for kind in section})
+    seconds["all"] = {kind: sum(section.get(kind, 0.0) for section in run.seconds.values()) for kind in kinds}
+    idle = {name: _idle(run, [name]) for name in run.seconds} | {"all": _idle(run, list(run.seconds))}
+    rows = [
+        {"section": name}
+        | {kind: seconds_text(each[kind]) if each.get(kind) else "" for kind in kinds}
+        | {"together": seconds_text(sum(each.values())), "idle PEs": f"{idle[name]:.0%}"}
+        for name, each in seconds.items()
+    ]
+    return Table(f"A MasPar MP-1 of {run.statistics['array']} PEs, by the model", rows)
+
+
+def _idle(run: Execution, sections: Sequence[str]) -> float:
+    """Return the share of PEs under the mask, over the seconds of sections."""
+    rows, cols = (int(side) for side in run.statistics["array"].split("x"))
+    pairs = [(run.seconds[name][kind], one) for name in sections for kind, one in run.counts[name].items()]
+    time = sum(seconds for seconds, _ in pairs)
+    busy = sum(seconds * one.active / max(1, one.instructions * rows * cols) for seconds, one in pairs)
+    return 1 - busy / time if time else 0.0
+
+
+def _utilisation(run: Execution) -> Plot:
+    """Return a plot of the share of active PEs in each step, over the virtual layers with an active PE."""
+    shares = [one.active[one.active.any((1, 2))].mean() for one in run.steps]
+    levels = np.array([one.level for one in run.steps])
+    plot = new_figure(7.2, 3.0)
+    axes = plot.add_subplot()
+    for level in sorted(set(levels.tolist()), reverse=True):
+        at = np.flatnonzero(levels == level)
+        axes.plot(at + 1, 100 * np.array(shares)[at], ".", markersize=3, label=f"level {level}")
+    tidy(axes, x="step", y="active PEs, %")
+    axes.set_ylim(0)
+    legend(plot, axes, columns=6)
+    return plot
+
+
+def steps(name: str, grid: Grid, order: int, seed: int) -> Steps:
+    """Yield the sites of each step of a schedule, sweep after sweep without end, as if all were active."""
+    schedule = schedules.get(name)
+    setting = Setting(Reference(), grid, neighbourhood_offsets(order), order, seed, 0)
+    state = schedule.init(setting)
+    while True:
+        state, info = schedule.step(setting, state, Masked(grid))
+        for step in info.apart(setting.machine):
+            plane = np.zeros(grid.shape, bool)
+            plane.flat[step.sites] = True
+            yield plane
+
+
+def film(shown: Mapping[str, Steps]) -> bytes:
+    """Return an animated PNG: the sites of each schedule side by side, a frame for each step."""
+    font, frames = PIL.ImageFont.load_default(TEXT), []
+    done: dict[str, Any] = dict.fromkeys(shown, False)
+    for number in range(1, FRAMES + 1):
+        panels = []
+        for name, ahead in shown.items():
+            now = next(ahead)
+            before = np.broadcast_to(done[name] & ~np.any(done[name] & now), now.shape)  # a site again: a new sweep
+            done[name] = before | now
+            scale = max(1, SIDE // max(now.shape))
+            colours = COLOURS[np.where(now, 2, before.astype(int))].repeat(scale, 0).repeat(scale, 1)
+            panels.append((f"{name}\n{np.count_nonzero(now):,} of {now.size:,} sites", colours))
+        width = sum(len(one[0]) + GAP for _, one in panels) + GAP
+        frame = PIL.Image.new("RGB", (width, len(panels[0][1]) + 4 * TEXT + 2 * GAP), "white")
+        pen, left = PIL.ImageDraw.Draw(frame), GAP
+        pen.text((GAP, 4), f"step {number}", fill="black", font=font)
+        for text, colours in panels:
+            pen.multiline_text((left, 8 + TEXT), text, fill="black", font=font)
+            frame.paste(PIL.Image.fromarray(colours), (left, 4 * TEXT + GAP))
+            left += len(colours[0]) + GAP
+        frames.append(frame)
+    buffer = io.BytesIO()
+    frames[0].save(buffer, "PNG", save_all=True, append_images=frames[1:], duration=PAUSE, loop=0)
+    return buffer.getvalue()

@@ -105,9 +105,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
     """
     block = np.asarray(volume)
     if block.ndim not in (3, 4) or block.size == 0:
-        raise ValueError(
-            f"the volume has the shape {block.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
-        )
+        raise ValueError(f"the volume has the shape {block.shape}: give (depth, rows, cols[, channels])")
     if not LEAST_SIDE <= size <= MOST_SIDE:
         raise ValueError(f"size is {size}: give {LEAST_SIDE} to {MOST_SIDE} pixels")
     if path is not None:

@@ -179,19 +179,8 @@ def write_classification(
 ) -> None:
     """Write the report of a classification: ``index.html``, PNG pictures, ``results.json``.
 
-    Parameters
-    ----------
-    folder : path
-        See `simdtex.report.page.check_folder`.
-    image : (rows, cols[, bands]) array
-    labels : (rows, cols) uint8 array
-        The labels, 0 unknown.
-    output : simdtex.run.Output
-        The output of `simdtex.classify`.
-    truth : (rows, cols) array of integers, optional
-        The true labels, 0 to 255; a label of no class where the true one is unknown.
-    command : str
-        The command line, if there is one.
+    ``image`` is (rows, cols[, bands]); ``labels`` (rows, cols) are 0 where unknown; ``output`` is that of
+    `simdtex.classify`. ``truth`` (rows, cols) are the true labels, one of no class where the true one is unknown.
     """
     statistics, fit = output.statistics, output.fit
     assert fit is not None

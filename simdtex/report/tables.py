@@ -92,13 +92,7 @@ def duration_text(seconds: float) -> str:
 
 
 def print_profile(statistics: dict[str, Any]) -> None:
-    """Print the profile in the statistics of a run, see `simdtex.run.Output`."""
-    print_table(profile_table(statistics))
-    print(profile_summary(statistics))
-
-
-def profile_table(statistics: dict[str, Any]) -> Table:
-    """Return a table of the kernels of a run."""
+    """Print the kernels of a run, and its wall time, from its statistics: see `simdtex.run.Output`."""
     rows = [
         {
             "kernel": kernel["name"],
@@ -109,13 +103,9 @@ def profile_table(statistics: dict[str, Any]) -> Table:
         }
         for kernel in statistics["kernels"]
     ]
-    return Table(f"Kernels on {statistics['device']}", rows)
-
-
-def profile_summary(statistics: dict[str, Any]) -> str:
-    """Return a sentence on the wall time and the time in kernels."""
+    print_table(Table(f"Kernels on {statistics['device']}", rows))
     wall, busy = statistics["seconds"], statistics["device_seconds"]
-    return f"wall time {seconds_text(wall)}: kernels {seconds_text(busy)} ({busy / wall:.1%})"
+    print(f"wall time {seconds_text(wall)}: kernels {seconds_text(busy)} ({busy / wall:.1%})")
 
 
 def print_accounting(accounting: dict[str, Any]) -> None:
@@ -139,7 +129,7 @@ def print_accounting(accounting: dict[str, Any]) -> None:
 
 
 def print_benchmark(results: dict[str, Any]) -> None:
-    """Print the results of `simdtex.bench.run.run`."""
+    """Print the results of `simdtex.experiments.benchmark.run`."""
     host = results["host"]
     print(
         f"{host['cpu']}, {host['cores']} cores; {host['system']}; simdtex {results['simdtex']}, numpy {host['numpy']}; "

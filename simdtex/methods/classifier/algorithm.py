@@ -17,8 +17,8 @@ from simdtex import schedules
 from simdtex.checkpoint import like
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
+from simdtex.methods.classifier import Options
 from simdtex.methods.classifier.model import UNITS, Model, Null, Region, learn, prepared, windowed
-from simdtex.methods.classifier.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
 from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window

@@ -15,7 +15,7 @@ from scipy import ndimage
 from simdtex import random
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
-from simdtex.methods.classifier.options import Options
+from simdtex.methods.classifier import Options
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.model.scale import Scale

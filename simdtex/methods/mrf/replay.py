@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.io.brief import Brief
 from simdtex.machine import Machine
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.algorithm import run_steps
@@ -20,6 +19,7 @@ from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.record import picture, sources, temperatures
 from simdtex.model.explanation import Explanation
 from simdtex.ops.neighbourhood import Field
+from simdtex.options import Brief
 
 KEPT = 2**28
 """The most bytes of the states that a replay keeps; all other states are recomputed."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
+from simdtex.methods.multires import Options
 from simdtex.methods.multires.analysis import (
     Analysis,
     analyse,
@@ -28,7 +29,6 @@ from simdtex.methods.multires.analysis import (
     read_sources,
     structure_of,
 )
-from simdtex.methods.multires.options import Options
 from simdtex.model.source_map import effective_use
 from simdtex.ops.candidates import Sampled, candidates
 from simdtex.ops.pyramids import laplacian_collapse

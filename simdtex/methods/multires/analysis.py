@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
+from simdtex.methods.multires import Options
 from simdtex.methods.multires.mend import mend
-from simdtex.methods.multires.options import Options
 from simdtex.model.stretched import Stretched
 from simdtex.ops.candidates import Sampled, Structure
 from simdtex.ops.pyramids import FILTER_SIDE, bank, filters, half, laplacian_band, laplacian_reduce

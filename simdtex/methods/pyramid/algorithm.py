@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
+from simdtex.methods.pyramid import Options
 from simdtex.methods.pyramid.matcher import Histograms, Matcher, Wanted, histograms
-from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import Decorrelated, Palette, decorrelated, palette
 from simdtex.methods.pyramid.pyramids import Transform, most_levels
 from simdtex.model.stretched import Stretched

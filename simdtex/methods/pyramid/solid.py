@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.pyramid import options as pyramid
+from simdtex.methods import pyramid
 from simdtex.methods.pyramid.algorithm import (
     VALUES,
     Run,

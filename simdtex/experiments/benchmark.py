@@ -83,9 +83,7 @@ def chosen(device: str | None = None) -> list[DeviceInfo]:
     if device is not None:
         info = find(device)
         if info.kind == "reference":
-            raise DeviceError(
-                "the reference is measured with every device; give an OpenCL device, or none for all of them"
-            )
+            raise DeviceError("the reference is measured with every device; give an OpenCL device, or none for all")
         return [info]
     found = [info for info in devices() if info.usable and info.kind != "reference" and not info.simulated]
     return found or [find(None)]
