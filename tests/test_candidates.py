@@ -331,11 +331,3 @@ def test_the_draw_is_uniform(seed, match):
             assert chisquare(times).pvalue > SIGNIFICANCE
             tested += 1
     assert tested >= 10, "there is something to draw from"
-
-
-def numbers(p, level, seed):
-    """Which of all nodes each pixel of a level was drawn from, where all pass; `match`."""
-    source, _ = sampled_on(REFERENCE, p, True, seed)
-    cols = p.tiles[level][1]
-    row, col = np.divmod(source[p.own(level)], cols)
-    return row // 2 * ((cols + 1) // 2) + col // 2

@@ -98,10 +98,6 @@ def test_the_help_of_an_option_begins_with_what_it_does():
             assert said[0].isupper() and said.partition(" ")[0].lower() in VERBS, f"{command} {one.opts[0]}: {said}"
 
 
-def test_a_short_list_has_no_groups():
-    assert "\nOptions:\n" in help_of("demo") and "\nOptions:\n" not in help_of("synth")
-
-
 @pytest.mark.parametrize("words", LINES, ids=lambda words: words[:40])
 def test_examples_are_understood(words):
     name, *rest = shlex.split(words)

@@ -617,16 +617,6 @@ def test_after_a_refusal_no_result_is_shown_as_its(opened):
     assert "selected" not in opened.kinds(after)[: opened.kinds(after).index("hello")], "it is what is to be filled"
 
 
-def test_frames_that_are_not_shown_are_few(opened):
-    opened.sees = False
-    opened.result()
-    after = len(opened.got)
-    for left in range(50):
-        opened.session.receive(WINDOW | {"left": left}).wait(5)
-    opened.ask("hello", kind="hello")
-    assert opened.kinds(after).count("frame") <= sessions.MAX_UNSEEN
-
-
 def test_too_little_memory_for_a_frame_is_said(opened, monkeypatch):
     def none(*_, **__):
         raise MemoryError
