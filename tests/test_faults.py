@@ -23,10 +23,8 @@ import PIL.Image
 import PIL.ImageFile
 import pytest
 import tifffile
-from click.testing import CliRunner
 from volumes import loaded, png
 
-from simdtex.cli import main
 from simdtex.io import decode, files, image, volume
 from simdtex.io.files import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
 from simdtex.io.grids import read_grid
@@ -501,12 +499,6 @@ def test_the_environment_says_how_many(tmp_path, monkeypatch):
     for number, error in ((0, ValueError), (1.5, TypeError), (True, TypeError)):
         with pytest.raises(error, match="max_pixels"):
             image.read(tmp_path / "a.png", max_pixels=number)
-
-
-def test_the_command_line_says_it_in_one_sentence(tmp_path, monkeypatch):
-    (tmp_path / "a.png").write_bytes(PICTURES["PNG"])
-    done = CliRunner().invoke(main, ["synth", str(tmp_path / "a.png"), "-o", str(tmp_path / "out.png")])
-    assert done.exit_code == 2 and files.VARIABLE in done.output and len(done.output.splitlines()) == 1
 
 
 def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
