@@ -256,11 +256,6 @@ def test_maps_are_those_of_the_function(folder, maps):
         assert np.array_equal(made("grey.png", "second.png", "--image-map", name), expected)
 
 
-def test_the_size_is_that_of_a_map(folder, maps):
-    np.save(folder / "small.npy", np.full((7, 9, 2), 0.5))
-    assert made("facies.png", "--probabilities", "small.npy", "--categorical").shape == (1, 7, 9)
-
-
 def test_a_source_map_is_in_the_file(folder):
     result = simulate("grey.png", "--source", "--finish", 0, "-o", "out.nc")
     assert result.exit_code == 0, result.output

@@ -1,6 +1,5 @@
 """The sample: its pictures, their gaps and categories, working levels, integers without contrast, and colours."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -13,7 +12,7 @@ from tolerances import CONTRAST, DECORRELATED, DIRECTION
 
 from simdtex.methods.pyramid.palette import FLAT, decorrelated, palette
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Pictures, completed, unknown_in
+from simdtex.model.pictures import Pictures, completed
 from simdtex.model.sample import Sample
 from simdtex.model.scale import Scale, highest, stretch
 from simdtex.model.stretched import LUMA, TOP, Stretched
@@ -24,14 +23,6 @@ from simdtex.model.stretched import LUMA, TOP, Stretched
 def line(*values, dtype=np.float32):
     """A picture of one row and one channel."""
     return np.array(values, dtype)[None, :, None]
-
-
-def test_unknown_is_nan_in_any_channel():
-    picture = np.zeros((2, 3, 2))
-    picture[0, 1, 1] = picture[1, 2, 0] = np.nan
-    assert np.argwhere(unknown_in(picture)).tolist() == [[0, 1], [1, 2]]
-    assert not unknown_in(picture.astype(np.float32)[..., :0]).any()
-    assert not unknown_in(np.zeros((2, 3, 1), np.uint8)).any()
 
 
 def test_a_gap_is_completed_by_the_nearest_known_pixel():
@@ -62,11 +53,6 @@ def test_what_is_said_to_be_unknown_is_so_beside_nan():
     assert pictures.pixels[0].ravel().tolist()[::2] == [5, 7]
     with pytest.raises(ValueError, match="no known pixel"):
         Pictures((line(np.nan, np.nan),))
-
-
-def test_a_copy_with_other_weights_has_the_same_gaps():
-    pictures = replace(Pictures((line(1, np.nan, 3),)), weights=(2.0,))
-    assert pictures.known[0].tolist() == [[True, False, True]]
 
 
 def test_clean_is_one_picture_all_known_and_all_usable():
@@ -481,20 +467,6 @@ def moments(channels):
     return flat.mean(1), np.cov(flat, bias=True).reshape(len(flat), -1)
 
 
-@given(st.integers(0, 2**16), st.integers(1, 5))
-def test_channels_have_unit_variance_and_no_correlation(seed, channels):
-    planes = mixed(np.random.default_rng(seed), channels)
-    own = palette([planes], [1.0])
-    mean, covariance = moments(own.decorrelated(planes))
-    deviations = np.sqrt(np.linalg.svd(moments(planes)[1])[1])
-    busy = own.deviations > 0
-    assert abs(mean).max() <= channels / deviations[busy].min(), "the mean is an integer"
-    assert abs(np.diag(covariance)[busy] - 1).max() <= DECORRELATED
-    between = abs(covariance - np.diag(np.diag(covariance)))
-    lesser = np.minimum(*np.meshgrid(deviations, deviations))
-    assert (between * lesser).max() <= DECORRELATED * deviations.max()
-
-
 @given(st.integers(0, 2**16), st.integers(1, 4))
 def test_the_transform_is_that_of_a_plain_svd(seed, channels):
     planes = mixed(np.random.default_rng(seed), channels)
@@ -548,15 +520,6 @@ def test_grey_in_three_channels_is_one_channel():
     assert not channels[1:].any()
     back = own.restored(np.concatenate([np.linspace(-3, 3, 77).reshape(1, 7, 11), np.zeros((2, 7, 11))]))
     assert (back == back[0]).all(), "grey to the bit"
-
-
-def test_a_flat_channel_keeps_its_value():
-    planes = planes_of()
-    planes[1] = 1234
-    own = palette([planes], [1.0])
-    assert own.deviations[-1] == 0
-    assert (own.restored(own.decorrelated(planes))[1] == 1234).all()
-    assert (own.restored(np.random.default_rng(1).normal(0, 2, planes.shape))[1] == 1234).all()
 
 
 @pytest.mark.parametrize("decorrelate", [True, False])

@@ -76,23 +76,6 @@ def test_seeds_are_apart_and_stay_what_they_are():
     assert simulate(first=3).seed.values.tolist() == [realisation_seed(5, 3), realisation_seed(5, 4)]
 
 
-def test_the_preset_wins_over_the_defaults_of_a_simulation():
-    found = simulate(n=1, preset="paper", order=1, levels=2)
-    own = simdtex.synthesize(
-        TRAINING,
-        SHAPE,
-        rng=int(found.seed[0]),
-        preset="paper",
-        boundary="open",
-        order=1,
-        levels=2,
-        xi=-8.0,
-        device="reference",
-    )
-    assert_same_bits(found.values[0], own)
-    assert json.loads(found.attrs["options"])["balance"] == 0
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
     data = holed(dtype)
@@ -214,13 +197,6 @@ def test_what_is_returned_is_written_by_xarray_itself(tmp_path):
         with xarray.open_dataarray(tmp_path / name) as back:
             assert back.identical(found)
             assert back.dtype == found.dtype and json.loads(back.attrs["options"])["order"] == 2
-
-
-def test_a_generator_is_asked_for_a_seed_that_gives_the_same_again():
-    found = simulate(n=1, rng=np.random.default_rng(3))
-    again = simulate(n=1, rng=found.attrs["seed"])
-    assert_same_bits(found.values, again.values)
-    assert np.array_equal(found.values, simulate(n=1, rng=np.random.default_rng(3)).values)
 
 
 DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")
@@ -446,22 +422,3 @@ def test_bad_input_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         simulate(**change)
     assert "\n" not in str(caught.value)
-
-
-TABLES = {
-    "outside": ("x,y,value\n3,4,20\n14,2,9\n", "line 3 .* outside of a picture of 14 x 12"),
-    "disagree": ("x,y,value\n3,4,20\n3.2,4.1,9\n", "line 3 and line 2 .* keep one|line 2 and line 3 .* keep one"),
-    "beyond the type": ("x,y,value\n3,4,300\n", "which uint8 cannot hold"),
-    "of two variables": ("x,y,a,b\n3,4,1,2\n", "2 values, a, b, and a pixel of the sample 1"),
-    "empty": ("", "the table is empty"),
-    "words": ("x,y,value\n3,4,high\n", "'high' in column 3"),
-}
-
-
-@pytest.mark.parametrize("case", TABLES)
-def test_bad_tables_are_refused_with_their_line(tmp_path, case):
-    text, words = TABLES[case]
-    path = tmp_path / "wells.csv"
-    path.write_text(text)
-    with pytest.raises(ValueError, match=words):
-        simulate(known=path)
