@@ -44,9 +44,10 @@ def weights(training, known, cell, nearest, reach, bandwidth, differs, variance,
     return found
 
 
-@pytest.mark.parametrize("how", [{}, {"nearest": 3}, {"nearest": 0}, {"reach": 5, "bandwidth": 0.6}], ids=str)
-@pytest.mark.parametrize("kinds", [2, 3])
-def test_probabilities_are_those_of_plain_loops(how, kinds):
+@pytest.mark.parametrize(
+    ("kinds", "how"), [(3, {}), (2, {"nearest": 3}), (3, {"nearest": 0}), (2, {"reach": 5, "bandwidth": 0.6})], ids=str
+)
+def test_probabilities_are_those_of_plain_loops(kinds, how):
     training = TRAINING if kinds == 3 else (TRAINING > 3).astype(np.uint8)
     known, names = data(training), np.unique(training)
     found = simdtex.estimate(training, known=known, categorical=True, device="reference", **how)

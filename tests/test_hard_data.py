@@ -268,15 +268,6 @@ def test_placing_against_a_loop(quarters, dtype, variables):
     np.testing.assert_array_equal(placed.compressed(), expected[~np.isnan(expected)])
 
 
-def test_x_is_the_column_and_halves_go_up():
-    below = np.nextafter(0.5, 0)
-    for x, column in ((-0.5, 0), (-1e-20, 0), (below, 0), (0.5, 1), (1.5, 2), (2.4999, 2)):
-        placed = place_hard_data([[x, 1, 7]], (2, 3), np.uint8)
-        assert np.argwhere(~placed.mask).tolist() == [[1, column]]
-    assert place_hard_data([[below, below, 7]], (2, 3))[0, 0] == 7
-    np.testing.assert_array_equal(place_hard_data([[0, 0, 1]], (1, 2), "float32").filled(), [[1, NAN]])
-
-
 def test_data_that_agree_at_one_site_are_one():
     placed = place_hard_data([[1, 1, 5, NAN], [1.2, 0.9, 5, 8], [1, 1, NAN, 8]], (2, 2))
     assert placed[1, 1].tolist() == [5, 8]

@@ -201,6 +201,7 @@ def test_a_script_keeps_no_figure_and_is_not_warned():
     assert (result.stdout.lower(), result.stderr) == ("agg []\n", "")
 
 
+@pytest.mark.slow
 def test_a_notebook_draws_each_figure_once_and_in_order():
     cells = ["simdtex.show(a)", "simdtex.show(a);\n1", "simdtex.show(a)\nsimdtex.show(a, a)"]
     book = nbformat.v4.new_notebook()

@@ -40,7 +40,7 @@ def halved(n, tile, times):
     return whole * tile + rest
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2, -1, -2, -3])
+@pytest.mark.parametrize("axis", [0, 1])
 def test_the_channel_axis_is_kept(axis):
     last = texture((9, 10), 3)
     image, output = run(np.moveaxis(last, -1, axis), (12, 17), channel_axis=axis)
@@ -48,16 +48,6 @@ def test_the_channel_axis_is_kept(axis):
     assert_same_bits(np.ascontiguousarray(np.moveaxis(image, axis, -1)), expected)
     for ours, theirs in zip(output.stages, other.stages, strict=True):
         assert np.array_equal(np.moveaxis(ours.image, axis, -1), theirs.image)
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (3, 2), (70, 45), (np.int64(4), 4)], ids=str)
-@pytest.mark.parametrize("boundary", ["torus", "open"])
-def test_any_size(shape, boundary):
-    for parity in ("match", "free"):
-        image, output = run(texture((13, 7)), shape, boundary=boundary, parity=parity)
-        assert image.shape == shape
-        assert output.source.shape == (*shape, 2)
-        assert (output.source < [13, 7]).all()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (2, 2), (3, 3), (4, 4)], ids=str)
@@ -100,15 +90,7 @@ def test_integer_pixels_of_any_magnitude(dtype):
     assert synthesize(sample, (18, 10), alpha=INF).dtype == dtype
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
-    sample = texture((13, 12))
-    first, again, *others = (synthesize(sample, (20, 21), alpha=1.0, rng=s) for s in (5, 5, 6, 5 + 2**32, 5 + 2**63))
-    assert_same_bits(first, again)
-    assert len({image.tobytes() for image in (first, *others)}) == 4
-
-
-@pytest.mark.parametrize("shape", [(13, 7), (20, 30), (5, 3)], ids=str)
-@pytest.mark.parametrize("boundary", ["torus", "open"])
+@pytest.mark.parametrize(("shape", "boundary"), [((20, 30), "torus"), ((5, 3), "open")], ids=str)
 def test_one_level_is_a_tiling(shape, boundary):
     sample = texture((13, 7), 3, np.float32)
     image, output = run(sample, shape, levels=1, boundary=boundary, alpha=INF)
@@ -130,9 +112,9 @@ def test_the_most_levels_that_are_named_work_and_one_more_does_not(size, most):
     assert_same_bits(synthesize(sample, (9, 9)), image)
 
 
-@pytest.mark.parametrize("size", [(13, 7), (16, 8), (3, 20)], ids=str)
-@pytest.mark.parametrize("shape", [(20, 17), (39, 21), (2, 50)], ids=str)
-@pytest.mark.parametrize("levels", [None, 2])
+@pytest.mark.parametrize(
+    ("size", "shape", "levels"), [((13, 7), (20, 17), None), ((16, 8), (39, 21), 2), ((3, 20), (2, 50), None)], ids=str
+)
 def test_the_stages_are_the_levels_of_every_tile_coarsest_first(size, shape, levels):
     sample = texture(size, 2, np.uint16)
     image, output = run(sample, shape, levels=levels)
@@ -248,37 +230,3 @@ def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch)
     monkeypatch.setattr("simdtex.methods.multires.algorithm.analyse", never)
     with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
         synthesize(texture((13, 7)), shape)
-
-
-SAMPLE = texture((13, 7))
-FLOAT = texture((13, 7), dtype=np.float64)
-UNKNOWN = (
-    "unknown option '{}' of the method 'multires'; choose from: preset, alpha, beta, seams, parity, "
-    "levels, boundary, edges, orientations"
-)
-
-
-def with_value(value):
-    sample = FLOAT.copy()
-    sample[4, 5] = value
-    return sample
-
-
-BAD = [
-    ({"sample": with_value(np.nan)}, ValueError, "known everywhere"),
-    # the options
-    ({"alpha": -1}, ValueError, "alpha is -1; give a number of at least 0"),
-    ({"alpha": math.nan}, ValueError, "alpha is nan; give a number of at least 0"),
-    ({"alpha": "x"}, TypeError, "alpha must be a number, not 'x'"),
-    ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
-    ({"gamma": 1}, TypeError, UNKNOWN.format("gamma")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "error", "words"), BAD, ids=lambda v: None)
-def test_bad_input_is_refused_with_a_remedy(change, error, words):
-    arguments = {"sample": SAMPLE, "shape": (6, 7), "method": "multires", "rng": 1, "device": "reference"} | change
-    with pytest.raises(error, match=words) as caught:
-        simdtex.synthesize(arguments.pop("sample"), arguments.pop("shape"), **arguments)
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 500
