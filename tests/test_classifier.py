@@ -389,21 +389,6 @@ def test_a_stroke_is_learned_from_what_is_around_it_alone():
     assert all((a == b).all() for a, b in zip(*found, strict=True))
 
 
-def test_parts_are_disjoint_and_equal():
-    sites = np.zeros((30, 30), bool)
-    sites[3:23, 5:21] = True
-    parts = model._quarters(sites)
-    assert (np.sum(parts, 0) == sites).all()
-    assert [int(part.sum()) for part in parts] == [80] * 4
-    one = np.zeros((5, 5), bool)
-    one[2, 3] = True
-    assert [part.sum() for part in model._quarters(one)] == [1]
-    far = np.zeros((500, 500), bool)
-    far[100:400, 100:400] = True
-    boxed = model._boxed(far)
-    assert boxed.sum() == model.BOX**2 and boxed[250, 250] and not boxed[100, 100]
-
-
 def test_exemplars_of_a_judged_part_and_of_validation_are_not_drawn():
     values = np.repeat(np.arange(40, dtype=np.uint8), 40).reshape(40, 40) * 3
     regions = [*whole(values), *whole(np.full((20, 20), 200, np.uint8), judged=True)]
@@ -451,13 +436,6 @@ def test_means_over_a_window_are_of_the_sites_alone():
     alone[0, 0] = True
     near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps, np.ones_like(alone))
     assert (near[0][0] == np.where(near[1], 9 * MEANS, 0)).all() and 1 < near[1].sum() < 1600
-
-
-def test_covariance_and_inverse_are_those_of_linear_algebra():
-    values = np.random.default_rng(1).normal(size=(5, 200))
-    found = model._covariance(values)
-    assert found == pytest.approx(np.cov(values), rel=1e-12)
-    assert model._inverse(found) == pytest.approx(np.linalg.inv(found), rel=1e-9)
 
 
 def test_the_covariance_of_a_class_has_its_share_that_of_all_and_the_drift():

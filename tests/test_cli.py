@@ -4,10 +4,8 @@ import json
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -99,24 +97,6 @@ def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
     assert words in result.output
     assert len(result.output.strip().splitlines()) == 1
     assert names(folder) == before
-
-
-def test_ctrl_c_leaves_no_file(folder):
-    image.write(folder / "big.png", np.random.default_rng(2).integers(0, 256, (96, 96), dtype=np.uint8))
-    command = [sys.executable, "-m", "simdtex", "synth", "big.png", "-o", "out.png", "--size", "1500x1500"]
-    running = subprocess.Popen(
-        [*command, "--stages", "st"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    deadline = time.monotonic() + 120
-    while not (folder / "st" / "level0-sweep01.png").exists() and not any((folder / "st").glob("level*")):
-        assert running.poll() is None and time.monotonic() < deadline, running.communicate()
-        time.sleep(0.1)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=120)
-    assert running.returncode == 130, errors
-    assert "Traceback" not in errors and "stopped" in errors
-    assert not (folder / "out.png").exists()
-    assert not [path for path in folder.rglob("*") if path.name.startswith((".", "tmp"))]
 
 
 SYNTHESIS = "jobs.synthesis.synthesize"

@@ -35,14 +35,6 @@ def feed(recorder, pictures, level=0, phase="free", **more):
         recorder(SimpleNamespace(**{**said, **more}))
 
 
-def test_a_flip_flop_oscillates_wholly():
-    recorder = Recorder()
-    black, white = np.zeros((2, 2), np.uint8), np.ones((2, 2), np.uint8)
-    feed(recorder, [black, white, black, white])
-    assert [sweep.changed for sweep in recorder.sweeps] == [None, 1, 1, 1]
-    assert [sweep.returned for sweep in recorder.sweeps] == [None, None, 1, 1]
-
-
 def test_shares_of_a_sequence_by_hand():
     recorder = Recorder()
     feed(recorder, [[[0, 0], [0, 0]], [[1, 0], [2, 0]], [[1, 5], [0, 0]], [[1, 0], [3, 0]], [[1, 0], [3, 0]]])
@@ -277,27 +269,6 @@ def test_without_a_sample_it_is_brick(any_device, tmp_path):
     found = json.loads((tmp_path / "report" / "results.json").read_text(encoding="utf-8"))
     assert found["sample_shape"] == [128, 128]
     assert "seeds.png" not in names(tmp_path / "report")
-
-
-def assert_refused(result, words):
-    assert result.exit_code == 2, result.output
-    assert words in result.output
-    said = [line for line in result.output.strip().splitlines() if not line.startswith("run ")]
-    assert len(said) == 1
-
-
-@pytest.mark.parametrize(
-    ("report", "words"),
-    [("file", "is a file"), ("nowhere/report", "does not exist"), ("full", "holds other files")],
-)
-def test_bad_folders_are_refused_before_the_work(folder, report, words):
-    (folder / "file").touch()
-    (folder / "full").mkdir()
-    (folder / "full" / "notes.txt").touch()
-    before = names(folder)
-    result = run("schedules", folder / "sample.png", "-o", folder / report, "--order", 2)
-    assert_refused(result, words)
-    assert names(folder) == before
 
 
 def test_ctrl_c_leaves_no_report(folder, monkeypatch):

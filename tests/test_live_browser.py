@@ -201,27 +201,6 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
 
 
 @pytest.mark.slow
-def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("page.setPart([8, 4, 50, 60])")
-    page.result(2)
-    assert page.labelled("Left").get_attribute("value") == "8"
-    page.put("Coherence", 1.5)
-    page.result(3)
-    page.button("New seed").click()
-    page.result(4)
-    assert "--coherence 1.5" in " ".join(page.command)
-    page.all(".strip button")[0].click()
-    until(lambda: page.labelled("Coherence").get_attribute("value") == "0.5")
-    assert page.labelled("Seed").get_attribute("value") == "1"
-    assert page.all(".strip button")[0].get_attribute("aria-current") == "true"
-    assert page.results == 4, "it selects a result and makes none"
-    page.button("Reset the options").click()
-    page.result(5)
-
-
-@pytest.mark.slow
 def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -268,21 +247,6 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
     assert (before[hole > 0] != after[hole > 0]).any()
 
 
-@pytest.mark.slow
-def test_painted_labels_are_a_guide(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.open(".paint")
-    canvas = page.one("canvas.view")
-    for layer in ("Sample", "Picture"):
-        page.choose("Layer", layer)
-        until(lambda layer=layer: page.script("return page.seen") == layer.lower())
-        page.choose("Paint", "Label 2")
-        ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(40, 0).release().perform()
-    page.result(2)
-    assert "--guide guide-sample.png=guide-texture.png" in " ".join(page.command)
-
-
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
     (tmp_path / "ground.png").write_bytes(png(striped()))
@@ -310,20 +274,6 @@ def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     until(lambda: page.sees((striped().astype(int) + colours) // 2))
     wanted = zip(("Unknown", "Label 1", "Label 3"), [(labels == label).sum() for label in (0, 1, 3)], strict=True)
     assert page.one(".classes").text.split("\n") == [f"{name}: {100 * n / labels.size:.1f} %" for name, n in wanted]
-
-
-@pytest.mark.slow
-def test_maps_are_carried_along(page, wall, tmp_path):
-    (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
-    drop(page.driver, wall)
-    page.result(1)
-    page.open(".maps")
-    drop(page.driver, tmp_path / "normal.png", ".maps")
-    page.result(2)
-    until(lambda: page.all("[data-file='texture-normal.png']"))
-    assert page.download("texture-normal.png").startswith(b"\x89PNG")
-    page.choose("Layer", "Map: normal")
-    until(lambda: page.script("return page.seen") == "map normal")
 
 
 @pytest.mark.slow
@@ -472,21 +422,6 @@ def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
     assert page.results == 4
 
 
-@pytest.mark.slow
-def test_a_refusal_leaves_no_result_as_if_it_were_its(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    assert page.one("[aria-label='Download']").is_displayed()
-    page.put("Finish", 99)
-    until(lambda: page.alert.startswith("finish is 99"))
-    until(lambda: page.script("return page.shown") is None)
-    assert not page.one("[aria-label='Download']").is_displayed() and not page.one(".doing").text
-    until(lambda: page.script("return page.seen") == "sample")
-    drop(page.driver, wall)
-    page.result(2)
-    assert page.labelled("Finish").get_attribute("value") == "", "the option is not kept"
-
-
 FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
 
 
@@ -556,14 +491,6 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
 
 
 @pytest.mark.slow
-def test_a_widget_is_not_much_higher_than_its_view(page, wall):
-    page.script("document.getElementById('simdtex-live').style.width = '1008px'")
-    drop(page.driver, wall)
-    page.result(1)
-    assert page.script("return document.querySelector('.columns').scrollHeight") < 1300
-
-
-@pytest.mark.slow
 def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
     shown(page.driver, width=1280, height=720)
     drop(page.driver, wall)
@@ -607,15 +534,6 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
         "page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")",
     )
     assert "Result 1 is no longer kept" in page.status
-
-
-@pytest.mark.slow
-def test_what_is_wrong_is_said(page, tmp_path):
-    (tmp_path / "text.png").write_text("this is no picture")
-    drop(page.driver, tmp_path / "text.png")
-    until(lambda: "text.png is not an image" in page.alert)
-    page.script("page.make()")
-    until(lambda: "There is no picture yet" in page.alert)
 
 
 @pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
@@ -803,18 +721,6 @@ def test_the_tour_has_five_steps_and_needs_nothing(page):
         page.one(".tour .next").click()
     assert not page.one(".tour").is_displayed()
     assert explained(page)["candidates"], "the tour has explained a pixel"
-
-
-@pytest.mark.slow
-def test_a_key_shows_the_sample_while_it_is_held(page):
-    page.button("gravel").click()
-    page.result(1)
-    until(lambda: page.script("return page.seen") == "picture")
-    page.one("canvas.view").click()
-    ActionChains(page.driver).key_down("b").perform()
-    until(lambda: page.script("return page.seen") == "sample")
-    ActionChains(page.driver).key_up("b").perform()
-    until(lambda: page.script("return page.seen") == "picture")
 
 
 @pytest.mark.slow

@@ -594,29 +594,6 @@ def test_a_forked_process_raises_instead_of_hanging(cl_device):
     assert python(FORK, str(cl_device.index)) == [*"111111", "True"]
 
 
-MULTIPROCESSING = """
-import multiprocessing
-import numpy as np
-import simdtex
-
-def work(device):
-    try:
-        return simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=device).shape
-    except simdtex.DeviceError as error:
-        return str(error).count(".") == 1 and "spawn" in str(error)
-
-if __name__ == "__main__":
-    work(None)
-    with multiprocessing.get_context("fork").Pool(2) as pool:
-        print(*pool.map(work, [None, "reference"]), sep=";")
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
-def test_a_pool_of_forked_processes_may_use_the_reference(any_device):
-    assert "".join(python(MULTIPROCESSING)) == "True;(4,4)"
-
-
 class Other:
     """Neither a text nor a machine."""
 
