@@ -109,8 +109,7 @@ def test_a_table_of_hard_data(folder):
     assert_same(found, simdtex.simulate(pixels("grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
 
 
-@pytest.mark.parametrize("name", ["ti.gslib", "ti.sgems"])
-@pytest.mark.parametrize("out", ["out.gslib", "out.sgems"])
+@pytest.mark.parametrize(("name", "out"), [("ti.gslib", "out.sgems"), ("ti.sgems", "out.gslib")])
 def test_from_a_grid_to_a_grid(folder, name, out):
     args = ["--known", "wells.eas", "--categorical", "--several", "most", "--size", "14x12", "-n", 2]
     result = simulate(name, *args, "-o", out)

@@ -94,7 +94,7 @@ def small_sheets(monkeypatch):
 
 @pytest.mark.parametrize(
     ("sample", "more"),
-    [("grey.png", []), ("colour.png", ["--source-map", "o.zarr/source"])],
+    [("grey.png", []), pytest.param("colour.png", ["--source-map", "o.zarr/source"], marks=pytest.mark.slow)],
     ids=["alone", "with a map"],
 )
 def test_the_report_is_that_of_a_whole_run(folder, small_sheets, sample, more):

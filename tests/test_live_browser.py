@@ -247,6 +247,7 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
     assert (before[hole > 0] != after[hole > 0]).any()
 
 
+@pytest.mark.slow
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
     (tmp_path / "ground.png").write_bytes(png(striped()))
@@ -425,6 +426,7 @@ def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
 FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
 
 
+@pytest.mark.slow
 def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -536,7 +538,8 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     assert "Result 1 is no longer kept" in page.status
 
 
-@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
+@pytest.mark.slow
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_nothing_keeps_people_out(page, wall, dark):
     shown(page.driver, width=1400, dark=dark)
     assert page.faults() == []
@@ -743,6 +746,7 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
     until(lambda: page.script("return page.seen") == "faults")
 
 
+@pytest.mark.slow
 def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     sys.path.insert(0, str(ROOT / "docs"))
     import recorded
