@@ -105,11 +105,7 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
 
 @pytest.mark.parametrize(
     ("moment", "after"),
-    [
-        ("replace", False),
-        ("rmtree", True),
-        *(pytest.param(*one, marks=pytest.mark.slow) for one in (("replace", True),)),
-    ],
+    [("replace", False), pytest.param("replace", True, marks=pytest.mark.slow), ("rmtree", True)],
 )
 def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, after, whole):
     """Stopped before or after any file is in its place, or before a folder is removed or when half of it is."""
