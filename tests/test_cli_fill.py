@@ -193,14 +193,6 @@ def test_a_material_becomes_seamless(folder, command, flags, tile):
     assert np.array_equal(made[:, 3:-3], photo[:, 3:-3]) == (tile == "x")
 
 
-def test_extend_shows_what_it_did(folder):
-    args = ["--seamless", "--band", 3, "--stages", folder / "stages", "--report", folder / "report"]
-    result = small("extend", "photo.png", "-o", "out.png", *args)
-    assert result.exit_code == 0, result.output
-    assert (folder / "stages" / "level0-sweep01.png").is_file()
-    assert "simdtex extend" in (folder / "report" / "index.html").read_text(encoding="utf-8")
-
-
 PHOTO = ["photo.png", "-o", "out.png"]
 BAD_EXTEND = {
     "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
@@ -390,11 +382,6 @@ def test_all_maps_are_written_or_none(material, monkeypatch):
     done = small("extend", "brick", "-o", "tiled", "--right", 4)
     assert done.exit_code == 2 and "the disk is full" in done.output
     assert contents() == before
-
-
-def test_a_folder_may_have_a_point_in_its_name(material):
-    assert small("extend", "brick", "-o", "brick.v2", *SEAMLESS).exit_code == 0
-    assert files(material / "brick.v2") == NAMES
 
 
 def test_a_picture_beside_other_maps_is_still_one_picture(material):

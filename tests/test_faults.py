@@ -226,16 +226,6 @@ def test_a_lock_has_one_holder_at_a_time(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_a_lock_that_was_replaced_is_left_to_its_holder(tmp_path):
-    pytest.importorskip("fcntl")
-    (tmp_path / ".state.lock").touch()  # of a process that was killed
-    with exclusive(tmp_path / "state"):
-        (tmp_path / ".state.lock").unlink()
-        with exclusive(tmp_path / "other"), open(tmp_path / ".state.lock", "w"):
-            pass
-    assert os.listdir(tmp_path) == [".state.lock"]
-
-
 def test_a_failed_write_into_a_folder_names_the_folder(tmp_path, monkeypatch):
     """Whatever writes into it, such as the atomic writer of one of its files, and whichever way the path was given."""
     monkeypatch.chdir(tmp_path)

@@ -182,34 +182,6 @@ def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, l
     assert (rows, cols) == (slice(60 - around, 60 + side + around), slice(50 - around, 50 + side + around))
 
 
-WINDOWS = {
-    "a pixel": ((40, 50), [np.s_[10:11, 20:21]], 1, None, [(slice(8, 13), slice(18, 23), 1)]),
-    "two levels": ((40, 50), [np.s_[10:11, 20:21]], 1, 2, [(slice(7, 14), slice(17, 24), 2)]),
-    "a corner": ((40, 50), [np.s_[0:1, 49:50]], 1, None, [(slice(0, 3), slice(47, 50), 1)]),
-    "overlapping, and from top to bottom": (
-        (40, 60),
-        [np.s_[30:31, 40:41], np.s_[10:11, 10:11], np.s_[10:11, 15:16]],
-        1,
-        None,
-        [(slice(8, 13), slice(8, 18), 1), (slice(28, 33), slice(38, 43), 1)],
-    ),
-    "in the bend of another": (
-        (200, 200),
-        [np.s_[10:60, 10:11], np.s_[59:60, 10:60], np.s_[20:21, 50:51]],
-        1,
-        None,
-        [(slice(8, 62), slice(8, 62), 1)],
-    ),
-    "half the picture": ((9, 16), [np.s_[4:5, 4:5], np.s_[4:5, 11:12]], 2, None, [(slice(1, 8), slice(1, 15), 1)]),
-}
-
-
-@pytest.mark.parametrize("case", WINDOWS)
-def test_windows_of_holes(case):
-    shape, parts, radius, levels, expected = WINDOWS[case]
-    assert windows(hole_at(*parts, shape=shape), radius, levels) == expected
-
-
 def test_many_holes_are_in_one_window():
     mask = np.zeros((100, 100), bool)
     mask.flat[[k * 2000 + 10 + 20 * j for k in range(4) for j in range(4)]] = True
@@ -252,17 +224,6 @@ def test_every_hole_is_in_one_window_with_what_its_sites_look_at(parts, radius, 
         assert one.cols.start <= max(0, col - around) and min(60, col + around + 1) <= one.cols.stop
     assert {one.levels for one in found} == {found[0].levels}
     assert len(found) <= FEW
-
-
-@pytest.mark.parametrize("axis", [0, -1])
-def test_a_source_map_carries_other_maps(axis):
-    image = with_axis(axis)
-    found, output = fill(image, MIDDLE, channel_axis=axis, finish=0.0, full_output=True)
-    assert_same_bits(np.ascontiguousarray(planes(axis, found)), apply_source_map(output.source, planes(axis, image)))
-    height = texture(SHAPE, dtype=np.uint16, seed=3)
-    carried = apply_source_map(output.source, height, SHAPE)
-    assert_same_bits(carried[~MIDDLE], height[~MIDDLE])
-    assert np.isin(carried[MIDDLE], height[~MIDDLE]).all()
 
 
 @pytest.mark.parametrize("axis", [None, 0])

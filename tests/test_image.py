@@ -136,14 +136,6 @@ def test_a_picture_without_a_palette_has_no_indices(tmp_path):
         assert found.metadata == plain.metadata
 
 
-def test_first_frame_of_an_animation(tmp_path):
-    frames = [PIL.Image.new("RGB", (4, 3), colour) for colour in ("red", "blue")]
-    for suffix in ("gif", "webp", "tif"):
-        path = tmp_path / f"a.{suffix}"
-        frames[0].save(path, save_all=True, append_images=frames[1:])
-        assert image.read(path).pixels[1, 1].tolist()[0] > 200
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize("colours", [1, 3])
 @pytest.mark.parametrize("suffix", [".png", ".tif"])

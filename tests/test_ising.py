@@ -1,6 +1,5 @@
 """The Ising model: its exact energy, heat-bath runs, which schedules sample it, and ``simdtex schedules --ising``."""
 
-import functools
 import json
 from dataclasses import fields
 
@@ -287,81 +286,6 @@ def test_random_subsets_and_blocks_differ_too(found):
     for schedule in ("random-subset", "block:4x4"):
         ones = [one for (name, _), one in found.items() if name == schedule]
         assert any(one.differs for one in ones) and not any(one.independent for one in ones)
-
-
-@functools.cache
-def states():
-    """All states of a 4x4 torus."""
-    bits = np.arange(2**16)[:, None] >> np.arange(16) & 1
-    return (2 * bits - 1).reshape(-1, 4, 4)
-
-
-def energies():
-    return -sum((states() * np.roll(states(), 1, axis)).sum((1, 2)) for axis in (1, 2))
-
-
-def tabulated(weight):
-    """Probability of every (energy, |magnetisation|) of a 4x4 torus, both as integers."""
-    table = {}
-    for e, m, w in zip(energies(), np.abs(states().sum((1, 2))), weight / weight.sum(), strict=True):
-        table[int(e), int(m)] = table.get((int(e), int(m)), 0.0) + w
-    return table
-
-
-@functools.cache
-def distribution(temperature):
-    return tabulated(np.exp(-energies() / temperature))
-
-
-def synchronous_distribution(temperature):
-    """The same of what the synchronous schedule is to sample: the product over sites of cosh(field / T)."""
-    s = states()
-    field = sum(np.roll(s, by, axis) for axis in (1, 2) for by in (1, -1))
-    return tabulated(np.cosh(field / temperature).prod((1, 2)))
-
-
-def tallied(run: Chains, thin):
-    """How often each (energy, |magnetisation|) was met, thinned until samples are as good as independent."""
-    e = np.rint(16 * run.energy[0, :, thin - 1 :: thin]).astype(int).ravel()
-    m = np.rint(16 * np.abs(run.magnetisation[0, :, thin - 1 :: thin])).astype(int).ravel()
-    return list(zip(e.tolist(), m.tolist(), strict=True))
-
-
-def binned(table, samples, least=8):
-    """Counts and expected counts, states too rare for chi-square thrown together."""
-    common = {key for key, p in table.items() if p * len(samples) >= least}
-    order = sorted(common)
-    counts = [samples.count(key) for key in order]
-    expected = [table[key] * len(samples) for key in order]
-    return np.array([*counts, len(samples) - sum(counts)]), np.array([*expected, len(samples) - sum(expected)])
-
-
-@pytest.fixture(scope="module")
-def tallies(any_device):
-    thin, made = 12, {}
-    for name in [*EXACT, "synchronous", "random-subset"]:
-        options = {"seeds": 200, "sweeps": 10 * thin, "burn_in": 60, "seed": 11}
-        made[name] = tallied(ising(opencl(any_device), (4, 4), [2.6], name, **options), thin)
-    return made
-
-
-@pytest.mark.parametrize("schedule", EXACT)
-def test_the_whole_distribution_of_a_small_lattice(tallies, schedule):
-    counts, expected = binned(distribution(2.6), tallies[schedule])
-    assert len(counts) > 12
-    assert stats.chisquare(counts, expected).pvalue > 1e-3
-
-
-@pytest.mark.parametrize("schedule", ["synchronous", "random-subset"])
-def test_another_distribution(tallies, schedule):
-    counts, expected = binned(distribution(2.6), tallies[schedule])
-    assert stats.chisquare(counts, expected).pvalue < 1e-12
-
-
-def test_what_the_synchronous_schedule_samples_is_known_too(tallies):
-    counts, expected = binned(synchronous_distribution(2.6), tallies["synchronous"][::2])  # it takes twice the sweeps
-    assert len(counts) > 12
-    assert stats.chisquare(counts, expected).pvalue > 1e-3
 
 
 # -- ``simdtex schedules --ising``, as its user meets it.

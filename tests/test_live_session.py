@@ -398,16 +398,6 @@ def test_another_picture_ends_the_run(opened):
     assert [kind for kind in opened.kinds(after) if kind in ("picture", "ended")] == ["picture", "ended"]
 
 
-def test_a_page_that_is_loaded_again_gets_everything(opened):
-    opened.result()
-    opened.result(seed=8)
-    after = len(opened.got)
-    assert opened.ask("selected", kind="hello")[0] == {"kind": "selected", "result": 2, "settings": None}
-    told = [message for message, _ in opened.got[after:] if message["kind"] != "frame"]
-    assert [one["kind"] for one in told] == ["hello", "picture", "result", "result", "selected"]
-    assert not told[0]["fresh"] and not told[1]["new"]
-
-
 def test_the_first_picture_is_new_to_the_page_until_it_has_a_result():
     page = Fake(Picture("a.png", texture(), -1))
     message, _ = page.ask("picture", kind="hello")
@@ -633,14 +623,6 @@ def test_picture_and_maps_together_are_bounded(opened, monkeypatch):
     opened.ask("maps", png(texture(channels=1)), kind="map", name="a.png")
     error = opened.error(png(texture(channels=1)), kind="map", name="b.png")
     assert error == "the picture and its maps have 9600 bytes and at most 7680 are held; remove a map"
-
-
-def test_results_hold_their_picture_once(opened, monkeypatch):
-    for seed in (1, 2):
-        opened.result(seed=seed)
-    kept = opened.session.results
-    own = sum(one.image.nbytes + one.source.nbytes + one.temperature.nbytes for one in kept.values())
-    assert kept.nbytes == own + texture().nbytes
 
 
 def test_a_file_with_further_frames_is_said(page):
@@ -957,20 +939,6 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
                 assert control["empty"], "it says what an empty field means"
             else:
                 assert least <= control["default"] <= most
-
-
-def test_the_controls_of_a_texture():
-    assert {one["name"] for one in controls("mrf")} >= {
-        "order",
-        "finish",
-        "boundary",
-        "categorical",
-        "levels",
-        "lattice",
-        "schedule",
-    }
-    assert not {"array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
-    assert controls("mrf")[0]["group"] == "Appearance"
 
 
 def test_jobs_have_their_own_defaults():

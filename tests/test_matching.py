@@ -27,7 +27,12 @@ KINDS = {
     "ends": lambda rng, shape: rng.choice([LOW, LOW + 1, -256, -1, 0, 1, 255, HIGH - 1, HIGH], shape),
     "bytes": lambda rng, shape: rng.integers(0, 4, shape) << 8 * rng.integers(0, 4, shape),
     "constant": lambda rng, shape: np.full(shape, rng.integers(LOW, HIGH)),
-    "falling": lambda rng, shape: np.broadcast_to(-np.arange(shape[1]), shape),
+    "falling": lambda rng, shape: np.broadcast_to(-np.arange(shape[-1]), shape),
+    "heavy": lambda rng, shape: np.rint(rng.standard_t(2, shape) * 2**14),
+    "11 bits": lambda rng, shape: HIGH - rng.integers(0, 2**11, shape),
+    "12 bits": lambda rng, shape: LOW + rng.choice([0, 1, 2**11 - 1, 2**11], shape),
+    "22 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1], shape) - 5,
+    "23 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1, 2**22], shape) - 5,
 }
 
 
@@ -63,7 +68,7 @@ def test_a_device_has_the_references_bits(machine, problem):
     assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", ["all", "ties", "bytes", "falling"])
 def test_long_segments_in_several_runs(machine, kind):
     problem = case((2, 20_001), kind)
     assert MODULE.run_length(machine, 2, 20_001) < 20_001
@@ -104,22 +109,11 @@ def test_scratch_memory_is_bounded(machine, monkeypatch):
 
 # -- Histogram matching by rank in one operation, beside the sort, the ranks and the distance that it is made of.
 
-KINDS_RANKING = {
-    "all": lambda rng, shape: rng.integers(LOW, HIGH, shape, endpoint=True),
-    "ends": lambda rng, shape: rng.choice([LOW, LOW + 1, -1, 0, HIGH - 1, HIGH], shape),
-    "subband": lambda rng, shape: np.rint(rng.normal(0, 2**17, shape)),
-    "11 bits": lambda rng, shape: HIGH - rng.integers(0, 2**11, shape),
-    "12 bits": lambda rng, shape: LOW + rng.choice([0, 1, 2**11 - 1, 2**11], shape),
-    "22 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1], shape) - 5,
-    "23 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1, 2**22], shape) - 5,
-    "constant": lambda rng, shape: np.full(shape, rng.integers(LOW, HIGH)),
-}
-
 
 def case_ranking(segments, n, m, targets=1, kind="subband", seed=0):
     """Values, the order of equal ones, sorted targets."""
     rng = np.random.default_rng(seed)
-    values = KINDS_RANKING[kind](rng, (segments, n)).astype(np.int64).astype(np.int32)
+    values = KINDS[kind](rng, (segments, n)).astype(np.int64).astype(np.int32)
     wanted = np.sort(rng.integers(LOW, HIGH, (targets, m), endpoint=True).astype(np.int32), 1)
     return values, rng.permutation(n).astype(np.int32), wanted
 
@@ -128,7 +122,7 @@ def case_ranking(segments, n, m, targets=1, kind="subband", seed=0):
 def cases_ranking(draw):
     targets = draw(st.integers(1, 3))
     n, m = (draw(st.sampled_from([1, 2, 7, 40, 300])) for _ in range(2))
-    kind, seed = draw(st.sampled_from(sorted(KINDS_RANKING))), draw(st.integers(0, 2**16))
+    kind, seed = draw(st.sampled_from(sorted(KINDS))), draw(st.integers(0, 2**16))
     return case_ranking(targets * draw(st.integers(1, 3)), n, m, targets, kind, seed)
 
 
@@ -156,8 +150,8 @@ def test_a_device_has_the_references_bits_of_ranking(machine, problem):
     assert_same_bits(run_ranking(machine, problem), run_ranking(REFERENCE, problem))
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS_RANKING))
-@pytest.mark.parametrize("m", [5000, 2500, 3000, 10_000])
+@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("m", [5000, 3000])
 def test_a_work_item_and_several_have_the_same_bits(machine, monkeypatch, kind, m):
     problem = case_ranking(4, 5000, m, 2, kind)
     expected = run_ranking(REFERENCE, problem)
@@ -198,21 +192,13 @@ def test_who_sorts_alone():
 # -- Histogram matching by rank and by lookup, the inverse cdf of a target, and the distance of two histograms.
 
 UNIT = 2**20
-KINDS_MATCHING = {
-    "all": lambda rng, shape: rng.integers(LOW, HIGH, shape, endpoint=True),
-    "subband": lambda rng, shape: np.rint(rng.normal(0, 2**17, shape)),
-    "heavy": lambda rng, shape: np.rint(rng.standard_t(2, shape) * 2**14),
-    "ties": lambda rng, shape: rng.integers(-3, 3, shape, endpoint=True),
-    "ends": lambda rng, shape: rng.choice([LOW, LOW + 1, 0, HIGH - 1, HIGH], shape),
-    "constant": lambda rng, shape: np.full(shape, rng.integers(LOW, HIGH)),
-}
-kinds = st.sampled_from(sorted(KINDS_MATCHING))
+kinds = st.sampled_from(sorted(KINDS))
 seeds = st.integers(0, 2**16)
 histograms = st.sampled_from([2, 3, 16, 255, 256, 4096])
 
 
 def picture(shape, kind="subband", seed=0):
-    return KINDS_MATCHING[kind](np.random.default_rng(seed), shape).astype(np.int64).astype(np.int32)
+    return KINDS[kind](np.random.default_rng(seed), shape).astype(np.int64).astype(np.int32)
 
 
 def tables(targets, bins=256):
@@ -334,7 +320,7 @@ def test_a_device_has_the_references_bits_of_matching(machine, case, bins):
     assert_same_bits(everything(machine, *case, bins), everything(REFERENCE, *case, bins))
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS_MATCHING))
+@pytest.mark.parametrize("kind", ["all", "heavy", "ties", "constant"])
 def test_long_segments_in_several_runs_of_matching(machine, kind):
     case = picture((2, 20_001), kind), picture((2, 300))
     assert MODULE.run_length(machine, 2, 20_001) < 20_001

@@ -86,23 +86,6 @@ def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
         assert_same_bits(one[known], data[known].astype(dtype))
 
 
-def test_all_forms_of_data_give_the_same(tmp_path):
-    data = holed()
-    known = ~np.isnan(data)
-    row, col = np.nonzero(known)
-    lines = [f"{j},{i},{data[i, j]!r}" for i, j in zip(row, col, strict=True)]
-    lines = [line.replace("np.float32(", "").replace(")", "") for line in lines]
-    path = tmp_path / "wells.csv"
-    path.write_text("x,y,value\n" + "\n".join(lines) + "\n")
-    training = texture((16, 20), dtype=np.float32)
-    expected = simulate(training, known=data)
-    masked = np.ma.MaskedArray(np.nan_to_num(data, nan=7.0), ~known)
-    for hard in (masked, read_hard_data(path), path, str(path), np.ma.MaskedArray(data, np.zeros(SHAPE, bool))):
-        found = simulate(training, known=hard)
-        assert_same_bits(found.values, expected.values)
-        assert found.attrs == expected.attrs
-
-
 def test_the_size_is_that_of_the_data_or_of_the_training_image():
     training = texture((16, 20), dtype=np.float32)
     assert simulate(training, n=1, shape=None, known=holed()).shape == (1, *SHAPE)
