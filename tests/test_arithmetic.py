@@ -324,24 +324,3 @@ def test_a_seed_out_of_range_is_an_error_that_says_the_range(seed):
 @pytest.fixture(scope="module")
 def kernels(machine):
     return devices.build(machine.context, kernel_source("common/philox.h") + SOURCE_PHILOX, [])
-
-
-def test_known_answers_on_a_device(machine, kernels):
-    import pyopencl as cl
-
-    for counter, key, answer in KNOWN:
-        out = machine.empty((4,), np.uint32)
-        packed = cl.cltypes.make_uint2(*numbers(key))
-        counters = machine.put(np.array(numbers(counter), np.uint32))
-        machine.enqueue(kernels["raw"], (1,), counters, packed, out, local=(1,))
-        assert machine.get(out).tolist() == numbers(answer)
-
-
-@pytest.mark.parametrize("n", [1, 7, 10_000, 2**32 + 1, 2**64 - 1])
-def test_draws_on_a_device_are_the_references(machine, kernels, n):
-    seed, level, sweep, attempt = 2**63 + 12345, 5, 17, 3
-    out = machine.empty((1000,), np.uint64)
-    scalars = (np.uint64(seed), *map(np.uint32, (level, sweep, random.DRAW, attempt)), np.uint64(n))
-    machine.enqueue(kernels["draws"], out.shape, *scalars, out, local=(8,))
-    lo, hi, *_ = random.draw4(seed, level, sweep, np.arange(1000), random.DRAW, attempt)
-    assert_same_bits(machine.get(out), random.below(lo, hi, n))

@@ -312,6 +312,7 @@ def test_openexr(tmp_path):
         (b"#?RADIANCE\n", r"is a Radiance picture \(HDR\): save it as OpenEXR"),
         (b"<?xml version='1.0'?>\n<svg xmlns='http://www.w3.org/2000/svg'/>", "is a drawing .*SVG.: export it"),
         (b"%PDF-1.7\n", r"is a drawing \(PDF"),
+        (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n", "is a drawing"),
         (b"II*\0\x10\0\0\0CR\2\0" + bytes(40), "is a camera's raw file: develop it"),
         (b"\0\0\0\x18ftypcrx " + bytes(40), "is a camera's raw file: develop it"),
         (bytes(128) + b"DICM" + bytes(40), "is a DICOM picture: convert it to NRRD"),

@@ -523,42 +523,6 @@ def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, pro
     assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
 
 
-DEVICES = """
-import itertools, sys
-from concurrent.futures import ThreadPoolExecutor
-import numpy as np
-import simdtex
-
-devices, repeats = [*sys.argv[2:], "reference"], int(sys.argv[1])
-sample = np.random.default_rng(0).integers(0, 256, (20, 18), dtype=np.uint8)
-hole = np.indices(sample.shape).sum(0) % 19 == 0
-JOBS = [
-    lambda **how: simdtex.synthesize(sample, (16, 17), order=2, levels=2, **how),
-    lambda **how: simdtex.synthesize(sample, (16, 17), method="multires", **how),
-    lambda **how: simdtex.synthesize(sample, (16, 17), method="pyramid", iterations=1, **how),
-    lambda **how: simdtex.synthesize_solid(sample, (6, 6, 6), iterations=1, **how),
-    lambda **how: simdtex.fill(sample, hole, order=1, levels=1, **how),
-]
-expected = [job(rng=5, device="reference").tobytes() for job in JOBS]
-sys.setswitchinterval(1e-5)
-
-def wrong(which):
-    device, number = which
-    return JOBS[number](rng=5, device=device).tobytes() != expected[number]
-
-with ThreadPoolExecutor(6) as pool:
-    ends = list(pool.map(wrong, [*itertools.product(devices, range(len(JOBS)))] * repeats))
-print(len(ends), sum(ends))
-"""
-
-
-@pytest.mark.slow  # kernels are compiled
-def test_threads_with_different_devices_get_the_same_bytes(any_device):
-    """The reference and every OpenCL device at the same time."""
-    devices = [str(one.index) for one in simdtex.devices() if one.usable and one.kind != "reference"]
-    assert python(DEVICES, "1", *devices) == [str(5 * (1 + len(devices))), "0"]
-
-
 FORK = """
 import os, sys
 import numpy as np

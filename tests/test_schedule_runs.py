@@ -39,35 +39,6 @@ def expected(name, form, shape=(5, 6)):
     return run(name, form, shape)
 
 
-@forms
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        ("raster", "block:100x100"),
-        ("raster", "block:5x6"),
-        ("synchronous", "random-subset:1"),
-        ("synchronous", "block:1x1"),
-    ],
-)
-def test_these_are_the_same_to_the_bit(one, other, form):
-    assert_same_bits(run(other, form), expected(one, form))
-
-
-@forms
-@pytest.mark.parametrize("shape", [(6, 4), (2, 4), (1, 8)], ids=str)
-def test_the_colours_of_order_1_are_a_checkerboard(form, shape):
-    ours = run("checkerboard", form, shape, order=1, levels=1)
-    assert_same_bits(ours, run("coloring-fixed", form, shape, order=1, levels=1))
-
-
-@pytest.mark.parametrize("form", ["icm", "gibbs"])
-def test_these_are_not_the_same(form):
-    """Else the tests above would show little."""
-    images = {name: expected(name, form)[0].tobytes() for name in CLAIMS}
-    assert images.pop("block") == images.pop("block:100x100") == images["raster"]
-    assert len(set(images.values())) == len(images)
-
-
 class Apart:
     """Another schedule's steps, each cut into its sites, the last of them first, one a step under the same turn."""
 
@@ -97,24 +68,6 @@ def test_independent_sites_may_as_well_be_relaxed_one_by_one(name, form):
 @pytest.mark.parametrize("name", ["synchronous", "random-subset", "checkerboard"])
 def test_sites_that_are_not_independent_may_not(name):
     assert (run(Apart(get(name)), "gibbs")[0] != expected(name, "gibbs")[0]).any()
-
-
-class TileAfterTile(schedules.Block):
-    """Tiles on their own, but one after another, one site a step."""
-
-    def groups(self, machine, grid, offsets, order, seed):
-        (row, col), (high, wide) = np.indices((grid.rows, grid.cols)), self.tile
-        place = row % high * wide + col % wide
-        return (row // high * grid.cols + col // wide) * high * wide + place
-
-
-@forms
-@pytest.mark.parametrize("tile", [(3, 5), (2, 2)], ids=str)
-def test_tiles_may_as_well_be_relaxed_one_after_another(tile, form):
-    """For what they see of one another is as old as the sweep."""
-    name = "block:{}x{}".format(*tile)
-    assert_same_bits(run(TileAfterTile(*tile), form), expected(name, form))
-    assert (expected(name, form)[0] != expected("raster", form)[0]).any()
 
 
 @every

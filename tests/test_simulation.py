@@ -389,13 +389,10 @@ BAD = {
     "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
     "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
     "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),
-    "data of another size": ({"known": holed(shape=(12, 13))}, ValueError, "known is 12x13x1 and the output 12x14"),
     "an unknown category": (
         {"training": CATEGORIES, "categorical": True, "known": with_value(NOTHING, 1.0)}, ValueError, "1"),
     "a cell of no size": ({"cell": (1, 0)}, ValueError, "give sizes above 0"),
     "an origin of one number": ({"origin": (1,)}, ValueError, "origin is .*; give"),
-    "no such table": ({"known": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
-    "an unknown option": ({"preset": "default", "reach": 3}, TypeError, "unknown option 'reach'"),
 }  # fmt: skip
 
 
