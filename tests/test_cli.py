@@ -283,11 +283,7 @@ def test_a_closed_stream_takes_nothing_away(small, closed):
 
 @POSIX
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device")
-@pytest.mark.parametrize(
-    ("words", "unbuffered"),
-    [(["--help"], "1"), (SYNTH, "")],
-    ids=str,
-)
+@pytest.mark.parametrize(("words", "unbuffered"), [(["--help"], "1"), (SYNTH, "")], ids=str)
 def test_a_full_standard_output_is_one_sentence(small, words, unbuffered):
     done = shell(small, [*words, ">/dev/full"], PYTHONUNBUFFERED=unbuffered, SIMDTEX_DEVICE="reference")
     assert done.returncode == 2

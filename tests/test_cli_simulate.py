@@ -40,10 +40,7 @@ def folder(tmp_path, monkeypatch):
     }
     for name, one in pictures.items():
         image.write(name, one)
-    tables = {
-        "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
-        "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
-    }
+    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n", "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n"}
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
     for suffix in (".gslib", ".sgems"):

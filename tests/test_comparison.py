@@ -207,9 +207,7 @@ def test_the_schedule_is_no_option():
 
 # -- ``simdtex schedules``, end to end, as its user meets it.
 
-FILES = [
-    *("index.html", "oscillation.png", "pictures.png", "results.json", "seeds.png", "temperature.png"),
-]
+FILES = [*("index.html", "oscillation.png", "pictures.png", "results.json", "seeds.png", "temperature.png")]
 
 
 @pytest.fixture

@@ -15,14 +15,13 @@ import simdtex
 from simdtex import distributed
 from simdtex.distributed import store as store_module
 from simdtex.distributed.layout import planned
-from simdtex.distributed.store import Store, cut
+from simdtex.distributed.store import Store
 from simdtex.distributed.turns import Tiles, do
 from simdtex.driver import drive
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.methods.mrf.tiles import Tile, framed
-from simdtex.model.lattice import Grid
+from simdtex.methods.mrf.tiles import framed
 from simdtex.model.pictures import Pictures
 from simdtex.model.source_map import apply_source_map
 from simdtex.ops.neighbourhood import Field
@@ -104,8 +103,7 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("moment", "after"),
-    [("replace", False), pytest.param("replace", True, marks=pytest.mark.slow), ("rmtree", True)],
+    ("moment", "after"), [("replace", False), pytest.param("replace", True, marks=pytest.mark.slow), ("rmtree", True)]
 )
 def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, after, whole):
     """Stopped before or after any file is in its place, or before a folder is removed or when half of it is."""
@@ -208,33 +206,6 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
         _, info = schedule.step(window.setting, schedule.init(window.setting), active)
         sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
     assert sites / (120 * 120) - 1 == pytest.approx(level.redundant, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("tile", "halo", "torus", "window", "where"),
-    [
-        (Tile(0, 10, 10, 10), 3, True, (37, 7, 16, 16), (3, 3)),
-        (Tile(0, 10, 10, 10), 3, False, (0, 7, 13, 16), (0, 3)),
-        (Tile(30, 40, 10, 10), 3, False, (27, 37, 13, 13), (3, 3)),
-        (Tile(10, 0, 10, 50), 20, True, (0, 0, 40, 50), (10, 0)),
-        (Tile(10, 0, 10, 50), 20, False, (0, 0, 40, 50), (10, 0)),
-        (Tile(39, 0, 1, 10), 0, True, (39, 0, 1, 10), (0, 0)),
-    ],
-    ids=str,
-)
-def test_a_tile_lies_in_its_window(tile, halo, torus, window, where):
-    frame = framed(Grid(40, 50, 1, torus), tile, halo)
-    assert tuple(frame.window) == window
-    assert (frame.rows.start, frame.cols.start) == where
-    assert frame.cut(np.zeros((2, *window[2:]))).shape == (2, tile.rows, tile.cols)
-
-
-def test_windows_go_on_across_the_seam():
-    level = distributed.plan(SAMPLE, (20, 30), tiles=8, order=1).levels[0]
-    whole = np.arange(2 * 600).reshape(2, 20, 30)
-    for window in (Tile(15, 25, 9, 12), Tile(0, 0, 20, 30), Tile(3, 4, 5, 6)):
-        rows, cols = (np.arange(a, a + n) % m for a, n, m in zip(window[:2], window[2:], (20, 30), strict=True))
-        assert_same_bits(cut(whole, level, window), whole[:, rows[:, None], cols])
 
 
 @pytest.mark.parametrize(

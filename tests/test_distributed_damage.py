@@ -186,29 +186,6 @@ def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finish
         assert_same_bits(zarr.open_group(path)["source"][:], zarr.open_group(finished)["source"][:])
 
 
-@pytest.mark.parametrize(
-    ("phase", "part", "old", "new", "words"),
-    [
-        ("sweep", "work/level0/READ/values", b'"separator": "/"', b'"separator": "."', "level 0 begins again"),
-        ("begin", "work/given/held0/known", b'"separator": "/"', b'"separator": "."', "nothing makes it again"),
-        ("show", "image", b"14", b"13", None),
-        ("show", "image", b'"separator": "/"', b'"separator": "."', None),
-    ],
-)
-def test_one_flipped_bit_in_the_description_of_an_array(tmp_path, stopped, whole, phase, part, old, new, words):
-    path, sentences = tmp_path / "o.zarr", []
-    shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
-    where = part_of(path, f"{part}/zarr.json")
-    assert old in where.read_bytes()
-    where.write_bytes(where.read_bytes().replace(old, new))
-    image = gone_on(path, sentences)
-    assert (words is None) == (sentences == [])
-    if words:
-        assert f"{where.relative_to(path)} of " in sentences[0] and words in sentences[0]
-    if image is not None:
-        assert_same_bits(image.compute(), whole)
-
-
 FEW = OPTIONS | {"tiles": 8, "source_map": True}
 
 

@@ -102,15 +102,6 @@ def test_a_device_has_the_references_bits(cl_device):
             assert_same_bits(both[1][name].values, both[0][name].values)
 
 
-def test_far_from_data_it_is_the_share_of_the_training_image():
-    known = np.full((40, 9), np.nan)
-    known[0, 0] = 4
-    found = simdtex.estimate(TRAINING, known=known, categorical=True, device="reference", reach=4)
-    shares = [(name == TRAINING).mean() for name in (0, 4, 8)]
-    np.testing.assert_allclose(found.probability[:, 20], np.repeat(shares, 9).reshape(3, 9), atol=1e-6)
-    assert found.entropy.values[0, 0] == 0 and not np.signbit(found.entropy.values).any()
-
-
 def test_tables_ground_masks_and_several_training_images(tmp_path):
     path = tmp_path / "wells.csv"
     path.write_text("x,y,value\n1035,2025,4\n1045,2035,8\n")

@@ -111,20 +111,6 @@ def test_what_is_impossible_is_not_there(search, weight):
     assert (found[:, told & (p[2] == 1)] == 8).all()
 
 
-def test_what_is_more_probable_is_more_frequent():
-    asked = (0.05, 0.3, 0.6, 0.95)
-    found = {
-        weight: [
-            (simulate(probabilities=of([(1 - p) / 2, p, (1 - p) / 2]), soft_weight=weight).values == 4).mean()
-            for p in asked
-        ]
-        for weight in (1.0, 4.0)
-    }
-    assert all(one == sorted(one) for one in found.values())
-    assert np.abs(np.array(found[4.0]) - asked).max() < 0.1
-    assert found[4.0][0] < found[1.0][0] and found[1.0][-1] < found[4.0][-1]
-
-
 def test_each_cell_is_from_the_training_image_of_its_number():
     images = [TRAINING, (TRAINING[:, :19] + 1).astype(np.uint8)]
     number = (np.arange(SHAPE[1]) > 8) * np.ones((SHAPE[0], 1), int)

@@ -358,10 +358,7 @@ def test_masked_numbers_are_unknown():
             "-0.6,0,1",
             r"line 3 .* at x -0\.6, y 0\.0, outside of a picture of 4 x 3 .*give x from -0.5 to below 3.5, y .* 2.5",
         ),
-        (
-            "0,0,0.5",
-            "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers below 2",
-        ),
+        ("0,0,0.5", "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers below 2"),
         ("0,0,256", "has 256.0 for facies, which uint8 cannot hold"),
         ("0,0,inf", "has inf for facies, which uint8 cannot hold"),
         (

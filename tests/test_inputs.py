@@ -474,10 +474,7 @@ def test_known_values_with_nan_are_taken():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (
-            OnGpu(PHOTO),
-            r"the sample is no array that NumPy can take: can.t convert cuda:0 .*Use Tensor\.cpu\(\)",
-        ),
+        (OnGpu(PHOTO), r"the sample is no array that NumPy can take: can.t convert cuda:0 .*Use Tensor\.cpu\(\)"),
         (Tracked(PHOTO), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
         (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
         (pandas.DataFrame(PHOTO).astype("Int64"), "holds object values; convert it"),

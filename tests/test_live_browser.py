@@ -369,23 +369,6 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_page_that_is_loaded_again_during_a_run_has_its_settings(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("page.auto.checked = false; page.setPart([8, 4, 50, 60])")
-    page.put("Result width", 1500)
-    page.put("Coherence", 1.5)
-    page.script("page.make()")
-    until(lambda: page.script("return page.running"))
-    page.button("Pause").click()
-    page.driver.refresh()
-    until(lambda: page.script("return Boolean(window.page && page.running)"))
-    assert page.script("return [page.width.value, page.part]") == ["1500", [8, 4, 50, 60]]
-    assert page.labelled("Coherence").get_attribute("value") == "1.5"
-    page.button("Cancel").click()
-
-
-@pytest.mark.slow
 def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -398,29 +381,6 @@ def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, 
     assert page.script("return page.layer") == "picture"
     assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
     assert page.labelled("Coherence").get_attribute("value") == "1.5"
-
-
-@pytest.mark.slow
-def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
-    stroke = "{label: 1, width: 20, points: [[30, 30]]}"
-    (tmp_path / "other.png").write_bytes(png(texture(30, 40)))
-    page.script("page.auto.checked = false")
-    drop(page.driver, wall)
-    page.result(1)
-    page.script(f"page.setPart([8, 4, 50, 60]); page.guide = {{sample: [{stroke}], output: [{stroke}]}}; page.make()")
-    page.result(2)
-    drop(page.driver, tmp_path / "other.png")
-    page.result(3)
-    page.script(f"page.job.value = 'fill'; page.showJob(); page.hole = [{stroke}]; page.make()")
-    page.result(4)
-    state = "return [page.picture.name, page.part, page.guide.output.length, page.hole.length, page.job.value]"
-    wanted = [["wall.png", None, 0, 0, "synth"], ["wall.png", [8, 4, 50, 60], 1, 0, "synth"]]
-    wanted += [["other.png", None, 0, 0, "synth"], ["other.png", None, 0, 1, "fill"]]
-    for number in (2, 1, 4, 3, 2):
-        page.script("page.send({kind: 'select', result: arguments[0]})", number)
-        until(lambda number=number: page.script("return page.shown") == number)
-        assert page.script(state) == wanted[number - 1], number
-    assert page.results == 4
 
 
 FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
@@ -532,9 +492,7 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.script("page.doing.textContent = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
     assert page.one(".doing").text == "", "a new run does not show the last one's level"
     small = "[new Uint8Array(4)]"
-    page.script(
-        "page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")",
-    )
+    page.script("page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")")
     assert "Result 1 is no longer kept" in page.status
 
 
@@ -650,25 +608,6 @@ def test_the_time_line_steps_and_plays(inside):
     inside.button("Stop").click()
     seen = at(inside)
     assert 3 < seen[0] < len(sweeps)
-
-
-@pytest.mark.slow
-def test_two_results_side_by_side_share_window_moment_and_pixel(inside):
-    inside.choose("Beside it", "Result 2")
-    until(lambda: inside.script("return page.inside.panes.length") == 2)
-    beside = inside.one("canvas.beside")
-    until(lambda: inside.script("return Boolean(page.view.panes[1].frame)"))
-    assert beside.size == inside.one("canvas.view").size
-    inside.script("page.inside.seek(page.inside.sweeps.length - 1, 1)")
-    until(lambda: "set 1 of 2" in inside.one(".moment").text)
-    moments = inside.script("return page.view.panes.map(({frame}) => [frame.left, frame.top, frame.step, frame.of])")
-    assert moments[0][:3] == moments[1][:3]
-    assert [one[3] for one in moments] == [3, 2]
-    ActionChains(inside.driver).move_to_element(beside).click().perform()
-    why = [explained(inside, pane) for pane in (0, 1)]
-    assert why[0]["pixel"] == why[1]["pixel"]
-    assert len(inside.all(".reason table")) == 2
-    assert inside.faults() == []
 
 
 @pytest.mark.slow

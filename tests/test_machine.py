@@ -487,11 +487,7 @@ except ValueError as error:
 def python(code, *words, **environment):
     """Return the words that a process prints within 100 seconds."""
     result = subprocess.run(
-        [sys.executable, "-c", code, *words],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=200,
+        [sys.executable, "-c", code, *words], env=os.environ | environment, capture_output=True, text=True, timeout=200
     )
     assert result.returncode == 0, result.stderr[-2000:]
     return result.stdout.split()

@@ -62,36 +62,6 @@ def test_the_reference_is_pythons_sort(problem):
         assert own == sorted(first.tolist(), key=lambda i, segment=segment: segment[i])
 
 
-@given(problem=cases(lengths=(1, 2, 40, 300)))
-@settings(max_examples=40)
-def test_a_device_has_the_references_bits(machine, problem):
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("kind", ["all", "ties", "bytes", "falling"])
-def test_long_segments_in_several_runs(machine, kind):
-    problem = case((2, 20_001), kind)
-    assert MODULE.run_length(machine, 2, 20_001) < 20_001
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("kind", ["all", "ties", "ends"])
-@pytest.mark.parametrize("length", [1, 7, 64, 299, 300])
-def test_the_length_of_a_run_changes_no_bit(machine, monkeypatch, kind, length):
-    monkeypatch.setattr(MODULE, "run_length", lambda *_: length)
-    problem = case((3, 300), kind)
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("scratch", [1, 600, 1300])
-def test_pieces_of_whole_segments_change_no_bit(machine, monkeypatch, scratch):
-    """One, two or four segments at a time, the last piece a smaller one."""
-    monkeypatch.setattr(MODULE, "SCRATCH", scratch)
-    for kind in ("all", "ties"):
-        problem = case((5, 300), kind)
-        assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
 def test_scratch_memory_is_bounded(machine, monkeypatch):
     """Keys and indices for SCRATCH values, and no table of counters for segments of a single value each."""
     monkeypatch.setattr(MODULE, "SCRATCH", 2**12)

@@ -17,7 +17,6 @@ from skimage import data
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.machine import memory
 from simdtex.methods import multires
 from simdtex.methods.multires import Options
 from simdtex.methods.multires.analysis import thresholds
@@ -501,43 +500,6 @@ def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
         assert progress.stage == (progress.doing.replace(" ", "") if progress.end_of_level else None)
         [marks] = progress.maps().values()
         assert marks.shape == candidates.shape and 0 <= marks.min() <= marks.max() <= 1
-
-
-@pytest.mark.parametrize("options", [{}, {"levels": 1}], ids=str)
-def test_progress_ends_at_1_and_a_callback_changes_nothing(options):
-    sample, seen = texture((13, 7)), []
-    image = synthesize(sample, (20, 17), callback=seen.append, **options)
-    assert (seen[-1].level, seen[-1].end_of_level, seen[-1].fraction) == (0, True, 1)
-    assert_same_bits(seen[-1].image(), image)
-    assert_same_bits(synthesize(sample, (20, 17), **options), image)
-
-
-def noted(monkeypatch, most=INF):
-    """Note the bytes of device memory that runs ask for, of which there are so many."""
-    sizes = []
-
-    def require(machine, device, *_):
-        sizes.append(device)
-        if device > most:
-            raise simdtex.DeviceError("too little memory")
-
-    monkeypatch.setattr(memory, "require", require)
-    return sizes
-
-
-@pytest.mark.parametrize("channels", [None, 3])
-def test_memory_grows_with_the_output_and_with_nothing_else(channels, monkeypatch):
-    sample, asked, sizes = texture((13, 7), channels), {}, noted(monkeypatch)
-    for cols in (14, 28, 42, 70):  # whole tiles
-        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "parity": "free"}):
-            sizes.clear()
-            synthesize(sample, (40, cols), device=REFERENCE, **options)
-            asked.setdefault(cols, set()).add(tuple(sizes))
-    assert all(len(sizes) == 1 for sizes in asked.values()), "whatever the candidates"
-    analysis, synthesis = zip(*(sizes.pop() for sizes in asked.values()), strict=True)
-    assert len(set(analysis)) == 1
-    steps = np.diff(synthesis) / np.diff(list(asked)) / 40
-    assert np.ptp(steps) == 0 and steps[0] <= 4 + 2 * (12 + 4 * (channels or 1)), "bytes for each pixel"
 
 
 @pytest.mark.parametrize("shape", [(2**31, 2**31), (1, 2**31), (2**70, 1), (2**16, 2**15)], ids=str)

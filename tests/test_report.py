@@ -39,10 +39,7 @@ def picture(side=5):
 
 NUMBERS = Table(
     "Numbers",
-    [
-        {"Name": "<a>", "Mark": "breaks (14)", "Figure": "1.5 ± 0.2"},
-        {"Name": "b", "Mark": "keeps (14)", "Figure": "2"},
-    ],
+    [{"Name": "<a>", "Mark": "breaks (14)", "Figure": "1.5 ± 0.2"}, {"Name": "b", "Mark": "keeps (14)", "Figure": "2"}],
     "note",
 )
 
@@ -464,14 +461,7 @@ def test_a_method_without_sources_has_a_report_without_them(folder):
 
 # -- The report of an ensemble says what the figures say.
 
-ALWAYS = {
-    "index.html",
-    "results.json",
-    "realisations.png",
-    "maps.png",
-    "entropy.png",
-    "variograms.png",
-}
+ALWAYS = {"index.html", "results.json", "realisations.png", "maps.png", "entropy.png", "variograms.png"}
 COPIES = {"copies.png"}  # where images hold a window
 OF_CATEGORIES = {"connectivity.png"}
 

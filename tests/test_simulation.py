@@ -57,12 +57,7 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
     found = simulate(texture((16, 20), dtype=np.float32), known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
         own = simdtex.synthesize(
-            texture((16, 20), dtype=np.float32),
-            SHAPE,
-            rng=int(seed),
-            known=data,
-            **OWN,
-            **options,
+            texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **OWN, **options
         )
         assert_same_bits(values, own)
 
@@ -150,13 +145,7 @@ def test_several_variables_are_the_last_dimension(axis):
     found = simulate(training, n=2, channel_axis=axis)
     assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 3)
     own = simdtex.synthesize(
-        training,
-        SHAPE,
-        channel_axis=axis,
-        rng=int(found.seed[1]),
-        order=2,
-        device="reference",
-        **OWN,
+        training, SHAPE, channel_axis=axis, rng=int(found.seed[1]), order=2, device="reference", **OWN
     )
     assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
 
