@@ -329,6 +329,14 @@ def test_formats_that_are_not_read_are_named(tmp_path, data, words):
         image.read(tmp_path / "a")
 
 
+@pytest.mark.parametrize("kind", ["PCX", "SGI", "ICNS"])
+def test_only_documented_formats_are_tried(tmp_path, kind):
+    """Pillow knows more, some of which start programs."""
+    PIL.Image.new("RGB", (32, 32)).save(tmp_path / "a.png", kind)
+    with pytest.raises(ValueError, match="is not an image: give a PNG"):
+        image.read(tmp_path / "a.png")
+
+
 def test_the_preview_in_a_raw_file_is_not_the_picture(tmp_path):
     with tifffile.TiffWriter(tmp_path / "a.dng") as file:
         file.write(noise((8, 8, 3)), photometric="rgb", subfiletype=1, metadata=None)
