@@ -944,10 +944,3 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
 def test_jobs_have_their_own_defaults():
     assert {one["name"]: one["default"] for one in controls("fill")}["balance"] == 0
     assert "boundary" not in {one["name"] for one in controls("extend")}
-
-
-def test_an_empty_field_says_what_it_stands_for():
-    finish = {one["name"]: one for one in controls("mrf")}["finish"]
-    assert (finish["default"], finish["usual"], finish["empty"]) == (None, 1.5, "automatic: 1.5")
-    levels = {one["name"]: one for one in controls("mrf")}["levels"]
-    assert (levels["usual"], levels["empty"]) == (None, "automatic")
