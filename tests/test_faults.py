@@ -203,7 +203,7 @@ def test_an_unfinished_output_that_looks_old_is_kept_while_its_writer_lives(tmp_
 
 def test_a_lock_has_one_holder_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
-    inside, counts, end = [], [], time.monotonic() + 2
+    inside, counts, end = [], [], time.monotonic() + 0.5
 
     def take():
         while time.monotonic() < end:

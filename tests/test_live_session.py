@@ -50,7 +50,7 @@ def opened(page):
 
 def whole(shape=(28, 36), **options):
     """What is made by one call, as `asked` asks for it."""
-    options = {"order": 4, "rng": 7} | options
+    options = {"order": 2, "rng": 7} | options
     return simdtex.synthesize(texture(), shape, channel_axis=-1, device="reference", **options)
 
 
@@ -716,7 +716,7 @@ def test_a_coarse_window_of_a_tiled_layer_takes_little_memory():
 # -- A look inside a result: moments of its run, and why pixels have their values, as the page is sent them.
 
 SAMPLE = texture(24, 28)
-RULES = {"order": 4, "channel_axis": -1, "device": "reference"}
+RULES = {"order": 2, "channel_axis": -1, "device": "reference"}
 
 
 @pytest.fixture
@@ -813,7 +813,7 @@ def test_two_results_side_by_side(page_inside):
 
 
 def test_a_seamless_picture_is_looked_into(page_inside):
-    page_inside.result(job="extend", options={"order": 4})
+    page_inside.result(job="extend", options={"order": 2})
     (pane,) = inside(page_inside)
     assert pane["sweeps"]
     found, _ = page_inside.ask("explained", kind="explain", row=0, col=0)
@@ -859,7 +859,7 @@ HOLE = [{"label": 1, "width": 7, "points": [[12, 10], [16, 12]]}]
 
 
 def test_a_filled_hole_is_looked_into(page_inside):
-    page_inside.result(job="fill", hole=HOLE, options={"order": 4})
+    page_inside.result(job="fill", hole=HOLE, options={"order": 2})
     image, hole = page_inside.latest.image, paint(HOLE, SAMPLE.shape) > 0
     (pane,) = inside(page_inside)
     level, sweep, sets, *_ = pane["sweeps"][-1]
