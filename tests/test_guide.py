@@ -131,11 +131,6 @@ def test_each_cell_is_from_the_training_image_of_its_number():
 # -- The structure channel: signed distance to the border between the bright and the dark parts of a sample.
 
 
-def step(side=60, at=30):
-    """A picture of one edge, between two columns."""
-    return np.where(np.arange(side) < at, 40, 200)[None, None] * np.ones((1, side, 1), int)
-
-
 @pytest.mark.parametrize("weight", [0.5, 1.0, 2.0])
 def test_its_deviation_is_its_weight_in_those_of_the_sample(weight):
     levels = np.moveaxis(texture((50, 48), 3, seed=2), -1, 0).astype(np.uint16)
@@ -157,6 +152,8 @@ def test_a_sample_without_an_edge_has_none(levels):
 @pytest.mark.parametrize("channels", [1, 3])
 def test_it_is_what_plain_loops_find(channels):
     pictures = [np.moveaxis(texture(shape, channels, seed=4), -1, 0).astype(np.uint16) for shape in ((13, 15), (9, 40))]
+    edge = np.where(np.arange(60) < 29, 40, 200).astype(np.uint16) * np.ones((channels, 5, 1), np.uint16)
+    pictures += [edge, edge.swapaxes(1, 2)]  # whose ends are farther from it than is measured
     expected = plain_sample.structure([[*one.astype(int)] for one in pictures], 1.0, STEPS)
     found = structure(pictures, 1.0, variance(*pictures), STEPS)
     for one, other in zip(found, expected, strict=True):
