@@ -300,6 +300,7 @@ def compared(folder, monkeypatch, *args):
     return done.output, json.loads((folder / "results.json").read_text())["ising"]
 
 
+@pytest.mark.slow
 def test_schedules_have_tables_of_the_ising_model_and_a_section_of_the_report(tmp_path, monkeypatch, any_device):
     said, found = compared(tmp_path / "r", monkeypatch, "--device", any_device.index)
     for word in ("T = 2:", "T = 2.3:", "T = 2.6:", "coloring", "keeps", "breaks"):

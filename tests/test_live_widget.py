@@ -66,15 +66,15 @@ def test_a_widget_takes_messages_and_gives_results(monkeypatch):
 
 def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
     monkeypatch.setattr(widget.Live, "send", lambda self, message, buffers=None: None)
-    live = simdtex.Live(texture(20, 24), channel_axis=-1, device="reference")
+    live = simdtex.Live(texture(10, 12), channel_axis=-1, device="reference")
     image = live.wait()
-    assert image is live.image and image.shape == (40, 48, 3)
+    assert image is live.image and image.shape == (20, 24, 3)
     live._handle_custom_msg(asked(seed=3), [])
     assert live.wait().shape == (28, 36, 3) and "--seed 3" in live.command
     live._handle_custom_msg(asked(options={"finish": 99}), [])
     with pytest.raises(ValueError, match="finish is 99"):
         live.wait()
-    live._handle_custom_msg(asked(width=900, height=900), [])
+    live._handle_custom_msg(asked(width=600, height=600), [])
     with pytest.raises(TimeoutError, match=r"within 0\.2 s"):
         live.wait(timeout=0.2)
     live._handle_custom_msg({"kind": "cancel"}, [])
