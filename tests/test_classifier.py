@@ -199,6 +199,12 @@ def cases_potts(draw):
     return sites, evidence, votes, draw(st.sampled_from([0, 1, 112, 1600])), rng.integers(0, classes, (rows, cols))
 
 
+@given(case=cases_potts())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits_of_potts(machine, case):
+    assert_same_bits(run_potts(machine, *case), run_potts(REFERENCE, *case))
+
+
 @given(cases_potts())
 @settings(max_examples=60)
 def test_the_reference_takes_the_first_of_the_greatest_energies(case):
