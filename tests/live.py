@@ -44,7 +44,7 @@ def png(pixels):
 def asked(**settings):
     """A request with few levels, which is quick."""
     order = settings.get("method", "mrf") == "mrf" and settings.get("job") != "classify"
-    options = {"order": 4} if order else {}
+    options = {"order": 2} if order else {}
     message = {"kind": "make", "job": "synth", "method": "mrf", "width": 36, "height": 28, "seed": 7}
     return message | settings | {"options": options | settings.get("options", {})}
 

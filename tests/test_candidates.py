@@ -8,8 +8,6 @@ from cases import REFERENCE, assert_same_bits, host
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_multires import as_large
-from scipy.stats import chisquare
-from tolerances import SIGNIFICANCE
 
 from simdtex import random
 from simdtex.ops.candidates import Sampled, Structure, candidates
@@ -273,69 +271,3 @@ def test_levels_that_are_not_compared_are_counted_all_the_same(machine, closed, 
     theirs = sampled_on(REFERENCE, p, match, 7)
     assert theirs[1][p.own(0)][:, 0].max() > 64
     assert_same_bits(sampled_on(machine, p, match, 7), theirs)
-
-
-def test_what_lies_below_a_node_that_fails_is_not_compared(machine):
-    """Of the four nodes at the top one passes; all of the level below would."""
-    p = problem(6, tile=(8, 8), shape=(8, 8), levels=3, features=1)
-    features = np.zeros((20, 1))
-    features[16:, 0] = [0, 5, 5, 5]
-    p = p.with_features(features)
-    p.sampled.source[p.own(2)] = 0
-    for m in (REFERENCE, machine):
-        source, counts = sampled_on(m, p, True, 1)
-        assert counts[p.own(1)].tolist() == [[1, 4]] * 16
-        assert counts[p.own(0)].tolist() == [[4, 4 + 4]] * 64, "of 20 nodes"
-        row, col = np.divmod(source[p.own(0)], 8)
-        assert (row < 4).all()
-        assert (col < 4).all()
-
-
-def test_differences_beyond_31_bits_are_compared(machine):
-    """The largest difference there is of two features passes a threshold of its own size, and of no less."""
-    p = problem(7, tile=(1, 6), shape=(1, 6), levels=2, features=1)
-    least, most = -(2**31), 2**31 - 1
-    p = p.with_features(np.array([[least], [0], [most]]))
-    p.sampled.source[p.own(1)] = [0, 1, 2]
-    expected = {2**31 - 2: (1, 1, 1), 2**31 - 1: (1, 2, 2), 2**31: (2, 3, 2), ALL - 1: (2, 3, 2), ALL: (3, 3, 3)}
-    for threshold, numbers in expected.items():
-        for m in (REFERENCE, machine):
-            _, counts = sampled_on(m, p.with_thresholds(threshold), True, 1)
-            assert counts[p.own(0)].tolist() == [[n, 3] for n in numbers for _ in range(2)]
-
-
-def many_tiles(tile, rows, cols, levels, **options):
-    """A problem whose output is many tiles that all begin with the same source at the top."""
-    p = problem(8, tile=tile, shape=(tile[0] * rows, tile[1] * cols), levels=levels, **options)
-    r, c = p.tiles[-1]
-    p.sampled.source[p.own(p.top)] = np.tile(np.arange(r * c).reshape(r, c), (rows, cols)).ravel()
-    return p
-
-
-@phases
-@pytest.mark.parametrize("seed", [1, 2**33 + 7, 2**64 - 1])
-def test_the_draw_is_uniform(seed, match):
-    """Pixels in the same place of every tile have the same parent structure, one level below the top."""
-    tile, rows, cols = (5, 6), 30, 40
-    p = many_tiles(tile, rows, cols, 2, features=1, kinds=3).with_thresholds(1)
-    source, counts = sampled_on(REFERENCE, p, match, seed)
-    loops, tested = Plain(p, source), 0
-    drawn = source[p.own(0)].reshape(rows, tile[0], cols, tile[1])
-    number = counts[p.own(0)][:, 0].reshape(rows, tile[0], cols, tile[1])
-    for i, j in np.ndindex(*tile):
-        expected = sorted(x * tile[1] + y for x, y in loops.candidates(0, i, j, match))
-        assert (number[:, i, :, j] == len(expected)).all()
-        found, times = np.unique(drawn[:, i, :, j], return_counts=True)
-        assert found.tolist() == expected, "each is drawn sometimes, and nothing else"
-        if len(expected) > 1:
-            assert chisquare(times).pvalue > SIGNIFICANCE
-            tested += 1
-    assert tested >= 10, "there is something to draw from"
-
-
-def numbers(p, level, seed):
-    """Which of all nodes each pixel of a level was drawn from, where all pass; `match`."""
-    source, _ = sampled_on(REFERENCE, p, True, seed)
-    cols = p.tiles[level][1]
-    row, col = np.divmod(source[p.own(level)], cols)
-    return row // 2 * ((cols + 1) // 2) + col // 2

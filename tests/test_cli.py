@@ -4,16 +4,14 @@ import json
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
-from commands import names, run
+from commands import names, refused, run
 
-from simdtex.cli import COMMANDS, WHAT, job
+from simdtex.cli import COMMANDS, job
 from simdtex.io import image
 from simdtex.machine import memory
 from simdtex.model.source_map import load_source_map
@@ -102,104 +100,16 @@ def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
     assert names(folder) == before
 
 
-def write_not_an_image(path):
-    path.write_text("this is a text")
-
-
-def write_nothing(path):
-    path.write_bytes(b"")
-
-
-def write_nan(path):
-    np.save(path, np.full((20, 20), np.nan))
-
-
-def write_infinite(path):
-    np.save(path, np.where(np.eye(20) > 0, np.inf, 1.0))
-
-
-@pytest.mark.parametrize(
-    ("name", "make"),
-    [
-        ("missing.png", lambda path: None),
-        ("text.png", write_not_an_image),
-        ("empty.png", write_nothing),
-        ("nan.npy", write_nan),
-        ("infinite.npy", write_infinite),
-        ("folder.png", lambda path: path.mkdir()),
-    ],
-)
-def test_bad_samples(folder, name, make):
-    make(folder / name)
-    before = names(folder)
-    result = run("synth", folder / name, "-o", folder / "out.npy", "--order", 2, "--device", "reference")
-    assert result.exit_code == 2, result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert names(folder) == before
-
-
-@pytest.mark.parametrize("output", ["nowhere/out.png", "sample.png/out.png", "out.xyz", "."])
-def test_bad_outputs(folder, output):
-    before = names(folder)
-    result = run("synth", folder / "sample.png", "-o", folder / output, "--order", 2)
-    assert result.exit_code == 2, result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert names(folder) == before
-
-
-def test_a_map_of_another_size_is_refused_before_the_work(folder):
-    image.write(folder / "small.png", np.zeros((5, 5), np.uint8))
-    result = synth(folder, "--also", f"{folder}/small.png={folder}/small-out.png")
-    assert result.exit_code == 2 and "sample's size" in result.output
-
-
-def test_devices_lists_the_reference():
-    result = run("devices")
-    assert result.exit_code == 0 and "reference" in result.output
-
-
-def test_ctrl_c_leaves_no_file(folder):
-    image.write(folder / "big.png", np.random.default_rng(2).integers(0, 256, (96, 96), dtype=np.uint8))
-    command = [sys.executable, "-m", "simdtex", "synth", "big.png", "-o", "out.png", "--size", "1500x1500"]
-    running = subprocess.Popen(
-        [*command, "--stages", "st"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    deadline = time.monotonic() + 120
-    while not (folder / "st" / "level0-sweep01.png").exists() and not any((folder / "st").glob("level*")):
-        assert running.poll() is None and time.monotonic() < deadline, running.communicate()
-        time.sleep(0.1)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=120)
-    assert running.returncode == 130, errors
-    assert "Traceback" not in errors and "stopped" in errors
-    assert not (folder / "out.png").exists()
-    assert not [path for path in folder.rglob("*") if path.name.startswith((".", "tmp"))]
+SYNTHESIS = "jobs.synthesis.synthesize"
 
 
 @pytest.mark.parametrize(
     ("function", "args", "writes", "said"),
     [
-        ("simdtex.experiments.benchmark.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
-        ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], [], "nothing was written"),
-        ("simdtex.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
-        (
-            "simdtex.jobs.synthesis.synthesize",
-            ["synth", "a.png", "-o", "o.png", "--stages", "st"],
-            ["st/level0.png"],
-            "st",
-        ),
-        (
-            "simdtex.jobs.synthesis.synthesize",
-            ["synth", "a.png", "-o", "o.png", "--stages", "st"],
-            [],
-            "nothing was written",
-        ),
-        (
-            "simdtex.jobs.synthesis.synthesize",
-            ["synth", "a.png", "-o", "old.png", "--stages", "st"],
-            ["old.png", "st/level0.png"],
-            "old.png, st",
-        ),
+        ("experiments.benchmark.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
+        ("extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
+        (SYNTHESIS, ["synth", "a.png", "-o", "o.png", "--stages", "st"], ["st/level0.png"], "st"),
+        (SYNTHESIS, ["synth", "a.png", "-o", "old.png", "--stages", "st"], ["old.png", "st/level0.png"], "old.png, st"),
     ],
 )
 def test_a_stopped_command_says_what_was_written(tmp_path, monkeypatch, function, args, writes, said):
@@ -214,7 +124,7 @@ def test_a_stopped_command_says_what_was_written(tmp_path, monkeypatch, function
             image.write(name, np.ones((2, 2), np.uint8))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(function, stopped)
+    monkeypatch.setattr(f"simdtex.{function}", stopped)
     result = run(*args)
     assert result.exit_code == 130
     assert result.stderr == f"simdtex: stopped; {said if 'nothing' in said else f'written so far: {said}'}\n"
@@ -339,12 +249,8 @@ def test_a_random_seed_is_short_and_printed(inputs):
     seeds = [int(re.search(r"seed (\d+)\n", one)[1]) for one in said]
     assert max(seeds) < 10**6 and seeds[0] != seeds[1]
     made = image.read("out.png").pixels
-    assert (
-        run(
-            "synth", "a.png", "-o", "out.png", "--size", 9, "--order", 2, "--seed", seeds[1], "--device", "reference"
-        ).exit_code
-        == 0
-    )
+    words = ["--size", 9, "--order", 2, "--seed", seeds[1], "--device", "reference"]
+    assert run("synth", "a.png", "-o", "out.png", *words).exit_code == 0
     assert np.array_equal(image.read("out.png").pixels, made)
 
 
@@ -369,7 +275,7 @@ def shell(folder, words, python=(), **environment):
 
 
 @POSIX
-@pytest.mark.parametrize("closed", ["2>&-", ">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", ["2>&-", "<&- >&- 2>&-"])
 def test_a_closed_stream_takes_nothing_away(small, closed):
     done = shell(small, [*SYNTH, closed])
     assert done.returncode == 0, done.stderr
@@ -378,11 +284,7 @@ def test_a_closed_stream_takes_nothing_away(small, closed):
 
 @POSIX
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device")
-@pytest.mark.parametrize(
-    ("words", "unbuffered"),
-    [(["--help"], "1"), (["devices"], ""), (SYNTH, "")],
-    ids=str,
-)
+@pytest.mark.parametrize(("words", "unbuffered"), [(["--help"], "1"), (SYNTH, "")], ids=str)
 def test_a_full_standard_output_is_one_sentence(small, words, unbuffered):
     done = shell(small, [*words, ">/dev/full"], PYTHONUNBUFFERED=unbuffered, SIMDTEX_DEVICE="reference")
     assert done.returncode == 2
@@ -392,7 +294,7 @@ def test_a_full_standard_output_is_one_sentence(small, words, unbuffered):
 
 
 @POSIX
-@pytest.mark.parametrize("words", [["--help"], ["devices"], SYNTH], ids=str)
+@pytest.mark.parametrize("words", [["--help"], SYNTH], ids=str)
 def test_a_reader_that_has_read_enough_ends_a_command_quietly(small, words):
     done = shell(small, [*words, "| true"], SIMDTEX_DEVICE="reference")
     assert done.stderr == b""
@@ -409,8 +311,7 @@ def test_a_folder_that_is_gone_is_named(small):
 
 @POSIX
 def test_helps_need_no_docstrings(small):
-    for words, said in ((["--help"], WHAT), (["synth", "--help"], COMMANDS["synth"])):
-        assert said in " ".join(shell(small, words, ["-OO"]).stdout.decode().split())
+    assert COMMANDS["synth"] in " ".join(shell(small, ["synth", "--help"], ["-OO"]).stdout.decode().split())
 
 
 @POSIX
@@ -431,19 +332,10 @@ def test_names_that_are_no_text_are_written_and_reported(small):
 
 @POSIX
 @pytest.mark.parametrize("words", [["loop.png", "-o", "out.png"], ["sample.png", "-o", "loop.png"]], ids=str)
-def test_links_in_a_circle_are_refused(small, words):
+def test_links_in_a_circle_are_refused(small, words, monkeypatch):
+    monkeypatch.chdir(small)
     (small / "loop.png").symlink_to("loop.png")
-    done = shell(small, ["synth", *words, *SYNTH[4:]])
-    assert done.returncode == 2
-    assert done.stderr.count(b"\n") == 1 and b"loop.png cannot be" in done.stderr, done.stderr
-    assert sorted(os.listdir(small)) == ["loop.png", "sample.png"]
-
-
-@POSIX
-def test_a_link_to_nothing_is_written_through(small):
-    (small / "out.png").symlink_to("real.png")
-    assert shell(small, SYNTH).returncode == 0
-    assert (small / "out.png").is_symlink() and image.read(small / "real.png").pixels.shape == (8, 9)
+    refused("loop.png cannot be", "synth", *words, *SYNTH[4:])
 
 
 @POSIX

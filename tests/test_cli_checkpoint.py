@@ -27,6 +27,10 @@ RUNS = {
     "extend": ("extend", "sample.png", "-o", "out.png", "--right", "3", "--order", "2", "--seed", "5"),
     "mix": ("mix", "sample.png", "holed.png", "-o", "out.png", "--size", "16x16", "--seed", "5"),
     "solid": ("solid", "sample.png", "-o", "out.npz", "--size", "8", "--iterations", "2", "--seed", "5"),
+    "classify": (
+        *("classify", "sample.png", "--texture", "a=sample.png", "--texture", "b=holed.png", "-o", "out.png"),
+        *("--exemplars", "20", "--seed", "5"),
+    ),
     "simulate": (
         *("simulate", "sample.png", "-o", "out.npz", "-n", "2", "--size", "9x8", "--order", "2", "--seed", "5"),
         *("--jobs", "1"),

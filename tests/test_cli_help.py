@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from importlib import import_module
 
 import click
 import numpy as np
@@ -12,11 +11,7 @@ from click.testing import CliRunner
 
 from simdtex.cli import COMMAND_WORDS, COMMANDS, EXAMPLES, load, main
 from simdtex.cli.command import OPTION_WORDS, entries_of
-from simdtex.cli.options import job_options
-from simdtex.cli.textures import COMMANDS as RUNS
-from simdtex.inputs import METHODS
 from simdtex.io import image
-from simdtex.options import Number, Whole, has_presets, is_flag, table
 
 OPTIONS = [(name, one) for name in COMMANDS for one in load(name).params if isinstance(one, click.Option)]
 LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [words for words, _ in EXAMPLES]
@@ -62,25 +57,6 @@ def test_help_lists_the_usual_options_and_says_where_the_others_are(name):
     assert every >= len(own) + 1, "an option of several methods is listed for each"
 
 
-@pytest.mark.parametrize("name", (*RUNS, "schedules"))
-def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
-    job = "extend" if name == "tile" else name
-    own = click.command()(job_options(job)(lambda **_: None)).params
-    params = {one.name: one for one in load(name).params}
-    tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
-    declared = {option: one for options in tables for option, one in options.items() if job in one.shown}
-    assert {one.name for one in own} == {*["preset"] * any(map(has_presets, tables)), *declared} <= params.keys()
-    said = "".join(help_of(name, 1000).split())
-    for option, one in declared.items():
-        assert f"{one.help}.".replace(" ", "") in said
-        default = one.default_of(job)
-        if default is not None and default is not False:
-            shown = f"{default:g}" if isinstance(default, float) else str(default)
-            assert f"{one.help}.[{shown}]".replace(" ", "") in said
-        number = {Whole: "integer", Number: "float"}.get(type(one.kind), "")
-        assert is_flag(one.kind) or params[option].type.name == (number or "text")
-
-
 def test_a_group_names_its_method():
     said = help_of("synth")
     assert re.search(r"Method multires: appearance:\n  --alpha FLOAT +Exchange places", said)
@@ -96,10 +72,6 @@ def test_the_help_of_an_option_begins_with_what_it_does():
     for command, one in OPTIONS:
         for _, (_, said) in entries_of(one, click.Context(load(command))):
             assert said[0].isupper() and said.partition(" ")[0].lower() in VERBS, f"{command} {one.opts[0]}: {said}"
-
-
-def test_a_short_list_has_no_groups():
-    assert "\nOptions:\n" in help_of("demo") and "\nOptions:\n" not in help_of("synth")
 
 
 @pytest.mark.parametrize("words", LINES, ids=lambda words: words[:40])

@@ -40,21 +40,16 @@ def folder(tmp_path, monkeypatch):
     }
     for name, one in pictures.items():
         image.write(name, one)
-    tables = {
-        "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
-        "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
-    }
+    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n", "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n"}
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
     for suffix in (".gslib", ".sgems"):
         write_grid(tmp_path / f"ti{suffix}", {"facies": facies}, **lies)
     write_grid(tmp_path / "two.gslib", {"por": grey / 8, "facies": facies}, **lies)
     write_grid(tmp_path / "holed.gslib", {"por": holed}, **lies)
-    write_grid(tmp_path / "solid.gslib", {"facies": np.stack([facies, facies])})
     tables |= {
         "wells.eas": "wells\n4\nX\nY\nZ\nfacies\n1035 2022.5 3 3\n1104 2037 2.5 0\n1107 2036 2.5 0\n1108 2036 2.5 3\n",
         "ti.dat": "20 16 1\n1\nfacies\n" + "\n".join(map(str, facies.ravel())) + "\n",
-        "unsized.dat": "title\n1\nfacies\n1\n",
         "cut.gslib": (tmp_path / "ti.gslib").read_text()[:-9],
     }
     for name, text in tables.items():
@@ -104,19 +99,6 @@ def test_what_is_told(folder):
     assert "1 realisation of 20x16" in simulate("grey.png", "-o", "out.npz").output
 
 
-def test_options_are_handed_on(folder):
-    args = ("--size", "14x12", "--novelty", 1, "--boundary", "torus", "--free-sweeps", 1)
-    found = made("grey.png", *args)
-    options = {"novelty": 1.0, "boundary": "torus", "free_sweeps": 1} | OPTIONS
-    assert_same(found, simdtex.simulate(pixels("grey.png"), 1, shape=(12, 14), **options))
-
-
-def test_colour_has_variables(folder):
-    found = made("colour.png", "--size", "14x12")
-    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (1, 12, 14, 3)
-    assert_same(found, simdtex.simulate(pixels("colour.png"), 1, shape=(12, 14), channel_axis=-1, **OPTIONS))
-
-
 def test_a_table_of_hard_data(folder):
     found = made("grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
     assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
@@ -124,14 +106,7 @@ def test_a_table_of_hard_data(folder):
     assert_same(found, simdtex.simulate(pixels("grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
 
 
-def test_categories(folder):
-    found = made("facies.png", "-n", 2, "--known", "facies.csv", "--size", "14x12", "--categorical")
-    assert set(np.unique(found)) == {0, 3}
-    assert (found.values[:, 4, 3] == 3).all() and (found.values[:, 7, 10] == 0).all()
-
-
-@pytest.mark.parametrize("name", ["ti.gslib", "ti.sgems"])
-@pytest.mark.parametrize("out", ["out.gslib", "out.sgems"])
+@pytest.mark.parametrize(("name", "out"), [("ti.gslib", "out.sgems"), ("ti.sgems", "out.gslib")])
 def test_from_a_grid_to_a_grid(folder, name, out):
     args = ["--known", "wells.eas", "--categorical", "--several", "most", "--size", "14x12", "-n", 2]
     result = simulate(name, *args, "-o", out)
@@ -206,53 +181,21 @@ def test_grids_as_guides(folder):
     refused(args, "has 1 channels and that of the output 2")
 
 
-def test_an_existing_file_is_replaced(folder):
-    made("grey.png", "-n", 2, "--size", "14x12")
-    assert made("grey.png", "--size", "9x8").shape == (1, 8, 9)
-
-
-def test_a_report_is_a_page_and_numbers(folder):
-    args = ("--known", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
-    made("facies.png", "-n", 2, *args)
-    page = (folder / "report" / "index.html").read_text(encoding="utf-8")
-    assert "simdtex simulate" in page and "facies.csv" in page
-    results = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
-    assert results["files"] == sorted(path.name for path in (folder / "report").iterdir())
-
-
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
-    "a grid of two layers": (
-        ["solid.gslib", "-o", "out.npz"],
-        "does not fit the sample of 2 layers x 16 rows x 20 columns",
-    ),
-    "a grid without sizes": (["unsized.dat", "-o", "out.npz"], "begin with nx ny nz, as"),
     "a grid cut short": (
         ["cut.gslib", "-o", "out.npz"],
         "too short for what its header says, 20 x 16 x 1 cells of 1 variable, 320 values",
     ),
     "a well off the grid": ([*FACIES, "--known", "wells.eas"], "line 7 of the hard data is at x 1035.0"),
-    "an unequal cell": (
-        ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical"],
-        "line 8 and line 10 of the hard data are both at row 7, column 10",
-    ),
-    "a mean of categories": (
-        ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical", "--several", "mean"],
-        "several is 'mean', which invents categories; give 'most'",
-    ),
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
-    "an origin of one number": ([*GREY, "--origin", "1"], "origin is (1.0,); give (x, y) or (x, y, z)"),
     "no origin": ([*GREY, "--origin", ""], "must be numbers"),
     "a text for a number": ([*GREY, "--categories", "sand=x"], "--categories sand=x must be NAME=NUMBER,..."),
     "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
-    "a negative cell": ([*GREY, "--cell", "1,-1"], "give sizes above 0"),
-    "an unknown rule": ([*FACIES, "--known", "facies.csv", "--several", "least"], "choose one of: refuse, mean, most"),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
-    "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
     "proportions in words": ([*FACIES, "--proportions", "half"], "numbers separated by commas"),
-    "no realisation": ([*GREY, "-n", 0], "n is 0; give 1 or more"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
     "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
@@ -289,7 +232,6 @@ def maps(folder):
     image.write(folder / "angles.tif", np.where(region, 0, 90).astype(np.float32))
     np.save(folder / "sizes.npy", np.where(region, 1.0, 0.5))
     np.save(folder / "numbers.npy", region.astype(np.uint8))
-    np.save(folder / "bad.npy", p * 2)
     return {"region": region, "probabilities": np.moveaxis(p, -1, 0)}
 
 
@@ -308,11 +250,6 @@ def test_maps_are_those_of_the_function(folder, maps):
     write_labels(folder / "numbers.png", number)  # as indices of a palette
     for name in ("numbers.npy", "numbers.png"):
         assert np.array_equal(made("grey.png", "second.png", "--image-map", name), expected)
-
-
-def test_the_size_is_that_of_a_map(folder, maps):
-    np.save(folder / "small.npy", np.full((7, 9, 2), 0.5))
-    assert made("facies.png", "--probabilities", "small.npy", "--categorical").shape == (1, 7, 9)
 
 
 def test_a_source_map_is_in_the_file(folder):
@@ -345,11 +282,8 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--probabilities", "bad.npy", "--categorical"], "row 0, column 0 are 0.4, 1.6; give shares that add up to 1"),
-        (["--probabilities", "p.npy"], "probabilities are of categories; give categorical=True"),
         (["--rotation", "angles.tif", "--size", "8x8"], "rotation is 16x20 and has to be 8x8"),
         (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),
-        (["--image-map", "numbers.npy"], "image_map has 1 and there is 1 training image"),
         (["--source", "-o", "out.gslib"], "is a grid, which holds no source map: end its name in .zarr, .nc or .npz"),
         (["--source", "--report", "report"], "--report cannot be used with --source or --region"),
     ],

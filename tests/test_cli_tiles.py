@@ -11,10 +11,9 @@ import time
 import numpy as np
 import pytest
 from cases import assert_same_bits, texture
-from click.testing import CliRunner
+from commands import run
 
 from simdtex import distributed
-from simdtex.cli import main
 from simdtex.distributed.store import Checked, Sources
 from simdtex.io import image
 from simdtex.model.source_map import load_source_map
@@ -37,10 +36,6 @@ def folder(tmp_path, monkeypatch):
     image.write(tmp_path / "to.png", (np.indices((34, 41)).sum(0) // 20 % 2).astype(np.uint8))
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def run(*args):
-    return CliRunner().invoke(main, [str(arg) for arg in args], catch_exceptions=False)
 
 
 def pixels(store):
@@ -94,7 +89,7 @@ def small_sheets(monkeypatch):
 
 @pytest.mark.parametrize(
     ("sample", "more"),
-    [("grey.png", []), ("colour.png", ["--source-map", "o.zarr/source"])],
+    [("grey.png", []), pytest.param("colour.png", ["--source-map", "o.zarr/source"], marks=pytest.mark.slow)],
     ids=["alone", "with a map"],
 )
 def test_the_report_is_that_of_a_whole_run(folder, small_sheets, sample, more):

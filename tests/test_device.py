@@ -123,15 +123,7 @@ def test_simulators_and_single_threads_come_last():
         fake(0, "Turbo", kind="gpu"),
     ]
     names = [info.name for info in sorted(infos, key=device._preference)]
-    assert names == [
-        "Turbo",
-        "pthread-epyc",
-        "basic-epyc",
-        "board",
-        "Oclgrind Simulator",
-        "llvmpipe (LLVM 15)",
-        "",
-    ]
+    assert names == ["Turbo", "pthread-epyc", "basic-epyc", "board", "Oclgrind Simulator", "llvmpipe (LLVM 15)", ""]
 
 
 # find

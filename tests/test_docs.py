@@ -212,7 +212,13 @@ def test_what_a_script_needs_is_there(script, monkeypatch):
 FIRST = (ROOT / "docs" / "index.rst").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("line", dict.fromkeys(commands(README) + commands(FIRST)))
+@pytest.mark.parametrize(
+    "line",
+    [
+        pytest.param(line, marks=[pytest.mark.slow] * ("--ising" in line))
+        for line in dict.fromkeys(commands(README) + commands(FIRST))
+    ],
+)
 def test_command_of_the_first_pages_runs(any_device, material, line, monkeypatch):
     """In this process, which is quicker than one for each."""
     monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))

@@ -116,7 +116,7 @@ def test_a_flat_end_counts_once_where_it_is():
     assert found == pytest.approx(1e4 / ((80 - 2 * MARGIN) * (100 - 2 * MARGIN)))
 
 
-@pytest.mark.parametrize("name", ["across", "inside", "Y that leaves", "Y with one end", "Y with three ends", "free"])
+@pytest.mark.parametrize("name", ["across", "Y with one end", "free"])
 def test_rough_banks_holes_and_specks_hardly_make_dead_ends(name):
     rng, (image, expected) = np.random.default_rng(3), DRAWN[name]
     bank = binary_dilation(image) & ~binary_erosion(image, border_value=1)

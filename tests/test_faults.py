@@ -23,13 +23,10 @@ import PIL.Image
 import PIL.ImageFile
 import pytest
 import tifffile
-from click.testing import CliRunner
 from volumes import loaded, png
 
-from simdtex.cli import main
 from simdtex.io import decode, files, image, volume
 from simdtex.io.files import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
-from simdtex.io.grids import read_grid
 from simdtex.io.hard_data import read_hard_data
 from simdtex.model.source_map import load_source_map, save_source_map
 from simdtex.report.page import Section, write_report
@@ -179,17 +176,6 @@ def tiny(tmp_path):
     subprocess.run(["umount", "-l", disk], check=True)
 
 
-def test_a_disk_that_is_full(tiny):
-    with pytest.raises(OSError, match="No space left"), (tiny / "ballast").open("wb", buffering=0) as ballast:
-        for _ in range(10_000):
-            ballast.write(b"x" * 8)
-    for name, write in WRITERS.items():
-        with pytest.raises(ValueError, match=re.escape("No space left on device): free some space")) as said:
-            write(tiny / name, 1)
-        assert str(said.value).startswith(str(tiny / name))
-        assert os.listdir(tiny) == ["ballast"]
-
-
 def leftover(name, days):
     """Make a hidden file that a process left so many days ago."""
     name.touch()
@@ -217,7 +203,7 @@ def test_an_unfinished_output_that_looks_old_is_kept_while_its_writer_lives(tmp_
 
 def test_a_lock_has_one_holder_at_a_time(tmp_path):
     pytest.importorskip("fcntl")
-    inside, counts, end = [], [], time.monotonic() + 2
+    inside, counts, end = [], [], time.monotonic() + 0.5
 
     def take():
         while time.monotonic() < end:
@@ -238,16 +224,6 @@ def test_a_lock_has_one_holder_at_a_time(tmp_path):
         thread.join()
     assert len(counts) > 20 and set(counts) == {1}
     assert os.listdir(tmp_path) == []
-
-
-def test_a_lock_that_was_replaced_is_left_to_its_holder(tmp_path):
-    pytest.importorskip("fcntl")
-    (tmp_path / ".state.lock").touch()  # of a process that was killed
-    with exclusive(tmp_path / "state"):
-        (tmp_path / ".state.lock").unlink()
-        with exclusive(tmp_path / "other"), open(tmp_path / ".state.lock", "w"):
-            pass
-    assert os.listdir(tmp_path) == [".state.lock"]
 
 
 def test_a_failed_write_into_a_folder_names_the_folder(tmp_path, monkeypatch):
@@ -354,7 +330,7 @@ def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
     assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
     image.write(tmp_path / "sample.png", np.random.default_rng(2).integers(0, 256, (64, 64), dtype=np.uint8))
     words = command(tmp_path, "--size", "200x200", "--stages", "st", "--order", "8")
@@ -503,12 +479,6 @@ def test_the_environment_says_how_many(tmp_path, monkeypatch):
             image.read(tmp_path / "a.png", max_pixels=number)
 
 
-def test_the_command_line_says_it_in_one_sentence(tmp_path, monkeypatch):
-    (tmp_path / "a.png").write_bytes(PICTURES["PNG"])
-    done = CliRunner().invoke(main, ["synth", str(tmp_path / "a.png"), "-o", str(tmp_path / "out.png")])
-    assert done.exit_code == 2 and files.VARIABLE in done.output and len(done.output.splitlines()) == 1
-
-
 def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
     """Pillow refuses those of 8 bits; of those of 16 bits only the orientation is read."""
     bomb = zlib.compress(bytes(2**25), 9)
@@ -542,22 +512,6 @@ def test_source_maps_and_hard_data(tmp_path):
         refused_limits(reading, tmp_path / name, f"{TOO_LARGE}|no more than .* are read: give fewer rows", peak=2**23)
 
 
-def test_grids(tmp_path):
-    """What a header says is compared with the length of the file before memory is asked for."""
-    sgems = b"\xb2\x11\x17\x5d\0\0\0\6Cgrid\0\0\0\0\1\0\0\0\0\x64%s" + struct.pack(">6f", *[1] * 6)
-    files = {
-        "far.gslib": (b"40000 40000 9\n1\nv\n1\n", "14400000000 pixels and no more than"),
-        "near.gslib": (b"10000 10000 1\n1\nv\n1\n", "too short for what its header says"),
-        "names.gslib": (b"1 1 1\n999999999\nv\n1\n", "line 5 has no name of a variable"),
-        "far.sgems": (sgems % struct.pack(">3I", 40000, 40000, 9) + b"\0\0\0\1\0\0\0\1\0", "14400000000 pixels"),
-        "near.sgems": (sgems % struct.pack(">3I", 10000, 10000, 1) + b"\0\0\0\1\0\0\0\1\0", "before the last of"),
-        "names.sgems": (sgems % struct.pack(">3I", 1, 1, 1) + b"\xff" * 8, "ends within its header"),
-    }
-    for name, (data, words) in files.items():
-        (tmp_path / name).write_bytes(data)
-        refused_limits(read_grid, tmp_path / name, words, peak=2**20)
-
-
 def test_lines_that_no_table_has(tmp_path):
     first = ",".join("1" * 30_000)
     for text, words in {
@@ -567,25 +521,6 @@ def test_lines_that_no_table_has(tmp_path):
     }.items():
         (tmp_path / "a.csv").write_text(text)
         refused_limits(read_hard_data, tmp_path / "a.csv", words, peak=2**24)
-
-
-def test_only_documented_formats_are_tried(tmp_path, monkeypatch):
-    """Pillow knows a PostScript file by its first bytes, and hands it to Ghostscript."""
-
-    def never(*_, **__):
-        raise AssertionError("a program is started")
-
-    for name in ("Popen", "check_call", "check_output", "run", "call"):
-        monkeypatch.setattr(subprocess, name, never)
-    (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n%%EndComments\nshowpage\n")
-    for kind in ("ICO", "PCX", "SGI", "DDS", "ICNS"):
-        (tmp_path / f"{kind}.png").write_bytes(saved(np.zeros((32, 32, 3), np.uint8), kind))
-    for path in sorted(tmp_path.iterdir()):
-        with pytest.raises(
-            ValueError,
-            match=r"is not an image: give a PNG, JPEG, TIFF, BMP, WebP, .*\.npy|is a drawing|is an icon|is a texture",
-        ):
-            image.read(path)
 
 
 def test_the_documented_formats_are_those_that_are_read(tmp_path):

@@ -628,9 +628,8 @@ def some(dtype="uint8", variables=None, name="rock"):
     return xarray.DataArray(values, coords, dims, name=name, attrs=ATTRIBUTES)
 
 
-@pytest.mark.parametrize("suffix", [".zarr", ".nc", ".NC"])
+@pytest.mark.parametrize(("suffix", "variables"), [(".zarr", None), (".nc", 3)])
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "uint64", "float16", "float32", "float64", "bool"])
-@pytest.mark.parametrize("variables", [None, 3])
 def test_xarray_reads_what_was_written(tmp_path, suffix, dtype, variables):
     path, array = tmp_path / f"many{suffix}", some(dtype, variables)
     write_realisations(path, array)

@@ -268,15 +268,6 @@ def test_placing_against_a_loop(quarters, dtype, variables):
     np.testing.assert_array_equal(placed.compressed(), expected[~np.isnan(expected)])
 
 
-def test_x_is_the_column_and_halves_go_up():
-    below = np.nextafter(0.5, 0)
-    for x, column in ((-0.5, 0), (-1e-20, 0), (below, 0), (0.5, 1), (1.5, 2), (2.4999, 2)):
-        placed = place_hard_data([[x, 1, 7]], (2, 3), np.uint8)
-        assert np.argwhere(~placed.mask).tolist() == [[1, column]]
-    assert place_hard_data([[below, below, 7]], (2, 3))[0, 0] == 7
-    np.testing.assert_array_equal(place_hard_data([[0, 0, 1]], (1, 2), "float32").filled(), [[1, NAN]])
-
-
 def test_data_that_agree_at_one_site_are_one():
     placed = place_hard_data([[1, 1, 5, NAN], [1.2, 0.9, 5, 8], [1, 1, NAN, 8]], (2, 2))
     assert placed[1, 1].tolist() == [5, 8]
@@ -367,10 +358,7 @@ def test_masked_numbers_are_unknown():
             "-0.6,0,1",
             r"line 3 .* at x -0\.6, y 0\.0, outside of a picture of 4 x 3 .*give x from -0.5 to below 3.5, y .* 2.5",
         ),
-        (
-            "0,0,0.5",
-            "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers below 2",
-        ),
+        ("0,0,0.5", "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers below 2"),
         ("0,0,256", "has 256.0 for facies, which uint8 cannot hold"),
         ("0,0,inf", "has inf for facies, which uint8 cannot hold"),
         (

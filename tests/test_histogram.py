@@ -91,13 +91,3 @@ def test_no_match_is_an_error_that_names_the_site_and_the_ways_out(machine):
         assert simdtex.lcpdf(image, sample, [(0, 0)], device=m, **options).tolist() == [[1, 0]]
         with pytest.raises(ValueError, match=r"equals that of site \(3, 3\); use fewer grey levels"):
             simdtex.lcpdf(image, sample, [(0, 0), (3, 3)], device=m, **options)
-
-
-def test_hot_neighbours_need_not_match():
-    image = np.array([[0, 1], [1, 0]], np.uint8)
-    sample = np.zeros((3, 3), np.uint8)
-    ours = simdtex.lcpdf(
-        image, sample, [(0, 0)], order=2, greys=2, estimator="histogram",
-        temperature=np.ones((2, 2)), device="reference",
-    )  # fmt: skip
-    assert ours.tolist() == [[1, 0]]

@@ -82,9 +82,9 @@ def check_lcpdf(machine, image, sample, sites, **options):
     return ours
 
 
-@pytest.mark.parametrize("boundary", ["torus", "open"])
-@pytest.mark.parametrize("bandwidth", [0.15, 1.0, 3.0])
-@pytest.mark.parametrize("order", [1, 2, 8])
+@pytest.mark.parametrize(
+    ("order", "bandwidth", "boundary"), [(1, 1.0, "open"), (2, 0.15, "torus"), (8, 3.0, "torus"), (8, 1.0, "open")]
+)
 def test_lcpdf_is_the_formula(order, bandwidth, boundary):
     rng = np.random.default_rng(order)
     image, sample = texture((7, 9), seed=1), texture((10, 11), seed=2)
@@ -170,7 +170,7 @@ def test_bad_input_is_one_clear_sentence(change, error, words):
         simdtex.lcpdf(**options)
 
 
-DRAWS = 10_000
+DRAWS = 5_000
 SEEDS = (1, 2**33 + 7, 2**64 - 1)
 
 
@@ -211,22 +211,20 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_a_draw_of_a_grey_level_follows_the_density(case, seed):
+def test_a_draw_of_a_grey_level_follows_the_density(case):
     order, bandwidth, temperatures, strength, torus = case
-    p = problem(seed, order=order, temperatures=temperatures, torus=torus, shape=(7, 8))
+    p = problem(1, order=order, temperatures=temperatures, torus=torus, shape=(7, 8))
     win, h = p.window(bandwidth)
     _, values = draw_many(p, win, True, strength)
     density = plain.mixture(reweighted(p, strength), [p.padded()[0][q] for q in p.positions()], h, 256)
     check_chi_square(np.bincount(values[0], minlength=256), density)
 
 
-@pytest.mark.parametrize("seed", [3, 4])
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_a_draw_of_a_source_follows_the_weights(case, seed):
+def test_a_draw_of_a_source_follows_the_weights(case):
     order, bandwidth, temperatures, strength, torus = case
-    p = problem(seed, order=order, channels=3, temperatures=temperatures, torus=torus, shape=(7, 8))
+    p = problem(3, order=order, channels=3, temperatures=temperatures, torus=torus, shape=(7, 8))
     win, h = p.window(bandwidth)
     choice, values = draw_many(p, win, False, strength)
     d = reweighted(p, strength)

@@ -314,14 +314,14 @@ def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
 
 
 def test_a_page_that_comes_back_in_time_keeps_its_run(monkeypatch):
-    monkeypatch.setattr(serving, "RUN_KEPT", 2.0)
+    monkeypatch.setattr(serving, "RUN_KEPT", 0.5)
     with running() as (port, pages):
         page, session = closed_in_a_run(port, pages)
         soon(lambda: page.key in pages._lost)
         again = Client(port, session=page.key)
         shown = again.wait("picture")[0]
         assert not shown["new"] and shown["settings"]["width"] == 2000
-        time.sleep(3)
+        time.sleep(1)
         assert session._begun, "the run goes on"
 
 

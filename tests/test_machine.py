@@ -469,11 +469,7 @@ except ValueError as error:
 def python(code, *words, **environment):
     """Return the words that a process prints within 100 seconds."""
     result = subprocess.run(
-        [sys.executable, "-c", code, *words],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=200,
+        [sys.executable, "-c", code, *words], env=os.environ | environment, capture_output=True, text=True, timeout=200
     )
     assert result.returncode == 0, result.stderr[-2000:]
     return result.stdout.split()
@@ -503,42 +499,6 @@ print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), 
 @pytest.mark.parametrize("profile", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, profile):
     assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
-
-
-DEVICES = """
-import itertools, sys
-from concurrent.futures import ThreadPoolExecutor
-import numpy as np
-import simdtex
-
-devices, repeats = [*sys.argv[2:], "reference"], int(sys.argv[1])
-sample = np.random.default_rng(0).integers(0, 256, (20, 18), dtype=np.uint8)
-hole = np.indices(sample.shape).sum(0) % 19 == 0
-JOBS = [
-    lambda **how: simdtex.synthesize(sample, (16, 17), order=2, levels=2, **how),
-    lambda **how: simdtex.synthesize(sample, (16, 17), method="multires", **how),
-    lambda **how: simdtex.synthesize(sample, (16, 17), method="pyramid", iterations=1, **how),
-    lambda **how: simdtex.synthesize_solid(sample, (6, 6, 6), iterations=1, **how),
-    lambda **how: simdtex.fill(sample, hole, order=1, levels=1, **how),
-]
-expected = [job(rng=5, device="reference").tobytes() for job in JOBS]
-sys.setswitchinterval(1e-5)
-
-def wrong(which):
-    device, number = which
-    return JOBS[number](rng=5, device=device).tobytes() != expected[number]
-
-with ThreadPoolExecutor(6) as pool:
-    ends = list(pool.map(wrong, [*itertools.product(devices, range(len(JOBS)))] * repeats))
-print(len(ends), sum(ends))
-"""
-
-
-@pytest.mark.slow  # kernels are compiled
-def test_threads_with_different_devices_get_the_same_bytes(any_device):
-    """The reference and every OpenCL device at the same time."""
-    devices = [str(one.index) for one in simdtex.devices() if one.usable and one.kind != "reference"]
-    assert python(DEVICES, "1", *devices) == [str(5 * (1 + len(devices))), "0"]
 
 
 FORK = """
@@ -574,29 +534,6 @@ print(early, *lost, listed, child(lambda: result("reference") == right), result(
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
 def test_a_forked_process_raises_instead_of_hanging(cl_device):
     assert python(FORK, str(cl_device.index)) == [*"111111", "True"]
-
-
-MULTIPROCESSING = """
-import multiprocessing
-import numpy as np
-import simdtex
-
-def work(device):
-    try:
-        return simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=device).shape
-    except simdtex.DeviceError as error:
-        return str(error).count(".") == 1 and "spawn" in str(error)
-
-if __name__ == "__main__":
-    work(None)
-    with multiprocessing.get_context("fork").Pool(2) as pool:
-        print(*pool.map(work, [None, "reference"]), sep=";")
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
-def test_a_pool_of_forked_processes_may_use_the_reference(any_device):
-    assert "".join(python(MULTIPROCESSING)) == "True;(4,4)"
 
 
 class Other:

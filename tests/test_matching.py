@@ -10,9 +10,6 @@ import pytest
 from cases import REFERENCE, assert_same_bits, host, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import wasserstein_distance
-from skimage.exposure import match_histograms
-from tolerances import CONTRAST
 
 from simdtex.methods.pyramid.matcher import Histograms, average, averaged, spliced
 from simdtex.methods.pyramid.matcher import histograms as histograms_histograms
@@ -30,7 +27,12 @@ KINDS = {
     "ends": lambda rng, shape: rng.choice([LOW, LOW + 1, -256, -1, 0, 1, 255, HIGH - 1, HIGH], shape),
     "bytes": lambda rng, shape: rng.integers(0, 4, shape) << 8 * rng.integers(0, 4, shape),
     "constant": lambda rng, shape: np.full(shape, rng.integers(LOW, HIGH)),
-    "falling": lambda rng, shape: np.broadcast_to(-np.arange(shape[1]), shape),
+    "falling": lambda rng, shape: np.broadcast_to(-np.arange(shape[-1]), shape),
+    "heavy": lambda rng, shape: np.rint(rng.standard_t(2, shape) * 2**14),
+    "11 bits": lambda rng, shape: HIGH - rng.integers(0, 2**11, shape),
+    "12 bits": lambda rng, shape: LOW + rng.choice([0, 1, 2**11 - 1, 2**11], shape),
+    "22 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1], shape) - 5,
+    "23 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1, 2**22], shape) - 5,
 }
 
 
@@ -60,36 +62,6 @@ def test_the_reference_is_pythons_sort(problem):
         assert own == sorted(first.tolist(), key=lambda i, segment=segment: segment[i])
 
 
-@given(problem=cases(lengths=(1, 2, 40, 300)))
-@settings(max_examples=40)
-def test_a_device_has_the_references_bits(machine, problem):
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_long_segments_in_several_runs(machine, kind):
-    problem = case((2, 20_001), kind)
-    assert MODULE.run_length(machine, 2, 20_001) < 20_001
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("kind", ["all", "ties", "ends"])
-@pytest.mark.parametrize("length", [1, 7, 64, 299, 300])
-def test_the_length_of_a_run_changes_no_bit(machine, monkeypatch, kind, length):
-    monkeypatch.setattr(MODULE, "run_length", lambda *_: length)
-    problem = case((3, 300), kind)
-    assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
-@pytest.mark.parametrize("scratch", [1, 600, 1300])
-def test_pieces_of_whole_segments_change_no_bit(machine, monkeypatch, scratch):
-    """One, two or four segments at a time, the last piece a smaller one."""
-    monkeypatch.setattr(MODULE, "SCRATCH", scratch)
-    for kind in ("all", "ties"):
-        problem = case((5, 300), kind)
-        assert_same_bits(run(machine, *problem), run(REFERENCE, *problem))
-
-
 def test_scratch_memory_is_bounded(machine, monkeypatch):
     """Keys and indices for SCRATCH values, and no table of counters for segments of a single value each."""
     monkeypatch.setattr(MODULE, "SCRATCH", 2**12)
@@ -105,33 +77,14 @@ def test_scratch_memory_is_bounded(machine, monkeypatch):
         assert all(np.prod(shape) <= 2 * 2**12 for shape in made[1:])
 
 
-def test_a_constant_comes_in_the_order_of_its_ties(machine):
-    values, first = case((3, 300), "constant")
-    for backend in (REFERENCE, machine):
-        assert (run(backend, values, first) == first).all()
-
-
 # -- Histogram matching by rank in one operation, beside the sort, the ranks and the distance that it is made of.
-
-MODULE_RANKING = importlib.import_module("simdtex.ops.matching")
-LOW_RANKING, HIGH_RANKING = -(2**31), 2**31 - 1
-KINDS_RANKING = {
-    "all": lambda rng, shape: rng.integers(LOW_RANKING, HIGH_RANKING, shape, endpoint=True),
-    "ends": lambda rng, shape: rng.choice([LOW_RANKING, LOW_RANKING + 1, -1, 0, HIGH_RANKING - 1, HIGH_RANKING], shape),
-    "subband": lambda rng, shape: np.rint(rng.normal(0, 2**17, shape)),
-    "11 bits": lambda rng, shape: HIGH_RANKING - rng.integers(0, 2**11, shape),
-    "12 bits": lambda rng, shape: LOW_RANKING + rng.choice([0, 1, 2**11 - 1, 2**11], shape),
-    "22 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1], shape) - 5,
-    "23 bits": lambda rng, shape: rng.choice([0, 2**11, 2**22 - 1, 2**22], shape) - 5,
-    "constant": lambda rng, shape: np.full(shape, rng.integers(LOW_RANKING, HIGH_RANKING)),
-}
 
 
 def case_ranking(segments, n, m, targets=1, kind="subband", seed=0):
     """Values, the order of equal ones, sorted targets."""
     rng = np.random.default_rng(seed)
-    values = KINDS_RANKING[kind](rng, (segments, n)).astype(np.int64).astype(np.int32)
-    wanted = np.sort(rng.integers(LOW_RANKING, HIGH_RANKING, (targets, m), endpoint=True).astype(np.int32), 1)
+    values = KINDS[kind](rng, (segments, n)).astype(np.int64).astype(np.int32)
+    wanted = np.sort(rng.integers(LOW, HIGH, (targets, m), endpoint=True).astype(np.int32), 1)
     return values, rng.permutation(n).astype(np.int32), wanted
 
 
@@ -139,7 +92,7 @@ def case_ranking(segments, n, m, targets=1, kind="subband", seed=0):
 def cases_ranking(draw):
     targets = draw(st.integers(1, 3))
     n, m = (draw(st.sampled_from([1, 2, 7, 40, 300])) for _ in range(2))
-    kind, seed = draw(st.sampled_from(sorted(KINDS_RANKING))), draw(st.integers(0, 2**16))
+    kind, seed = draw(st.sampled_from(sorted(KINDS))), draw(st.integers(0, 2**16))
     return case_ranking(targets * draw(st.integers(1, 3)), n, m, targets, kind, seed)
 
 
@@ -167,19 +120,19 @@ def test_a_device_has_the_references_bits_of_ranking(machine, problem):
     assert_same_bits(run_ranking(machine, problem), run_ranking(REFERENCE, problem))
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS_RANKING))
-@pytest.mark.parametrize("m", [5000, 2500, 3000, 10_000])
+@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("m", [5000, 3000])
 def test_a_work_item_and_several_have_the_same_bits(machine, monkeypatch, kind, m):
     problem = case_ranking(4, 5000, m, 2, kind)
     expected = run_ranking(REFERENCE, problem)
     for alone in (True, False):
-        monkeypatch.setattr(MODULE_RANKING, "alone", lambda *_, alone=alone: alone)
+        monkeypatch.setattr(MODULE, "alone", lambda *_, alone=alone: alone)
         assert_same_bits(run_ranking(machine, problem), expected)
 
 
 @pytest.mark.parametrize("kind", ["subband", "all"])
 def test_segments_of_more_values_than_a_word_numbers(machine, monkeypatch, kind):
-    monkeypatch.setattr(MODULE_RANKING, "alone", lambda *_: True)
+    monkeypatch.setattr(MODULE, "alone", lambda *_: True)
     problem = case_ranking(1, 2**21 + 1, 1000, kind=kind)
     assert_same_bits(run_ranking(machine, problem), run_ranking(REFERENCE, problem))
 
@@ -187,45 +140,35 @@ def test_segments_of_more_values_than_a_word_numbers(machine, monkeypatch, kind)
 @pytest.mark.parametrize("scratch", [1, 7000, 13_000])
 def test_pieces_of_whole_segments_change_no_bit_of_ranking(machine, monkeypatch, scratch):
     """One, two or four segments at a time, the last piece a smaller one; no array beyond the scratch memory."""
-    monkeypatch.setattr(MODULE_RANKING, "SCRATCH", scratch)
-    monkeypatch.setattr(MODULE_RANKING, "alone", lambda *_: True)
+    monkeypatch.setattr(MODULE, "SCRATCH", scratch)
+    monkeypatch.setattr(MODULE, "alone", lambda *_: True)
     made, empty = [], machine.empty
     monkeypatch.setattr(machine, "empty", lambda shape, dtype: made.append(np.prod(shape)) or empty(shape, dtype))
     problem = case_ranking(5, 300, 100)
     assert_same_bits(run_ranking(machine, problem), run_ranking(REFERENCE, problem))
-    assert sorted(made)[-1] <= max(MODULE_RANKING.COUNTERS, 2 * scratch)
+    assert sorted(made)[-1] <= max(MODULE.COUNTERS, 2 * scratch)
 
 
 def test_who_sorts_alone():
     processor = SimpleNamespace(info=SimpleNamespace(kind="cpu", compute_units=8))
     graphics = SimpleNamespace(info=SimpleNamespace(kind="gpu", compute_units=8))
-    assert MODULE_RANKING.alone(processor, 1, MODULE_RANKING.SHORT)
-    assert not MODULE_RANKING.alone(processor, 3, MODULE_RANKING.SHORT + 1)
-    assert MODULE_RANKING.alone(processor, 4, MODULE_RANKING.LONG)
-    assert not MODULE_RANKING.alone(processor, 4, MODULE_RANKING.LONG + 1)
-    assert not MODULE_RANKING.alone(graphics, 4, 1)
+    assert MODULE.alone(processor, 1, MODULE.SHORT)
+    assert not MODULE.alone(processor, 3, MODULE.SHORT + 1)
+    assert MODULE.alone(processor, 4, MODULE.LONG)
+    assert not MODULE.alone(processor, 4, MODULE.LONG + 1)
+    assert not MODULE.alone(graphics, 4, 1)
 
 
 # -- Histogram matching by rank and by lookup, the inverse cdf of a target, and the distance of two histograms.
 
-MODULE_MATCHING = importlib.import_module("simdtex.ops.matching")
-LOW_MATCHING, HIGH_MATCHING = -(2**31), 2**31 - 1
 UNIT = 2**20
-KINDS_MATCHING = {
-    "all": lambda rng, shape: rng.integers(LOW_MATCHING, HIGH_MATCHING, shape, endpoint=True),
-    "subband": lambda rng, shape: np.rint(rng.normal(0, 2**17, shape)),
-    "heavy": lambda rng, shape: np.rint(rng.standard_t(2, shape) * 2**14),
-    "ties": lambda rng, shape: rng.integers(-3, 3, shape, endpoint=True),
-    "ends": lambda rng, shape: rng.choice([LOW_MATCHING, LOW_MATCHING + 1, 0, HIGH_MATCHING - 1, HIGH_MATCHING], shape),
-    "constant": lambda rng, shape: np.full(shape, rng.integers(LOW_MATCHING, HIGH_MATCHING)),
-}
-kinds = st.sampled_from(sorted(KINDS_MATCHING))
+kinds = st.sampled_from(sorted(KINDS))
 seeds = st.integers(0, 2**16)
 histograms = st.sampled_from([2, 3, 16, 255, 256, 4096])
 
 
 def picture(shape, kind="subband", seed=0):
-    return KINDS_MATCHING[kind](np.random.default_rng(seed), shape).astype(np.int64).astype(np.int32)
+    return KINDS[kind](np.random.default_rng(seed), shape).astype(np.int64).astype(np.int32)
 
 
 def tables(targets, bins=256):
@@ -249,10 +192,6 @@ def ordered(values, seed=0):
     return on(REFERENCE, sort, values, first)
 
 
-def by_rank(values, targets, seed=0):
-    return on(REFERENCE, match_ranks, ordered(values, seed), np.sort(targets, 1))
-
-
 @given(pairs())
 def test_the_k_th_smallest_takes_the_value_of_its_rank(case):
     values, targets = case
@@ -264,13 +203,6 @@ def test_the_k_th_smallest_takes_the_value_of_its_rank(case):
         for k in range(n):
             rank = floor((k + Fraction(1, 2)) / n * m)
             assert found[s, order[s, k]] == targets[s * len(targets) // segments, rank]
-
-
-def test_pictures_without_ties_are_matched_as_by_scikit_image():
-    rng = np.random.default_rng(5)
-    values, target = (rng.permutation(5000)[:900].astype(np.int32).reshape(30, 30) for _ in range(2))
-    expected = match_histograms(values, target)
-    assert (by_rank(values.reshape(1, -1), target.reshape(1, -1)) == expected.reshape(1, -1)).all()
 
 
 def exact_inverse(target, bins):
@@ -335,19 +267,6 @@ def test_a_value_goes_through_the_cdf_and_the_table(case, bins):
             assert abs(ours - exact) <= Fraction(1, 2) + Fraction((bins + 1) * steepest, UNIT)
 
 
-@pytest.mark.parametrize("bins", [2, 3, 255, 256, 4096])
-def test_a_constant_segment_takes_the_median(machine, bins):
-    """The table's own, and within a bin and a rounding the target's."""
-    values, targets = picture((2, 40), "constant"), np.sort(picture((2, 301)))
-    inverse = tables(targets, bins).astype(np.int64)
-    middle = (inverse[:, bins // 2] + inverse[:, (bins + 1) // 2] + 1) // 2
-    for backend in (REFERENCE, machine):
-        found = on(backend, match_lookup, values, inverse.astype(np.int32))
-        assert (found == middle[:, None]).all()
-        if bins >= 255:
-            assert (abs(found - targets[:, 150:151]) <= np.ptp(targets, 1)[:, None] / bins + 1).all()
-
-
 @given(pairs(), seeds)
 def test_the_distance_is_the_sum_of_differences(case, seed):
     before = case[0]
@@ -356,14 +275,6 @@ def test_the_distance_is_the_sum_of_differences(case, seed):
     assert (found.dtype, found.shape) == (np.int64, before.shape[:1])
     for s, total in enumerate(found.tolist()):
         assert total == sum(abs(int(a) - int(b)) for a, b in zip(before[s], after[s], strict=True))
-
-
-@pytest.mark.parametrize("m", [50, 150, 300])
-def test_after_ranks_it_is_the_wasserstein_distance(m):
-    values, targets = picture((2, 300)), picture((2, m), "heavy")
-    found = on(REFERENCE, distance, values, by_rank(values, targets))
-    for total, one, other in zip(found, values, targets, strict=True):
-        assert abs(total - 300 * wasserstein_distance(one, other)) <= CONTRAST * total
 
 
 def everything(machine, values, targets, bins=256):
@@ -379,16 +290,16 @@ def test_a_device_has_the_references_bits_of_matching(machine, case, bins):
     assert_same_bits(everything(machine, *case, bins), everything(REFERENCE, *case, bins))
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS_MATCHING))
+@pytest.mark.parametrize("kind", ["all", "heavy", "ties", "constant"])
 def test_long_segments_in_several_runs_of_matching(machine, kind):
     case = picture((2, 20_001), kind), picture((2, 300))
-    assert MODULE_MATCHING.run_length(machine, 2, 20_001) < 20_001
+    assert MODULE.run_length(machine, 2, 20_001) < 20_001
     assert_same_bits(everything(machine, *case), everything(REFERENCE, *case))
 
 
 @pytest.mark.parametrize("length", [3, 64, 299])
 def test_the_length_of_a_run_changes_no_bit_of_matching(machine, monkeypatch, length):
-    monkeypatch.setattr(MODULE_MATCHING, "run_length", lambda *_: length)
+    monkeypatch.setattr(MODULE, "run_length", lambda *_: length)
     for kind in ("all", "heavy"):
         case = picture((6, 300), kind), picture((3, 40))
         for bins in (2, 256):
@@ -397,7 +308,7 @@ def test_the_length_of_a_run_changes_no_bit_of_matching(machine, monkeypatch, le
 
 def test_runs_are_not_shorter_than_their_tables_of_counters(machine, monkeypatch):
     """However short a device would have them; so counters take no more memory than values and one table."""
-    monkeypatch.setattr(MODULE_MATCHING, "run_length", lambda *_: 1)
+    monkeypatch.setattr(MODULE, "run_length", lambda *_: 1)
     made = []
     empty = machine.empty
     monkeypatch.setattr(machine, "empty", lambda shape, dtype: made.append(shape) or empty(shape, dtype))

@@ -286,13 +286,6 @@ def test_errors_of_several_samples():
             apply_source_map(bad, others)
 
 
-def test_a_sample_that_no_pixel_is_of():
-    source = np.dstack([some_map(7), np.zeros((7, 9), int)])
-    other = np.random.default_rng(7).random((5, 6))
-    for others in (other, [other], [other, np.zeros((2, 2))]):
-        np.testing.assert_array_equal(apply_source_map(source, others), apply_source_map(source[..., :2], other))
-
-
 @pytest.mark.parametrize("suffix", [".npz", ".npy"])
 @pytest.mark.parametrize("columns", [2, 3])
 def test_files_of_maps_with_pixels_that_have_no_source(tmp_path, suffix, columns):

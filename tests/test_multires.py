@@ -1,9 +1,10 @@
-"""De Bonet's method: its limits, what a picture is made of, thresholds, contrast, colour, and borders."""
+"""De Bonet's method: what it takes and tells, its limits, what a picture is made of, thresholds, and borders."""
 
 import itertools
+import logging
 import math
+from dataclasses import fields
 from fractions import Fraction
-from math import inf
 
 import numpy as np
 import pytest
@@ -12,28 +13,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from plain_multires import as_large
-from scipy.stats import chisquare
 from skimage import data
-from tolerances import SIGNIFICANCE
 
 import simdtex
 from simdtex.experiments.quality import seam
 from simdtex.methods import multires
 from simdtex.methods.multires import Options
-from simdtex.methods.multires.analysis import differences, thresholds
+from simdtex.methods.multires.analysis import thresholds
 from simdtex.methods.multires.mend import SHARE, _least, _path, mend
 from simdtex.model.stretched import Stretched
-from simdtex.ops.candidates import Sampled, Structure, candidates
 
 # -- De Bonet's method as users see it: its limits, what a picture is made of, thresholds, contrast and colour.
 
 INF = math.inf
 
 
+def synthesize(sample, shape, **options):
+    """An image; the last axis of a sample of three holds the channels."""
+    given = {"rng": 1, "device": REFERENCE, "channel_axis": -1 if np.ndim(sample) == 3 else None} | options
+    return simdtex.synthesize(sample, shape, method="multires", **given)
+
+
 def run(sample, shape, **options):
-    """Image and output; the last axis of a sample of three holds the channels."""
-    given = {"rng": 1, "device": REFERENCE, "channel_axis": -1 if sample.ndim == 3 else None} | options
-    return simdtex.synthesize(sample, shape, method="multires", full_output=True, **given)
+    """Image and output."""
+    return synthesize(sample, shape, full_output=True, **options)
 
 
 def tiling(shape, size):
@@ -48,12 +51,6 @@ def sizes(shape, levels=None):
     while max(found[-1]) > 1:
         found.append(tuple(-(-n // 2) for n in found[-1]))
     return found[:levels]
-
-
-def same_places(output, other):
-    """Whether two runs took everything from the same places, among the same number of candidates."""
-    pairs = zip(output.stages, other.stages, strict=True)
-    return all(np.array_equal(a.source, b.source) and np.array_equal(a.candidates, b.candidates) for a, b in pairs)
 
 
 def ancestors(stage, size, level):
@@ -73,147 +70,6 @@ def test_alpha_0_tiles_the_sample_to_the_bit(dtype, size):
         assert_same_bits(image, np.tile(sample, whole))
         for stage, own in zip(output.stages, reversed(sizes(size)), strict=True):
             assert np.array_equal(stage.source, tiling(stage.source.shape[:2], own))
-
-
-@pytest.mark.parametrize("shape", [(3, 5), (20, 17), (1, 30), (26, 8)], ids=str)
-def test_alpha_0_tiles_the_source_map_of_an_output_of_any_size(shape):
-    _, output = run(texture((13, 7)), shape, alpha=0)
-    assert all((stage.candidates == 1).all() for stage in output.stages)
-    assert np.array_equal(output.source, tiling(shape, (13, 7)))
-
-
-def test_alpha_0_without_phase_keeps_to_one_parent_and_scrambles_its_children():
-    _, output = run(texture((13, 7)), (39, 28), alpha=0, parity="free")
-    above, fine = output.stages[-2:]
-    assert np.array_equal(fine.source // 2, above.source[ancestors(fine, (13, 7), 1)])
-    inside = (fine.source < [12, 6]).all(-1)  # of parents with four children
-    assert (fine.candidates[inside] == 4).all()
-    assert (fine.candidates[(fine.source == [12, 6]).all(-1)] == 1).all()
-    assert chisquare(np.bincount((fine.source % 2 @ [2, 1])[inside])).pvalue > SIGNIFICANCE
-
-
-@pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
-@pytest.mark.parametrize("channels", [None, 3])
-def test_alpha_0_on_an_open_plane_gives_the_sample_itself(size, channels):
-    sample = texture(size, channels)
-    image, output = run(sample, size, alpha=0, boundary="open")
-    assert_same_bits(image, sample)
-    _, output = run(sample, (20, 17), alpha=0, boundary="open")
-    assert np.array_equal(output.source, tiling((20, 17), size))
-
-
-@pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
-@pytest.mark.parametrize("beta", [0, 1])
-def test_infinite_alpha_leaves_nothing_out(size, beta):
-    for parity in ("match", "free"):
-        _, output = run(texture(size), (17, 11), alpha=INF, beta=beta, parity=parity)
-        assert (output.stages[0].candidates == 1).all()
-        for stage in output.stages[1:]:
-            own = sizes(size)[stage.level]
-            for count, place in zip(
-                stage.candidates.ravel(), tiling(stage.candidates.shape, own).reshape(-1, 2), strict=True
-            ):
-                of = [sum(as_large(n, stage.level, k)) for n, k in zip(size, place, strict=True)]
-                assert count == math.prod(of if parity == "match" else own)
-
-
-def test_infinite_alpha_draws_each_band_evenly_and_on_its_own():
-    _, output = run(texture((8, 8)), (64, 64), alpha=INF)
-    fine, above = output.stages[-1].source, output.stages[-2].source
-    assert np.array_equal(fine % 2, tiling((64, 64), (2, 2))), "a pixel's own row and column parity"
-    for p, q in itertools.product(range(2), range(2)):
-        parent = fine[p::2, q::2] // 2
-        assert chisquare(np.bincount((parent @ [4, 1]).ravel(), minlength=16)).pvalue > SIGNIFICANCE
-    of_parent = np.repeat(np.repeat(above, 2, 0), 2, 1) @ [4, 1]
-    pairs = of_parent * 16 + fine // 2 @ [4, 1]
-    assert chisquare(np.bincount(pairs.ravel(), minlength=256)).pvalue > SIGNIFICANCE
-
-
-def border(i, n, torus):
-    """Index i brought to 0 .. n-1."""
-    while not 0 <= i < n:
-        i = i % n if torus or n == 1 else -i if i < 0 else 2 * n - 2 - i
-    return i
-
-
-def halving(n, torus):
-    """Matrix that takes n pixels in a line to half as many."""
-    matrix = np.zeros((-(-n // 2), n))
-    for k in range(len(matrix)):
-        for step, weight in zip(range(-2, 3), (1, 4, 6, 4, 1), strict=True):
-            matrix[k, border(2 * k + step, n, torus)] += weight / 16
-    return matrix
-
-
-def doubling(n, tile, coarse, torus):
-    """Matrix that takes `coarse` pixels in a line to n, in tiles."""
-    matrix = np.zeros((n, coarse))
-    for i in range(n):
-        parent = i // tile * -(-tile // 2) + i % tile // 2
-        for step, weight in [(-1, 1 / 8), (0, 6 / 8), (1, 1 / 8)] if i % tile % 2 == 0 else [(0, 1 / 2), (1, 1 / 2)]:
-            matrix[i, border(parent + step, coarse, torus)] += weight
-    return matrix
-
-
-def expanded(coarse, shape, tile, torus):
-    row, col = (doubling(n, t, m, torus) for n, t, m in zip(shape, tile, coarse.shape, strict=False))
-    return np.einsum("ik,jl,klc->ijc", row, col, coarse)
-
-
-def faded(band, source, torus):
-    """A level's band where pieces that meet fade into each other: nine neighbours say what goes on at a pixel."""
-    made = np.zeros((*source.shape[:2], band.shape[-1]))
-    for pixel in np.ndindex(*source.shape[:2]):
-        for step in itertools.product((-1, 0, 1), repeat=2):
-            shifted = zip(pixel, step, source.shape, strict=False)
-            near = [i + s if torus else min(max(i + s, 0), n - 1) for i, s, n in shifted]
-            back = [k - i for i, k in zip(pixel, near, strict=True)]
-            own = source[near[0] % made.shape[0], near[1] % made.shape[1]]
-            place = tuple(border(k - b, n, torus) for k, b, n in zip(own, back, band.shape, strict=False))
-            made[pixel] += (2 - abs(step[0])) * (2 - abs(step[1])) * band[place] / 16
-    return made
-
-
-def reconstructions(sample, output, torus, blend=True):
-    """The picture of every level, coarsest first: bands in floats, copied as the source maps say, and added up."""
-    gaussian = [sample.astype(float)]
-    while len(gaussian) < len(output.stages):
-        row, col = (halving(n, torus) for n in gaussian[-1].shape[:2])
-        gaussian.append(np.einsum("ki,lj,ijc->klc", row, col, gaussian[-1]))
-    picture = None
-    for stage in output.stages:
-        own = gaussian[stage.level]
-        if picture is not None:
-            shape = own.shape[:2]
-            band = own - expanded(gaussian[stage.level + 1], shape, shape, torus)
-            copied = faded(band, stage.source, torus) if blend else band[tuple(np.moveaxis(stage.source, -1, 0))]
-            picture = copied + expanded(picture, stage.source.shape[:2], shape, torus)
-        else:
-            picture = own[tuple(np.moveaxis(stage.source, -1, 0))]
-        yield picture
-
-
-@pytest.mark.parametrize("boundary", ["torus", "open"])
-@pytest.mark.parametrize(("size", "shape"), [((16, 16), (40, 32)), ((13, 7), (20, 24)), ((9, 22), (4, 30))], ids=str)
-@pytest.mark.parametrize("seams", ["blend", "cut"])
-def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, seams):
-    sample = texture(size, 3)
-    for options in ({}, {"alpha": INF, "parity": "free"}, {"alpha": 1.0}):
-        _, output = run(sample, shape, boundary=boundary, edges="keep", seams=seams, **options)
-        pictures = reconstructions(sample, output, boundary == "torus", seams == "blend")
-        for stage, expected in zip(output.stages, pictures, strict=True):
-            # Half a grey level is the last rounding; those of the levels are 2**-20 of the range each, a few dozen.
-            assert abs(stage.image - np.clip(expected, 0, 255)).max() < 1
-
-
-def test_float_pixels_stay_in_the_samples_range():
-    sample = texture((13, 7), dtype=np.float32)
-    image, output = run(sample, (20, 24), alpha=INF, seams="cut")
-    assert image.dtype == np.float32
-    assert all(sample.min() <= s.image.min() <= s.image.max() <= sample.max() for s in output.stages)
-    [*_, expected] = reconstructions(sample[..., None], output, torus=True, blend=False)
-    beyond = (expected[..., 0] < sample.min()) | (expected[..., 0] > sample.max())
-    assert beyond.any() and np.isin(image[beyond], [sample.min(), sample.max()]).all()
 
 
 def alike(found, each, table):
@@ -275,11 +131,11 @@ def check_candidates(sample, shape, table, **options):
             assert np.array_equal(stage.source % 2, tiling(stage.candidates.shape, own) % 2), "its parity"
 
 
+@pytest.mark.parametrize("alpha", [0, 0.3, 0.77, 1.5, 3.0, INF])
 @given(
     st.tuples(st.integers(1, 14), st.integers(1, 14)),
     st.tuples(st.integers(1, 20), st.integers(1, 20)),
     st.sampled_from([None, 2, 3]),
-    st.sampled_from([0, 0.3, 0.77, 1.5, 3.0, INF]),
     st.sampled_from([0, 0.5, 1]),
     st.fixed_dictionaries(
         {},
@@ -291,34 +147,12 @@ def check_candidates(sample, shape, table, **options):
         },
     ),
 )
-@settings(max_examples=80)
-def test_candidates_are_those_of_the_equations(size, shape, channels, alpha, beta, options):
+@settings(max_examples=16)
+def test_candidates_are_those_of_the_equations(alpha, size, shape, channels, beta, options):
     levels = min(len(sizes(size)), options.get("levels", 30))
     options |= {"levels": levels} if "levels" in options else {}
     table = [[alpha / k**beta] for k in range(1, levels)]
     check_candidates(texture(size, channels), shape, table, alpha=alpha, beta=beta, **options)
-
-
-ALPHAS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.3, 2.0, 4.0, INF]
-
-
-@pytest.mark.parametrize("parity", ["match", "free"])
-def test_candidates_grow_with_alpha_at_every_level(parity):
-    sample = texture((12, 14))
-    found = analyse(REFERENCE, sample[..., None])
-    begins = np.cumsum([0, *(math.prod(size) for size in found.shapes)])
-    lattice = np.array([(*size, begin, 0) for size, begin in zip(found.shapes, begins, strict=False)], np.int32)
-    nodes = lattice - [[0, 0, begins[1], 0]]
-    before = np.zeros(begins[-1])
-    for alpha in ALPHAS:
-        structure = Structure(found.features, differences(found, multires.Options(alpha=alpha)), nodes)
-        counts = np.ones((begins[-1], 2), np.int32)
-        for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
-            source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
-            sampled = Sampled(source, counts, lattice)
-            candidates(REFERENCE, structure, sampled, level, range(math.prod(size)), parity == "match", 1)
-        assert (counts[:, 0] >= before).all()
-        before = counts[:, 0]
 
 
 @pytest.mark.parametrize("beta", [0, 0.5, 1, 2.5])
@@ -331,35 +165,12 @@ def test_thresholds_are_alpha_over_the_number_of_the_level_from_the_top(levels, 
     assert table[-1] == 0.3
 
 
-DARK = texture((13, 12)) // 2
-SCALED = {
-    "uint8 + 100": DARK + 100,
-    "uint8 * 2 + 1": DARK * 2 + 1,
-    "uint16": DARK.astype(np.uint16) * 257 + 3,
-    "int16, negative": DARK.astype(np.int16) * 7 - 3000,
-    "int64": DARK.astype(np.int64) * 2**40 - 2**50,
-    "float32": DARK.astype(np.float32) * np.float32(2**-9) - np.float32(0.5),
-    "float64": DARK * 0.1 - 7.3,
-    "float64, large": DARK * 1e300,
-}
-
-
-@pytest.mark.parametrize("name", SCALED)
-def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
-    for options in ({}, {"alpha": 0.8, "beta": 1}, {"parity": "free", "boundary": "open"}):
-        _, output = run(DARK, (20, 22), **options)
-        image, other = run(SCALED[name], (20, 22), **options)
-        assert image.dtype == SCALED[name].dtype
-        assert same_places(output, other)
-        assert output.statistics["options"]["alpha"] == other.statistics["options"]["alpha"]
-
-
 def test_equal_channels_are_as_good_as_one():
     grey = texture((13, 12))
     image, output = run(grey, (20, 22), alpha=0.6)
     for count in (1, 2, 3):
         many, other = run(np.repeat(grey[..., None], count, -1), (20, 22), alpha=0.6)
-        assert same_places(output, other)
+        assert_same_bits(other.source, output.source)
         assert_same_bits(many, np.ascontiguousarray(np.repeat(image[..., None], count, -1)))
 
 
@@ -371,15 +182,7 @@ def test_a_large_beta_is_no_more_than_strict(beta):
     table = thresholds(11, 0.3, beta)
     assert table[-1] == 0.3, "k is 1 at the top"
     assert (np.diff(table) >= 0).all() and (table >= 0).all() and np.isfinite(table).all()
-    assert np.isinf(thresholds(11, inf, beta)).all()
-
-
-def test_numbers_of_any_kind_are_thresholds():
-    sample, options = texture((13, 9)), {"method": "multires", "rng": 1, "device": "reference"}
-    plain = simdtex.synthesize(sample, (12, 14), alpha=0.25, beta=0.75, **options)
-    for kind in (Fraction, np.float32, np.float64):
-        other = simdtex.synthesize(sample, (12, 14), alpha=kind(0.25), beta=kind(0.75), **options)
-        assert_same_bits(other, plain)
+    assert np.isinf(thresholds(11, INF, beta)).all()
 
 
 @pytest.mark.parametrize("name", ["alpha", "beta"])
@@ -532,16 +335,13 @@ def test_the_source_map_is_of_the_sample_as_given(boundary):
     assert_same_bits(output.stages[-1].source, output.source)
 
 
-@pytest.mark.parametrize("alpha", [0.3, 0.1])
-def test_a_texture_tiles_and_shows_no_lines(alpha):
-    names = ("gravel", "grass", "coffee")
-    plain = {"edges": "keep", "seams": "cut"}
-    pictures = {n: run_mending(PHOTOGRAPHS[n], 2 * len(PHOTOGRAPHS[n]), alpha=alpha) for n in names}
-    before = {n: run_mending(PHOTOGRAPHS[n], 2 * len(PHOTOGRAPHS[n]), alpha=alpha, **plain) for n in names}
-    assert np.median([seam(picture) for picture in before.values()]) > 1.3
-    assert 0.85 < np.median([seam(picture) for picture in pictures.values()]) < 1.15
+def test_a_texture_tiles_and_shows_no_lines():
+    samples, plain = [PHOTOGRAPHS[name] for name in ("gravel", "grass", "coffee")], {"edges": "keep", "seams": "cut"}
+    pictures, before = ([run_mending(one, 2 * len(one), alpha=0.3, **how) for one in samples] for how in ({}, plain))
+    assert np.median([seam(picture) for picture in before]) > 1.3
+    assert 0.85 < np.median([seam(picture) for picture in pictures]) < 1.15
     for period in (8, 16, 32):
-        assert 0.9 < np.median([lines(picture, period) for picture in pictures.values()]) < 1.06
+        assert 0.9 < np.median([lines(picture, period) for picture in pictures]) < 1.06
 
 
 def test_blending_takes_nothing_from_elsewhere():
@@ -551,3 +351,162 @@ def test_blending_takes_nothing_from_elsewhere():
     assert_same_bits(one.source, two.source)
     assert (cut != blend).any()
     assert max(lines(blend, 8), lines(blend, 16)) < max(lines(cut, 8), lines(cut, 16))
+
+
+# -- What the method takes, and what it says along the way.
+
+
+def tiled(sample, shape):
+    """The beginning of so many repetitions of a sample as fill a shape."""
+    row, col = (np.arange(n) % m for n, m in zip(shape, sample.shape, strict=False))
+    return sample[np.ix_(row, col)]
+
+
+def halved(n, tile, times):
+    """Pixels in a line at a level of an output that is made of tiles: each is halved and rounded up on its own."""
+    whole, rest = divmod(n, tile)
+    for _ in range(times):
+        tile, rest = -(-tile // 2), -(-rest // 2)
+    return whole * tile + rest
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_channel_axis_is_kept(axis):
+    last = texture((9, 10), 3)
+    image, output = run(np.moveaxis(last, -1, axis), (12, 17), channel_axis=axis)
+    expected, other = run(last, (12, 17))
+    assert_same_bits(np.ascontiguousarray(np.moveaxis(image, axis, -1)), expected)
+    for ours, theirs in zip(output.stages, other.stages, strict=True):
+        assert np.array_equal(np.moveaxis(ours.image, axis, -1), theirs.image)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (2, 2), (3, 3), (4, 4)], ids=str)
+def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
+    sample = texture(size, 3)
+    for options in ({"alpha": 0}, {}, {"parity": "free"}, {"boundary": "open", "alpha": INF}):
+        caplog.clear()
+        image, output = run(sample, (10, 15), **options)
+        assert image.shape == (10, 15, 3)
+        assert min(stage.candidates.min() for stage in output.stages) >= 1
+        told = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+        assert len(told) == (size != (1, 1)), "where there are no candidates, nothing is missed"
+        assert all(f"{size[0]} rows x {size[1]} columns" in note and "3 x 3" in note for note in told)
+    image = synthesize(sample, (3 * size[0], 2 * size[1]), alpha=0)
+    assert_same_bits(image, np.tile(sample, (3, 2, 1)))
+
+
+def test_a_constant_sample_gives_a_constant():
+    for dtype in (np.uint8, np.uint16, np.float64, np.bool_):
+        for options in ({"alpha": 0}, {"alpha": INF}):
+            image, output = run(np.ones((6, 8), dtype), (9, 20), **options)
+            assert_same_bits(image, np.ones((9, 20), dtype))
+            assert (output.stages[-1].candidates == 12).all(), "nothing tells one node from another"
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300, 8e307])
+def test_float_pixels_of_any_magnitude(scale):
+    sample = texture((9, 10), dtype=np.float64) * scale
+    assert_same_bits(synthesize(sample, (18, 10), alpha=0), np.tile(sample, (2, 1)))
+    image = synthesize(sample, (18, 10), alpha=INF)
+    assert sample.min() <= image.min() < image.max() <= sample.max()
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.int8])
+def test_integer_pixels_of_any_magnitude(dtype):
+    bounds = np.iinfo(dtype)
+    sample = texture((9, 10), dtype=dtype)
+    sample[4, 4:6] = bounds.min, bounds.max
+    assert_same_bits(synthesize(sample, (18, 10), alpha=0), np.tile(sample, (2, 1)))
+    assert synthesize(sample, (18, 10), alpha=INF).dtype == dtype
+
+
+@pytest.mark.parametrize(("shape", "boundary"), [((20, 30), "torus"), ((5, 3), "open")], ids=str)
+def test_one_level_is_a_tiling(shape, boundary):
+    sample = texture((13, 7), 3, np.float32)
+    image, output = run(sample, shape, levels=1, boundary=boundary, alpha=INF)
+    assert_same_bits(image, tiled(sample, shape))
+    [stage] = output.stages
+    assert (stage.candidates == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("size", "shape", "levels"), [((13, 7), (20, 17), None), ((16, 8), (39, 21), 2), ((3, 20), (2, 50), None)], ids=str
+)
+def test_the_stages_are_the_levels_of_every_tile_coarsest_first(size, shape, levels):
+    sample = texture(size, 2, np.uint16)
+    image, output = run(sample, shape, levels=levels)
+    count = levels or 1 + math.ceil(math.log2(max(size)))
+    assert [stage.level for stage in output.stages] == list(reversed(range(count)))
+    for stage in output.stages:
+        own = tuple(halved(n, m, stage.level) for n, m in zip(shape, size, strict=True))
+        assert (stage.image.shape, stage.image.dtype) == ((*own, 2), np.uint16)
+        assert (stage.source.shape, stage.source.dtype) == ((*own, 2), np.int32)
+        assert stage.candidates.shape == own
+        assert np.issubdtype(stage.candidates.dtype, np.integer)
+    assert_same_bits(output.stages[-1].image, image)
+    assert_same_bits(output.stages[-1].source, output.source)
+    assert output.temperature is None
+
+
+@pytest.mark.parametrize("alpha", [0.5, INF])
+def test_the_statistics_count_what_was_done(alpha):
+    sample = texture((13, 7))
+    _, output = run(sample, (20, 17), alpha=alpha, rng=7)
+    told = output.statistics
+    assert (told["device"], told["seed"], told["device_seconds"]) == (REFERENCE.name, 7, None)
+    assert set(told["options"]) == {option.name for option in fields(multires.Options)}
+    assert told["options"]["alpha"] == alpha
+    assert told["options"]["levels"] == 5
+    assert [level["level"] for level in told["levels"]] == [4, 3, 2, 1, 0]
+    nodes = [0, 1, 1 + 2, 1 + 2 + 8, 1 + 2 + 8 + 28]
+    assert [level["nodes"] for level in told["levels"]] == nodes
+    for level, stage in zip(told["levels"], output.stages, strict=True):
+        assert (level["rows"], level["cols"]) == stage.candidates.shape
+        assert level["most"] == stage.candidates.max()
+        assert level["candidates"] == stage.candidates.mean()
+        if alpha == INF:
+            assert level["compared"] == level["nodes"]
+        assert stage.level == 4 or 1 <= level["compared"] <= level["nodes"]
+        assert level["seconds"] >= 0
+    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
+    last = texture((13, 7), None if axis is None else 3)
+    sample, seen = last if axis is None else np.moveaxis(last, -1, axis), []
+
+    def look(progress):
+        seen.append((progress, progress.image(), progress.candidates()))
+
+    whole, output = run(sample, (40, 30), channel_axis=axis)
+    monkeypatch.setattr("simdtex.methods.multires.analysis.LAUNCH", 1)  # so that levels come in pieces
+    image = synthesize(sample, (40, 30), channel_axis=axis, callback=look)
+    assert_same_bits(image, whole)
+    fractions = [progress.fraction for progress, *_ in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[0] > 0
+    assert fractions[-1] == 1
+    ends = [progress.level for progress, *_ in seen if progress.stage]
+    assert ends == [4, 3, 2, 1, 0], "one end for each"
+    assert len(seen) > 2 * len(ends)
+    stages = {stage.level: stage for stage in output.stages}
+    for progress, picture, candidates in seen:
+        assert progress.levels == 5
+        shown = stages[progress.level + (progress.stage is None)]  # else the level before
+        assert_same_bits(picture, shown.image)
+        assert_same_bits(candidates, shown.candidates)
+        assert progress.doing == f"level {progress.level}"
+        assert progress.stage in (None, f"level{progress.level}")
+        [marks] = progress.maps().values()
+        assert marks.shape == candidates.shape and 0 <= marks.min() <= marks.max() <= 1
+
+
+@pytest.mark.parametrize("shape", [(2**31, 2**31), (1, 2**31), (2**70, 1), (2**16, 2**15)], ids=str)
+def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("worked")
+
+    monkeypatch.setattr("simdtex.methods.multires.algorithm.analyse", never)
+    with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
+        synthesize(texture((13, 7)), shape)

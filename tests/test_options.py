@@ -50,26 +50,6 @@ def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name
             assert name.rstrip("s") in text or "array" in text, text
 
 
-NUMBERS = ("order", "bandwidth", "coherence", "balance", "structure", "novelty", "finish", "xi", "data_weight")
-COUNTS = ("levels", "overview", "free_sweeps", "chance", "coarse_chance")
-TOO_MUCH = {
-    **{f"mrf {name}": ("mrf", {name: 2**31}) for name in (*NUMBERS[:-1], *COUNTS)},
-    **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight")},
-    "xi": ("mrf", {"xi": -3e6}),
-    "a finish of next to nothing": ("mrf", {"finish": 1e-320}),
-    "beta": ("multires", {"beta": 1e308}),
-    "orientations": ("multires", {"orientations": 65}),
-    "iterations": ("pyramid", {"iterations": 2**31}),
-}
-
-
-@pytest.mark.parametrize("case", TOO_MUCH)
-def test_what_is_beyond_a_range_is_refused(case):
-    method, given = TOO_MUCH[case]
-    with pytest.raises(ValueError, match=r"^\w+ is .*; give "):
-        simdtex.synthesize(SAMPLE, (5, 5), method=method, device="reference", rng=1, **given)
-
-
 LARGEST = {
     "mrf": {
         **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},

@@ -391,7 +391,7 @@ def test_the_worst_is_far_from_what_is_best(study):
         ]
     )
     assert {figure: worst[2] for figure, worst in found.items()} == {
-        **{"salt": "a", "coverage": "b", "effective_share": "b"},
+        **{"salt": "a", "coverage": "b", "effective_share": "b"}
     }
     assert found["salt"][:2] == (1.625, 0.25)
 

@@ -8,9 +8,8 @@ from scipy import ndimage
 
 import simdtex
 from simdtex.model import regularity
-from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
-from simdtex.model.regularity import Lattice, Phases, aligned, harmonics, parse_lattice, phases, plain, regular
+from simdtex.model.regularity import Lattice, aligned, harmonics, parse_lattice, phases, plain, regular
 from simdtex.options import resolve
 
 BASES = {
@@ -152,39 +151,6 @@ def test_what_does_not_fit_is_left_alone_or_refused():
         phases(pictures, (30, 200), True, lattice)
 
 
-def guide_of(lattice, height=100.0, shape=(24, 30)):
-    """The levels of a guide whose sample and output have one lattice, and its lattice."""
-    return regularity.Waves((lattice,), lattice, 1.0, height), Grid.of(shape, torus=False)
-
-
-def test_pixels_a_lattice_vector_apart_have_one_phase():
-    waves, grid = guide_of(Lattice((6, 3), (-2, 8), (0.7, 1.9)))
-    levels = waves.at(grid)
-    assert (levels[:, 6:, 3:] == levels[:, :-6, :-3]).all()
-    assert (levels[:, 2:, :-8] == levels[:, :-2, 8:]).all()
-    assert (levels == waves.sample(0, *np.indices((24, 30)))).all()
-    assert len(np.unique(levels.reshape(4, -1), axis=1).T) == 54, "and pixels of one cell all differ"
-
-
-def test_a_window_and_a_coarse_level_have_the_phases_of_the_whole():
-    waves, grid = guide_of(Lattice((6.3, 3), (-2, 8.2)))
-    levels = waves.at(grid)
-    assert (waves.at(Grid.of((24, 30), 4, False)) == levels[:, ::4, ::4]).all()
-    torus = Grid.of((24, 30), 2)
-    window = torus.window(9, 13, 6, 4)
-    rows, cols = np.arange(9, 15) % 12 * 2, np.arange(13, 17) % 15 * 2
-    assert (waves.at(window) == levels[:, rows[:, None], cols]).all()
-
-
-@pytest.mark.parametrize(("spread", "top", "height"), [(800.0, 4095, 20.0), (800.0, 30, 15.0)])
-def test_the_guide_has_the_variance_of_the_pixels(spread, top, height):
-    lattice = Lattice((8, 0), (0, 8))
-    waves = Phases((lattice,), lattice).waves(spread, top)
-    assert waves.height == height
-    total = waves.sample(0, *np.indices((64, 64))).reshape(4, -1).var(1).sum()
-    assert total == pytest.approx(2 * height**2, rel=0.05)
-
-
 @pytest.mark.parametrize("moved", [(0, 0), (3.3, 0), (5.2, 9.1), (-4.1, 2.2)])
 def test_pictures_are_brought_into_phase(moved):
     lattice = Lattice((11, 2), (-3, 13))
@@ -265,11 +231,11 @@ def in_phase(source, site, lattice, fitted, within):
 
 
 def test_a_regular_sample_is_repeated_without_a_fault():
-    shape, lattice = (48, 54), found_in(BRICK)
+    shape, lattice = (32, 36), found_in(BRICK)
     share, sites = {}, np.indices(shape).reshape(2, -1)
     for how in ("auto", "none"):
         options = {"lattice": how, "order": 8, "device": REFERENCE, "full_output": True}
-        runs = [simdtex.synthesize(BRICK[..., 0], shape, rng=rng, **options)[1] for rng in range(3)]
+        runs = [simdtex.synthesize(BRICK[..., 0], shape, rng=rng, **options)[1] for rng in range(2)]
         share[how] = np.mean([in_phase(one.source, sites, lattice, lattice.fitted(shape), 0.125) for one in runs])
     assert share["auto"] > 0.95 > 0.5 > share["none"]
 
@@ -318,13 +284,6 @@ def test_categories_and_densities_have_none():
     for given in ({"categorical": True}, {"pixel": "density", "relaxation": "gibbs"}):
         chosen = options(lattice="4,0,0,4", **given)
         assert chosen.resolved(chosen.of(pictures)).lattice == "none"
-
-
-def test_what_half_a_step_is_apart_costs_nothing():
-    lattice = Lattice((12, 1), (-3, 9), (2.5, 4.5))
-    waves = regularity.Waves((lattice,), lattice, 1.0, 1e4)
-    here = waves.sample(0, np.array([5.0, 7.0, 5.0]), np.array([6.0, 6.0, 8.0])).astype(float)
-    assert waves.half(4) == pytest.approx(((here[:, 1:] - here[:, :1]) ** 2).sum(0).mean(), rel=1e-3)
 
 
 def test_seeds_do_not_make_one_picture():

@@ -22,21 +22,15 @@ from simdtex.model.display import source_colours, temperature_colours, use_colou
 from simdtex.model.regularity import lattice_sentence
 from simdtex.model.source_map import counts, effective_use
 from simdtex.report import ensemble as report_ensemble
-from simdtex.report import sheet, synthesis
+from simdtex.report import sheet
 from simdtex.report.ensemble import write_ensemble
-from simdtex.report.page import Figure, Section, check_folder, figure_png, new_figure, tidy, write_report
+from simdtex.report.page import Figure, Section, check_folder, write_report
 from simdtex.report.sheet import GAP, STRIP, StageWriter, view
-from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
+from simdtex.report.synthesis import FRAME, _use, use_sentences
 from simdtex.report.tables import Table, duration_text, number_text, print_table
 from simdtex.run import Progress
 
 # -- Reports: a self-contained page, its pictures as files, valid numbers; tables of pages and terminals.
-
-
-def png(side=5):
-    buffer = io.BytesIO()
-    PIL.Image.fromarray(np.arange(side * 3 * 3, dtype=np.uint8).reshape(side, 3, 3)).save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 def picture(side=5):
@@ -45,10 +39,7 @@ def picture(side=5):
 
 NUMBERS = Table(
     "Numbers",
-    [
-        {"Name": "<a>", "Mark": "breaks (14)", "Figure": "1.5 ± 0.2"},
-        {"Name": "b", "Mark": "keeps (14)", "Figure": "2"},
-    ],
+    [{"Name": "<a>", "Mark": "breaks (14)", "Figure": "1.5 ± 0.2"}, {"Name": "b", "Mark": "keeps (14)", "Figure": "2"}],
     "note",
 )
 
@@ -173,18 +164,6 @@ def test_nothing_is_left_of_a_report_that_fails(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
-def test_plots_have_the_same_bytes_every_time():
-    def drawn():
-        plot = new_figure(3, 2)
-        axes = plot.subplots()
-        axes.plot([1, 3, 2])
-        tidy(axes, "title", "x", "y")
-        return figure_png(plot)
-
-    assert drawn() == drawn()
-    assert PIL.Image.open(io.BytesIO(drawn())).info.keys() == {"dpi"}
-
-
 @pytest.mark.parametrize(
     ("given", "text"),
     [
@@ -240,23 +219,6 @@ def test_a_row_of_a_sheet_is_as_high_as_its_pictures():
     assert len(laid) == sheet.GAP + 3 * (sheet.STRIP + sheet.GAP) + 350
     assert contains(laid, sheet.rgb(high))
     assert len(sheet.contact_sheet([("a", low), ("b", high)], columns=2)) == 2 * sheet.GAP + sheet.STRIP + 150
-
-
-def test_a_scale_neither_fits_nor_smooths():
-    rng = np.random.default_rng(1)
-    small, large = (rng.integers(0, 256, (3, side, 3), dtype=np.uint8) for side in (20, 1100))
-    pictures = [("small", small), ("large", large)]
-    as_they_are = sheet.contact_sheet(pictures, columns=1, scale=1)
-    assert contains(as_they_are, small) and contains(as_they_are, large)
-    fitting = sheet.contact_sheet(pictures, columns=1)
-    assert not contains(fitting, small) and not contains(fitting, large)
-    assert contains(sheet.contact_sheet(pictures, scale=2), sheet.magnified(small, 2))
-
-
-def test_encoded_is_a_png_of_the_picture():
-    picture = np.random.default_rng(2).integers(0, 256, (5, 7, 3), dtype=np.uint8)
-    with PIL.Image.open(io.BytesIO(sheet.encoded(picture))) as read:
-        np.testing.assert_array_equal(np.asarray(read), picture)
 
 
 def test_contact_sheet_errors(tmp_path):
@@ -449,44 +411,6 @@ def test_pictures_of_use_show_the_map_the_frame_and_the_arrangement():
     assert stands_in(used, use_colours(counts(source, (130, 132)))[20:])  # below the frame
 
 
-def test_what_is_counted_part_by_part_is_that_of_the_whole(monkeypatch):
-    """A map of 40 x 37 windows: those that cross from one piece into the other are no piece of the sample."""
-    source = np.moveaxis(np.indices((55, 52)), 0, -1).astype(np.int32)
-    source[:, 30:] += 3, 5
-    whole = {}
-    for part in (1024, 20, 7):
-        monkeypatch.setattr(sheet, "PART", part)
-        whole[part] = synthesis._counted(source, (60, 60))
-        assert whole[part][0].tolist() == counts(source, (60, 60)).tolist()
-    assert {copied for _, copied in whole.values()} == {(37 - 15) / 37}
-    assert synthesis._counted(source[:15], (60, 60))[1] is None
-
-
-@pytest.mark.parametrize(("rows", "cols"), [(50, 61), (20, 9), (3, 128)])
-def test_a_picture_that_is_read_part_by_part_is_reduced_as_a_whole(monkeypatch, rows, cols):
-    monkeypatch.setattr(sheet, "MOST_SIDE", 20)
-    monkeypatch.setattr(sheet, "PART", 16)
-    picture = np.random.default_rng(1).integers(0, 256, (rows, cols, 3)).astype(np.uint8)
-    sizes = []
-
-    def show(part):
-        sizes.append(max(part.shape[:2]))
-        return part
-
-    np.testing.assert_array_equal(sheet.read_fitted(picture, show), sheet.fitted(picture, 20))
-    assert max(sizes) <= 16
-
-
-def test_the_frame_is_around_the_piece():
-    picture = np.zeros((40, 60, 3), np.uint8)
-    _frame(picture, {"row": 2, "col": 5, "rows": 3, "cols": 4}, 4)
-    framed = (picture == FRAME).all(axis=-1)
-    expected = np.zeros((40, 60), bool)
-    expected[8:20, 20:36] = True
-    expected[9:19, 21:35] = False
-    np.testing.assert_array_equal(framed, expected)
-
-
 @pytest.mark.parametrize("method", OPTIONS)
 def test_a_report(folder, method):
     options = [word for name, value in OPTIONS[method].items() for word in (f"--{name}", value)]
@@ -518,14 +442,7 @@ def test_a_method_without_sources_has_a_report_without_them(folder):
 
 # -- The report of an ensemble says what the figures say.
 
-ALWAYS = {
-    "index.html",
-    "results.json",
-    "realisations.png",
-    "maps.png",
-    "entropy.png",
-    "variograms.png",
-}
+ALWAYS = {"index.html", "results.json", "realisations.png", "maps.png", "entropy.png", "variograms.png"}
 COPIES = {"copies.png"}  # where images hold a window
 OF_CATEGORIES = {"connectivity.png"}
 

@@ -1,19 +1,17 @@
 """The sample: its pictures, their gaps and categories, working levels, integers without contrast, and colours."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import plain_pyramid as plain
 import pytest
 from cases import assert_same_bits, texture
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tolerances import CONTRAST, DECORRELATED, DIRECTION
 
 from simdtex.methods.pyramid.palette import FLAT, decorrelated, palette
-from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Pictures, completed, unknown_in
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.scale import Scale, highest, stretch
 from simdtex.model.stretched import LUMA, TOP, Stretched
@@ -26,33 +24,12 @@ def line(*values, dtype=np.float32):
     return np.array(values, dtype)[None, :, None]
 
 
-def test_unknown_is_nan_in_any_channel():
-    picture = np.zeros((2, 3, 2))
-    picture[0, 1, 1] = picture[1, 2, 0] = np.nan
-    assert np.argwhere(unknown_in(picture)).tolist() == [[0, 1], [1, 2]]
-    assert not unknown_in(picture.astype(np.float32)[..., :0]).any()
-    assert not unknown_in(np.zeros((2, 3, 1), np.uint8)).any()
-
-
 def test_a_gap_is_completed_by_the_nearest_known_pixel():
     pictures = Pictures((line(1, np.nan, np.nan, np.nan, 9),))
     assert pictures.pixels[0].ravel().tolist()[:2] == [1, 1]
     assert pictures.pixels[0].ravel().tolist()[3:] == [9, 9]
     assert pictures.known[0].tolist() == [[True, False, False, False, True]]
     assert pictures.values(0, 0).tolist() == [1, 9]
-
-
-@given(st.integers(0, 2**16), st.integers(1, 9), st.integers(1, 9))
-@settings(max_examples=30)
-def test_no_known_pixel_is_nearer_than_the_one_taken(seed, rows, cols):
-    rng = np.random.default_rng(seed)
-    picture, gap = rng.permutation(rows * cols).reshape(rows, cols, 1), rng.random((rows, cols)) < 0.7
-    gap.flat[0] = False
-    found = completed(picture, gap)
-    place = {int(picture[i, j, 0]): (i, j) for i, j in np.ndindex(rows, cols) if not gap[i, j]}
-    for i, j in np.ndindex(rows, cols):
-        k, m = place[int(found[i, j, 0])]
-        assert (k - i) ** 2 + (m - j) ** 2 == min((a - i) ** 2 + (b - j) ** 2 for a, b in place.values())
 
 
 def test_what_is_said_to_be_unknown_is_so_beside_nan():
@@ -62,28 +39,6 @@ def test_what_is_said_to_be_unknown_is_so_beside_nan():
     assert pictures.pixels[0].ravel().tolist()[::2] == [5, 7]
     with pytest.raises(ValueError, match="no known pixel"):
         Pictures((line(np.nan, np.nan),))
-
-
-def test_a_copy_with_other_weights_has_the_same_gaps():
-    pictures = replace(Pictures((line(1, np.nan, 3),)), weights=(2.0,))
-    assert pictures.known[0].tolist() == [[True, False, True]]
-
-
-def test_clean_is_one_picture_all_known_and_all_usable():
-    one = line(1, 2)
-    assert Pictures((one,)).clean
-    assert not Pictures((one, one)).clean
-    assert not Pictures((one,), usable=(np.array([[True, True]]),)).clean
-    assert not Pictures((line(1, np.nan),)).clean
-
-
-def test_categories_are_those_of_all_pictures_that_are_known():
-    pictures = Pictures((line(3, np.nan, 1), line(7, 3)), categorical=(True,))
-    assert pictures.categories(0).tolist() == [1, 3, 7]
-    assert pictures.channels == 3
-    assert Pictures((line(3, 7),), categorical=(True,)).channels == 1, "of two, one says which"
-    assert Pictures((line(3, 3),), categorical=(True,)).channels == 1
-    assert Pictures((line(3, 4, 5),)).categories(0) is None
 
 
 def two(step=2, margin=2, apart=0):
@@ -112,56 +67,6 @@ def test_places_and_pixel_indices_are_each_others_inverse():
     assert sample.picture_of(index[:4]).tolist() == [0, 0, 1, 1]
 
 
-@pytest.mark.parametrize("edges", ["whole", "reflect", "auto"])
-@pytest.mark.parametrize(("spacing", "phases"), [(1, "all"), (2, "all"), (2, "decimated")])
-def test_candidates_are_those_of_each_picture_alone(edges, spacing, phases):
-    rng = np.random.default_rng(1)
-    masks = [rng.random((7, 8)) < 0.7, rng.random((9, 6)) < 0.7]
-    pictures = [rng.integers(0, 9, (*mask.shape, 1)).astype(np.uint8) for mask in masks]
-    sample = Sample(Pictures(tuple(pictures), usable=tuple(masks)), 8, 2, step=2)
-    offsets, step = neighbourhood_offsets(1), 1 if phases == "all" else spacing
-    found = [tuple(p) for p in sample.place(sample.places(offsets, spacing, phases, edges).positions).tolist()]
-    every = [(i, j, n) for n, mask in enumerate(masks) for i, j in np.ndindex(mask.shape) if mask[i, j]]
-    every = [(i, j, n) for i, j, n in every if i % step == j % step == 0]
-    whole = [
-        (i, j, n)
-        for i, j, n in every
-        if all(spacing <= x < side - spacing for x, side in zip((i, j), masks[n].shape, strict=True))
-    ]
-    all_of_them = edges == "reflect" or (edges == "auto" and (spacing > 1 or len(whole) < 0.75 * len(every)))
-    assert found == (every if all_of_them else whole)
-
-
-def test_a_candidate_knows_enough_of_its_neighbours(monkeypatch):
-    known = np.ones((9, 9), bool)
-    known[4, 4] = known[4, 5] = False
-    pixels = (np.zeros((9, 9, 1), np.uint8),)
-    offsets = neighbourhood_offsets(1)
-    found = {}
-    for unsure in (0.0, 0.25, 0.5):
-        monkeypatch.setattr("simdtex.model.sample.UNSURE", unsure)
-        sample = Sample(Pictures(pixels, unknown=(~known,)), 4, 1)
-        found[unsure] = {tuple(p) for p in sample.place(sample.places(offsets, 1, "all", "reflect").positions).tolist()}
-    everywhere = {(i, j) for i, j in np.ndindex(9, 9) if known[i, j]}
-    beside = {(3, 4), (5, 4), (4, 3), (3, 5), (5, 5), (4, 6)}  # each sees one of the two
-    assert found == {0.0: everywhere - beside, 0.25: everywhere, 0.5: everywhere}
-
-
-def test_what_is_fair_is_in_proportion_to_shares():
-    offsets = neighbourhood_offsets(1)
-    where = (offsets, 1, "all", "reflect")
-    first, second = np.zeros((4, 5, 1), np.uint8), np.zeros((8, 5, 1), np.uint8)
-    sample = Sample(Pictures((first, second), shares=(3.0, 1.0)), 4, 1)
-    places = sample.places(*where)
-    fair, picture = sample.fair(places), sample.picture_of(places.everywhere)
-    assert fair[picture == 0].sum() == pytest.approx(3 * fair[picture == 1].sum(), rel=1e-4)
-    assert (fair > 0).sum() == 60
-    several, one = Sample(Pictures((first, second)), 4, 1), Sample(Pictures((first,)), 4, 1)
-    alike = several.fair(several.places(*where))
-    assert sorted(set(alike.tolist())) == [0, 1]
-    assert one.fair(one.places(*where)) is None
-
-
 # -- From pixels to working levels, with weights and categories.
 
 
@@ -170,13 +75,6 @@ def scale(*variables, values=64, **kinds):
     pixels = np.stack([np.asarray(v) for v in variables], -1)[None]
     found = Scale(Pictures((pixels,), **kinds), values)
     return found, found.levels(pixels)[:, 0]
-
-
-def test_eight_bits_are_their_own_levels():
-    found, levels = scale(np.uint8([3, 255, 0]), np.uint8([9, 9, 9]))
-    assert levels.tolist() == [[3, 255, 0], [9, 9, 9]]
-    assert (found.top, found.unit, found.direct, found.owners) == (255, 1.0, True, [0, 1])
-    assert found.units.tolist() == [1, 1]
 
 
 @pytest.mark.parametrize(("values", "top"), [(1, 4095), (2**9, 4095), (2**11, 2047), (2**13, 1023)])
@@ -189,71 +87,12 @@ def test_the_highest_level_keeps_sums_exact(values, top):
     assert levels.tolist() == [[0, top, round(top / 2)]]
 
 
-def test_channels_on_one_scale_keep_their_differences():
-    found, levels = scale(np.float64([0, 100]), np.float64([40, 60]))
-    assert levels.tolist() == [[0, 4095], [round(0.4 * 4095), round(0.6 * 4095)]]
-    assert found.unit == pytest.approx(100 / 4095)
-    assert found.levels(np.float64([[[-5, 500]]]))[:, 0, 0].tolist() == [0, 4095], "beyond the range, the nearest"
-
-
 def test_integers_are_stretched_exactly():
     low = np.iinfo(np.int64).min
     levels, unit = stretch(np.array([low, 0, -low - 1], np.int64), 4)
     assert levels.tolist() == [0, 2, 4]
     assert unit == 2.0**62
     assert stretch(np.uint8([7, 7]), 10)[0].tolist() == [0, 0]
-
-
-def test_weighted_variables_have_the_same_spread_times_their_weight():
-    rng = np.random.default_rng(1)
-    wide, narrow = rng.normal(size=400) * 1e6, rng.normal(size=400) * 1e-3
-    found, levels = scale(wide, narrow, weights=(1.0, 2.0))
-    one, two = levels.astype(float).std(1)
-    assert two == pytest.approx(2 * one, rel=2e-3)
-    assert levels.max() == found.top
-    assert not found.direct
-    assert found.units * levels.astype(float).std(1) == pytest.approx([wide.std(), narrow.std()], rel=2e-3)
-    _, alone = scale(wide, narrow, weights=(0.0, 1.0))
-    assert not alone[0].any()
-
-
-def test_a_variable_that_never_varies_has_no_levels():
-    found, levels = scale(np.float32([5, 5, 5]), np.float32([1, 2, 3]), weights=(1.0, 1.0))
-    assert levels[0].tolist() == [0, 0, 0]
-    assert levels[1].tolist() == [0, round(found.top / 2), found.top]
-    assert found.units[0] == 0
-
-
-def test_any_two_categories_differ_alike():
-    found, levels = scale(np.int32([7, 7, 90, 31, 7]), categorical=(True,))
-    assert found.owners == [0, 0, 0]
-    high = found.top
-    assert levels.tolist() == [[high, high, 0, 0, high], [0, 0, 0, high, 0], [0, 0, high, 0, 0]], "in ascending order"
-    assert found.units.tolist() == [0, 0, 0]
-
-
-def test_two_categories_are_one_channel_and_one_is_nothing():
-    found, levels = scale(np.int32([7, 90, 7]), categorical=(True,))
-    assert levels.tolist() == [[0, found.top, 0]]
-    assert scale(np.int32([7, 7]), categorical=(True,))[1].tolist() == [[0, 0]]
-
-
-@pytest.mark.parametrize("kinds", [2, 3, 4])
-def test_two_pixels_differ_as_much_in_a_category_as_in_a_number(kinds):
-    """By two variances, on average."""
-    rng = np.random.default_rng(kinds)
-    category, number = rng.integers(0, kinds, 600), rng.normal(size=600)
-    found, levels = scale(category.astype(float), number, categorical=(True, False))
-    squares = (levels[:, :, None].astype(float) - levels[:, None, :]) ** 2
-    own = np.array(found.owners)
-    assert squares[own == 0].sum(0).mean() == pytest.approx(squares[own == 1].sum(0).mean(), rel=1e-2)
-
-
-def test_unknown_pixels_tell_nothing():
-    pixels = np.float32([[[0.0], [np.nan], [2.0]]])
-    far = np.where(np.isnan(pixels), 1e9, pixels)
-    told = Scale(Pictures((far,), unknown=(np.isnan(pixels)[..., 0],)), 64)
-    assert told.levels(pixels[:, ::2])[0, 0].tolist() == [0, 4095]
 
 
 # -- The sample in integers that do not depend on its contrast, and the way back.
@@ -387,24 +226,6 @@ def test_a_copied_zero_keeps_its_sign(zero):
     assert_same_bits(sample.picture(sample.planes, identity((1, 2))), pixels)
 
 
-@pytest.mark.parametrize("dtype", DTYPES[:5], ids=lambda dtype: dtype.__name__)
-def test_values_alone_give_back_types_of_up_to_16_bits(dtype):
-    """The scale is finer than they are. This is what stages of coarser levels rest on."""
-    pixels = extremes(dtype)
-    sample = Stretched(pixels)
-    assert_same_bits(sample.picture(sample.planes), pixels)
-
-
-@pytest.mark.parametrize("dtype", FLOATS[1:], ids=lambda dtype: dtype.__name__)
-def test_values_alone_give_floats_to_half_a_unit(dtype):
-    pixels = texture((6, 5), 2, dtype)
-    sample = Stretched(pixels)
-    picture = sample.picture(sample.planes)
-    assert picture.dtype == dtype
-    off = abs(picture.astype(np.float64) - pixels)
-    assert off.max() <= sample.unit / 2 + np.finfo(dtype).eps * abs(pixels).max()
-
-
 @dtypes
 def test_values_beyond_the_scale_are_projected_onto_legal_pixels(dtype):
     """0 to 255 for 8 bits without a sign; else between the sample's smallest and largest pixel."""
@@ -481,20 +302,6 @@ def moments(channels):
     return flat.mean(1), np.cov(flat, bias=True).reshape(len(flat), -1)
 
 
-@given(st.integers(0, 2**16), st.integers(1, 5))
-def test_channels_have_unit_variance_and_no_correlation(seed, channels):
-    planes = mixed(np.random.default_rng(seed), channels)
-    own = palette([planes], [1.0])
-    mean, covariance = moments(own.decorrelated(planes))
-    deviations = np.sqrt(np.linalg.svd(moments(planes)[1])[1])
-    busy = own.deviations > 0
-    assert abs(mean).max() <= channels / deviations[busy].min(), "the mean is an integer"
-    assert abs(np.diag(covariance)[busy] - 1).max() <= DECORRELATED
-    between = abs(covariance - np.diag(np.diag(covariance)))
-    lesser = np.minimum(*np.meshgrid(deviations, deviations))
-    assert (between * lesser).max() <= DECORRELATED * deviations.max()
-
-
 @given(st.integers(0, 2**16), st.integers(1, 4))
 def test_the_transform_is_that_of_a_plain_svd(seed, channels):
     planes = mixed(np.random.default_rng(seed), channels)
@@ -516,58 +323,6 @@ def test_there_and_back_is_the_same(seed, channels, decorrelate):
     if (own.deviations == 0).any():
         return
     assert (own.restored(own.decorrelated(planes)) == planes).all()
-
-
-def test_what_is_scaled_comes_back_within_what_scaling_rounds():
-    planes = planes_of()
-    own = palette([planes], [1.0])
-    scale = decorrelated([planes], [own])
-    channels = scale.channels[0]
-    assert channels.dtype == np.int32
-    assert (abs(channels).reshape(3, -1).max(1) == TOP).all()
-    step = (scale.spans / TOP * own.deviations / 2**14).sum()
-    assert abs(own.restored(scale.normalised(channels)) - planes).max() <= 1.5 + step
-
-
-def test_channels_kept_apart_are_only_centred_and_scaled():
-    planes = planes_of()
-    own = palette([planes], [1.0], decorrelate=False)
-    assert (own.axes == np.eye(3, dtype=np.int64) * 2**14).all()
-    flat = planes.reshape(3, -1).astype(float)
-    assert own.deviations / 2**14 == pytest.approx(flat.std(1), rel=1e-9)
-    assert (own.mean == np.rint(flat.mean(1))).all()
-
-
-def test_grey_in_three_channels_is_one_channel():
-    grey = planes_of(channels=1)
-    planes = np.repeat(grey, 3, 0)
-    own = palette([planes], [1.0])
-    assert (own.deviations[1:] == 0).all()
-    assert own.deviations[0] > 0
-    channels = own.decorrelated(planes)
-    assert not channels[1:].any()
-    back = own.restored(np.concatenate([np.linspace(-3, 3, 77).reshape(1, 7, 11), np.zeros((2, 7, 11))]))
-    assert (back == back[0]).all(), "grey to the bit"
-
-
-def test_a_flat_channel_keeps_its_value():
-    planes = planes_of()
-    planes[1] = 1234
-    own = palette([planes], [1.0])
-    assert own.deviations[-1] == 0
-    assert (own.restored(own.decorrelated(planes))[1] == 1234).all()
-    assert (own.restored(np.random.default_rng(1).normal(0, 2, planes.shape))[1] == 1234).all()
-
-
-@pytest.mark.parametrize("decorrelate", [True, False])
-def test_a_constant_picture_has_flat_channels(decorrelate):
-    planes = np.arange(3, dtype=np.int32).reshape(3, 1, 1).repeat(5, 1).repeat(4, 2)
-    own = palette([planes], [1.0], decorrelate)
-    scale = decorrelated([planes], [own])
-    assert not own.deviations.any()
-    assert not scale.channels[0].any()
-    assert not scale.spans.any()
-    assert (own.restored(scale.normalised(scale.channels[0])) == planes).all()
 
 
 @pytest.mark.parametrize(("share", "flat"), [(2 * FLAT, False), (FLAT / 2, True)])

@@ -63,9 +63,8 @@ def test_a_name_of_another_program_names_ours(theirs, ours):
         getattr(simdtex, theirs)
 
 
-@pytest.mark.parametrize("command", ["synth", "schedules"])
-def test_the_help_of_a_command_needs_no_heavy_module(command):
-    assert not imported(COMMAND_LINE.format(words=[command, "--help"])) & HEAVY
+def test_the_help_of_a_command_needs_no_heavy_module():
+    assert not imported(COMMAND_LINE.format(words=["synth", "--help"])) & HEAVY
 
 
 def test_an_8_bit_picture_is_read_and_written_by_pillow_alone(tmp_path):
@@ -159,13 +158,7 @@ def interrupted(tmp_path, way, module, size="64", before=None):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-@pytest.mark.parametrize(
-    ("way", "module"),
-    [
-        *(("module", name) for name in ("simdtex.cli", "click", "click.core", "simdtex.cli.textures", "numpy", "PIL")),
-        *(("script", name) for name in ("simdtex.cli", "numpy")),
-    ],
-)
+@pytest.mark.parametrize(("way", "module"), [("module", "simdtex.cli"), ("module", "numpy"), ("script", "click")])
 def test_ctrl_c_during_imports_ends_with_one_line(tmp_path, way, module):
     result = interrupted(tmp_path, way, module)
     assert result.returncode == 130, result.stderr

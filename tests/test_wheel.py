@@ -84,7 +84,7 @@ def test_the_wheel_carries_the_kernels_and_nothing_else(wheel):
     info = {name for name in names if name.partition("/")[0].endswith(".dist-info")}
     assert names - info == wanted
     assert {name.partition("/")[2] for name in info} == {
-        *("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE"),
+        *("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")
     }
 
 
@@ -128,10 +128,7 @@ def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):
     elsewhere.mkdir()
     Image.fromarray(data.brick()[:48, :56]).save(elsewhere / "sample.png")
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    for name, file, words in (
-        ("wheel", f"{wheel}{extra()}", ()),
-        ("sdist", sdist, ("--force-reinstall", "--no-deps")),
-    ):
+    for name, file, words in (("wheel", f"{wheel}{extra()}", ()), ("sdist", sdist, ("--force-reinstall", "--no-deps"))):
         run(scripts / "python", "-m", "pip", "install", *QUIET, *words, file, cwd=tmp_path)
         where = run(scripts / "python", "-c", "import simdtex; print(simdtex.__file__)", cwd=elsewhere)
         assert Path(where.strip()).is_relative_to(venv)

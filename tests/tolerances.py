@@ -50,9 +50,6 @@ RECONSTRUCTION = {1: 0.0035, 2: 0.015, 4: 0.012, 6: 0.032}
 orientations. The filters are small and invert only nearly: 0.0031, 0.0142, 0.0114 and 0.0301 are the most of
 seventeen pictures and 1 to 3 levels; those with an odd side are folded."""
 
-PARSEVAL = {1: 0.001, 2: 0.003, 4: 0.002, 6: 0.007}
-"""Relative error of the sum of squares of a steerable pyramid of white noise, by orientations, for the same reason:
-0.0005, 0.0026, 0.0013 and 0.0058 are the most of the same pictures."""
 
 DECORRELATED = 1e-4
 """Of the variances of decorrelated channels against 1; and of their covariances against 0, times the lesser of the two
@@ -63,9 +60,6 @@ DIRECTION = 5e-3
 largest. Roundings to 2**-14 turn axes, and deviations of a few units are rounded: 2.5e-3 is the most of 3000
 pictures."""
 
-MIRRORED = 0.1
-"""As RECONSTRUCTION, for pictures of 96 x 96 with mirrored borders: the way back mirrors what is spread, which is not
-the transpose of the way there: 0.084, near the borders."""
 
 PLAIN_TEXTURE = {0: 0.999, 1: 0.99, 2: 0.95, 5: 0.6}
 """Share of pixels that are those of Match-texture in float64, by iterations. Ours are rounded at every step, which may
@@ -75,10 +69,6 @@ SEAM = 0.1
 """Of the gradient across the seam of a torus over that inside, against 1, for the mean of six pictures of some 96
 pixels a side: one of them may be off by 0.15."""
 
-LOOKUP = 1.5
-"""Bins of the sample's range by which a lookup misses 99 % of the quantiles between the first entry of its table and
-the last: 0.94 of 256 bins, 0.29 of 64. The darkest 1/256 of all pixels have one entry of a
-table, and so have the brightest."""
 
 HALVES = 0.15
 """Difference of the means of two halves of 64 x 64 pixels, in standard deviations, averaged over four pictures: 0.059
@@ -101,8 +91,6 @@ SLICE_SUBBANDS = {"together": 0.09, "each": 0.12, "paper": 0.14, "oblique": 0.13
 """The same of a family's subbands, all slices together, the largest: 0.066, 0.089, 0.113, 0.094 and 0.298 are the most;
 of noise it is 2.4."""
 
-FAVOUR = 0.03
-"""Difference of the means of SLICE_SUBBANDS between families: 0.013 is the most of gravel."""
 
 SOLID_SEAM = 0.15
 """As SEAM, for a block of 32 a side, whose faces are small: 0.19 is the most of one, 0.055 of the mean of six."""
