@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well `simdtex.classify` labels textures, beside classifiers of other kinds, and how long it takes.
+"""How well `simdtex.classify` labels textures, beside classifiers of other kinds.
 
-    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown,calibration,order,defaults,time]
-                                  [--draws N] [--seed N] [--side N] [--out DIR] [--device TEXT]
+    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown,calibration] [--draws N] [--seed N]
+                                  [--side N] [--out DIR] [--device TEXT]
 
 Textures are the pictures of a folder, and brick, grass and gravel of scikit-image. What is learned from and what is
 labelled lie apart: the left and the right half of a picture, or of one with 512 or more pixels a side [:128, :128] and
@@ -15,34 +15,179 @@ accuracy     shares of right labels 16 or more pixels from borders, and of all p
 unknown      the area under the curve (AUROC) of fits: of each class alone, its held-out part against whole pictures
              of every other texture; and in mosaics of which one class was not learned.
 calibration  the shares of pixels called unknown that are of a known texture, by the probability asked for.
-order        accuracy by the order of neighbourhoods; of whole ones, and of the pixel given its neighbours: equation
-             (6) with the bandwidth of equation (8), by `simdtex.lcpdf` at every fourth row and column. Half the draws.
-defaults     accuracy with other values of the options. Half the draws.
-time         512x512 against five samples of 128x128 (by --side), seconds on the device by kernel, best of three;
-             and how much faster than the NumPy reference a small case is.
 """
 
 from collections import defaultdict
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import common
 import numpy as np
-from mosaics import FEATURES, accuracy, auroc, drawn, grey, own_fit, probabilities, textures
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.signal import fftconvolve
+from scipy.stats import rankdata
 from skimage import data
+from skimage.feature import local_binary_pattern
+from skimage.filters import gabor_kernel
 
 import simdtex
 from simdtex.ops.classes import WEIGHTS, gaussian, potts, window
 
 ASKED = (0.01, 0.05, 0.1)  # probabilities of calling a known texture unknown
 FIELDS = [(coupling, weight) for coupling in (8, 11) for weight in (2, 4, 7, 12)]  # of the baselines; they get the best
-ORDERS = (1, 2, 4, 8, 18)
-STEP = 4  # rows and columns between the sites that the density of a pixel is computed at
-DEFAULTS = {"typical": (0.0, 0.6), "levels": (1, 2), "exemplars": (500, 4000), "coupling": (4, 12), "weight": (3, 12)}
 UNITS = 2**18  # of evidence and votes
 SHARES = ["straight, away", "straight, all", "curved, away", "curved, all"]
+LUMA = (0.299, 0.587, 0.114)
+NUMBER = 5  # textures of a mosaic
+PATTERNS = ((8, 1), (8, 2), (16, 3))  # points and radius of local binary patterns
+FREQUENCIES, DIRECTIONS = (0.05, 0.1, 0.2, 0.35), 6  # of Gabor filters; cycles a pixel
+SHOWN = 3000  # pixels of each class that a forest learns from
+LEAST = 0.01  # added to a forest's probabilities, which may be 0
+AWAY = 16  # pixels from a border beyond which a pixel lies away from it
+
+
+class Texture(NamedTuple):
+    """Parts of a picture, (rows, cols, 3) uint8: for training, for tests, and of the test part two apart."""
+
+    training: np.ndarray
+    test: np.ndarray
+    further: np.ndarray
+    rest: np.ndarray
+
+
+class Mosaic(NamedTuple):
+    """A picture (rows, cols, 3), the ``truth`` (rows, cols), 1 the first of its textures, and those by name."""
+
+    picture: np.ndarray
+    truth: np.ndarray
+    textures: dict
+
+
+def grey(picture):
+    """The luma of a picture with three bands, uint8."""
+    return np.rint(picture @ LUMA).astype(np.uint8)
+
+
+def parted(picture):
+    """The parts of a picture of 256 or more pixels a side, by its corners, or of a smaller one, by its halves."""
+    colour = picture[..., :3] if picture.ndim == 3 else np.stack([picture] * 3, -1)
+    rows, cols = colour.shape[:2]
+    if min(rows, cols) >= 512:
+        test = colour[-256:, -256:]
+        return Texture(colour[:128, :128], test, colour[-128:, :128], test)
+    test = colour[:, cols // 2 :]
+    return Texture(colour[:, : cols // 2], test, test[rows // 2 :], test[: rows // 2])
+
+
+def textures(folder, only=""):
+    """The textures of a folder, and brick, grass and gravel of scikit-image, by name."""
+    found = common.folder(folder, only)
+    found |= {name: getattr(data, name)() for name in ("brick", "grass", "gravel")}
+    return {name: parted(picture) for name, picture in found.items()}
+
+
+def regions(side, rng, curved, number=NUMBER):
+    """Labels 1 to 5 of a mosaic: quadrants and a square in the middle, or the greatest of random fields."""
+    if curved:
+        noise = rng.standard_normal((number, side, side))
+        fields = np.array([gaussian_filter(one, side / 7, mode="reflect") for one in noise])
+        return 1 + (fields / fields.std((1, 2), keepdims=True)).argmax(0)
+    half, quarter = side // 2, side // 4
+    found = 1 + np.add.outer(2 * (np.arange(side) >= half), np.arange(side) >= half)
+    found[quarter:-quarter, quarter:-quarter] = number
+    return found
+
+
+def laid(picture, side):
+    """A picture of a side, filled with another side by side."""
+    return np.tile(picture, [*(-(-side // length) for length in picture.shape[:2]), 1])[:side, :side]
+
+
+def drawn(known, seed, side=256):
+    """Two mosaics of the same five textures drawn at random, with straight borders and with curved ones."""
+    rng = np.random.default_rng(seed)
+    chosen = {name: known[name] for name in rng.choice(sorted(known), NUMBER, replace=False).tolist()}
+    found = []
+    for curved in (False, True):
+        truth = regions(side, rng, curved)
+        filled = np.array([laid(one.test, side) for one in chosen.values()])
+        found.append(Mosaic(np.take_along_axis(filled, truth[None, ..., None] - 1, 0)[0], truth, chosen))
+    return found
+
+
+def border_distance(truth):
+    """How far each pixel is from the nearest of another label; infinite if there is none."""
+    found = np.full(truth.shape, np.inf)
+    for label in np.unique(truth):
+        if not (own := truth == label).all():
+            found[own] = distance_transform_edt(own)[own]
+    return found
+
+
+def accuracy(labels, truth):
+    """The shares of right labels away from borders, and of all."""
+    right = labels == truth
+    return right[border_distance(truth) >= AWAY].mean(), right.mean()
+
+
+def auroc(unknown, known):
+    """The area under the curve of right against false alarms, of scores that are lower for the unknown."""
+    unknown, known = np.ravel(unknown), np.ravel(known)
+    ranks = rankdata(np.concatenate([unknown, known]))[len(unknown) :]
+    return (ranks.sum() - len(known) * (len(known) + 1) / 2) / len(known) / len(unknown)
+
+
+def own_fit(output):
+    """The fit of each pixel's most probable class, (rows, cols)."""
+    return np.take_along_axis(output.fit, output.probability.argmax(-1)[..., None], -1)[..., 0]
+
+
+def averaged(planes, picture, window):
+    """Means of planes over Gaussian windows, with the mean and the contrast of the picture, (..., features)."""
+    values = picture.astype(np.float32)
+    mean, square = (gaussian_filter(one, window) for one in (values, values * values))
+    means = [gaussian_filter(np.asarray(plane, np.float32), window) for plane in planes]
+    return np.stack([*means, mean, np.sqrt(np.maximum(square - mean * mean, 0))], -1)
+
+
+def patterns(picture):
+    """Where each local binary pattern occurs in a grey picture."""
+    for points, radius in PATTERNS:
+        code = local_binary_pattern(picture, points, radius, "uniform")
+        yield from (code == value for value in range(points + 2))
+
+
+def energies(picture):
+    """The energy of each Gabor filter in a grey picture."""
+    values = picture / 255
+    for frequency in FREQUENCIES:
+        for turn in range(DIRECTIONS):
+            kernel = gabor_kernel(frequency, theta=np.pi * turn / DIRECTIONS)
+            rows, cols = (length // 2 for length in kernel.shape)
+            padded = np.pad(values, ((rows, rows), (cols, cols)), mode="symmetric")
+            yield abs(fftconvolve(padded, kernel, mode="valid"))
+
+
+FEATURES = {"binary patterns": patterns, "Gabor energies": energies}
+
+
+def probabilities(training, pictures, features, window):
+    """Logarithms of probabilities by a random forest, (classes, rows, cols) for each of grey pictures."""
+    try:
+        from sklearn.ensemble import RandomForestClassifier
+    except ModuleNotFoundError:
+        raise SystemExit("the baselines need scikit-learn: pip install -e '.[benchmarks]'") from None
+
+    def pixels(picture):
+        found = averaged(features(picture), picture, window)
+        return found.reshape(-1, found.shape[-1])
+
+    rng = np.random.default_rng(1)
+    shown = [rng.permutation(pixels(one))[:SHOWN] for one in training]
+    forest = RandomForestClassifier(100, n_jobs=2, random_state=1, min_samples_leaf=3)
+    forest.fit(np.concatenate(shown), np.repeat(np.arange(len(shown)), [len(one) for one in shown]))
+    return [np.log(forest.predict_proba(pixels(one)).T.reshape(-1, *one.shape) + LEAST) for one in pictures]
 
 
 class Bench(NamedTuple):
@@ -54,9 +199,9 @@ class Bench(NamedTuple):
     seed: int
     side: int
 
-    def pairs(self, part=1):
-        """Two mosaics, straight and curved, for each draw or for a part of the draws."""
-        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(-(-self.draws // part))]
+    def pairs(self):
+        """Two mosaics, straight and curved, for each draw."""
+        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(self.draws)]
 
 
 def labelled(bench, picture, samples, colour=False, **options):
@@ -177,99 +322,20 @@ def measure_calibration(bench):
     ]
 
 
-def densities(bench, mosaic, order):
-    """Logarithms of the LCPDF of each class at every fourth row and column, (classes, rows, cols)."""
-    picture = grey(mosaic.picture)
-    sites = np.stack(np.mgrid[: picture.shape[0] : STEP, : picture.shape[1] : STEP], -1)
-    flat, values = sites.reshape(-1, 2), picture[::STEP, ::STEP].ravel()
-    options = {"order": order, "boundary": "open", "device": bench.machine}
-    found = [simdtex.lcpdf(picture, grey(one), flat, **options) for one in parts(mosaic.textures).values()]
-    own = np.array(found)[:, np.arange(len(flat)), values]
-    return np.log(np.maximum(own, 1e-9)).reshape(-1, *sites.shape[:2])
-
-
-def measure_order(bench):
-    """Accuracy by order, for whole neighbourhoods and for the pixel given its neighbours, without and with a field."""
-    rows = []
-    for order in ORDERS:
-        shares = defaultdict(list)
-        for mosaic in (mosaic for pair in bench.pairs(2) for mosaic in pair):
-            options = {"order": order, "weight": 0, "unknown": 0}
-            labels, output = labelled(bench, mosaic.picture, parts(mosaic.textures), **options)
-            evidence = np.log(np.maximum(np.moveaxis(output.probability, -1, 0), 1e-30))
-            logs, truth = densities(bench, mosaic, order), mosaic.truth[::STEP, ::STEP]
-            shares["whole"].append((labels == mosaic.truth).mean())
-            shares["whole, field"].append((field(bench.machine, evidence, 8, 7) == mosaic.truth).mean())
-            shares["pixel"].append((1 + logs.argmax(0) == truth).mean())
-            for coupling, weight in FIELDS:
-                labels = field(bench.machine, logs, coupling / STEP, weight)
-                shares[coupling, weight].append((labels == truth).mean())
-        mean = {name: np.mean(values) for name, values in shares.items()}
-        found = (mean["whole"], mean["whole, field"], mean["pixel"], max(mean[setting] for setting in FIELDS))
-        rows.append([order, *(f"{share:.3f}" for share in found)])
-    return ["order", "whole, no field", "whole, field", "pixel, no field", "pixel, field"], rows
-
-
-def measure_defaults(bench):
-    """Accuracy with the defaults, and with one option changed."""
-    settings, rows = {"defaults": {}}, []
-    settings |= {f"{name} {value:g}": {name: value} for name, values in DEFAULTS.items() for value in values}
-    for text, options in settings.items():
-        shares = [
-            [accuracy(labelled(bench, m.picture, parts(m.textures), unknown=0, **options)[0], m.truth) for m in pair]
-            for pair in bench.pairs(2)
-        ]
-        rows.append([text, *(f"{share:.3f}" for share in np.mean(shares, 0).ravel())])
-    return ["options", *SHARES], rows
-
-
-def large(side, size):
-    """A picture and five samples, of brick, grass, gravel and two of them turned."""
-    pictures = [getattr(data, name)() for name in ("brick", "grass", "gravel")]
-    pictures += [np.rot90(pictures[0]), np.rot90(pictures[1])]
-    place = np.add.outer(np.arange(side) // -(-side // 3) * 3, np.arange(side) // -(-side // 3)) % 5
-    picture = np.choose(place, [one[-side:, -side:] for one in pictures])
-    return picture, {str(number): one[:size, :size] for number, one in enumerate(pictures)}
-
-
-def measure_time(bench):
-    """Seconds of a run on the device by kernel, and the ratio to the NumPy reference."""
-
-    def fastest(side, size, machine):
-        job = partial(simdtex.classify, *large(side, size), rng=1, device=machine, full_output=True)
-        (_, output), seconds = min(common.in_turns(3, {"": partial(common.timed, job)})[""], key=lambda run: run[1])
-        return seconds, output.statistics.get("kernels", [])
-
-    seconds, kernels = fastest(2 * bench.side, bench.side // 2, bench.machine)
-    rows = [[f"{2 * bench.side}x{2 * bench.side}, the whole call", "", f"{seconds:.2f} s"]]
-    rows += [[one["name"], one["calls"], f"{one['seconds']:.3f} s"] for one in kernels]
-    side, size = bench.side // 4, bench.side * 3 // 16
-    plain, fast = (fastest(side, size, machine)[0] for machine in (simdtex.open_machine("reference"), bench.machine))
-    rows.append([f"{side}x{side}, five samples of {size}x{size}", "", f"{fast:.3f} s"])
-    rows.append(["the same by the reference", "", f"{plain:.3f} s, {plain / fast:.0f} times"])
-    return ["what", "launches", "time"], rows
-
-
 PARTS = {
     "accuracy": measure_accuracy,
     "unknown": measure_unknown,
     "calibration": measure_calibration,
-    "order": measure_order,
-    "defaults": measure_defaults,
-    "time": measure_time,
 }
 
 
 @common.command
 def main(samples, only="", parts="", draws=10, seed=1, side=256, out=Path, device=None):
     chosen, known = common.chosen(PARTS, parts), textures(samples, only)
-    bench = Bench(common.opened(device, profile=True), known, draws, seed, side)
+    bench = Bench(common.opened(device), known, draws, seed, side)
     print(f"textures: {len(known)}")
     for part, measure in chosen.items():
-        (header, rows), seconds = common.timed(measure, bench)
-        common.show(f"{part}, {seconds:.0f} s", header, rows)
-        if out:
-            common.write(out / f"{part}.csv", header, rows)
+        common.table(part, *measure(bench), out and out / f"{part}.csv")
 
 
 if __name__ == "__main__":
