@@ -41,16 +41,19 @@ def command(main):
 
     parameters = []
     for name, one in inspect.signature(main).parameters.items():
-        default, kind = one.default, None
+        default, words = one.default, [f"--{name.replace('_', '-')}"]
         if default is one.empty:
             parameters.append(click.Argument([name], type=Path))
-            continue
-        if isinstance(default, tuple):
-            kind = several_of(type(default[0]))
+        elif default is list:
+            parameters.append(click.Option(words, multiple=True))
         elif isinstance(default, type):
-            kind, default = None if default is list else default, None
-        words = [f"--{name.replace('_', '-')}"]
-        parameters.append(click.Option(words, type=kind, default=default, multiple=one.default is list))
+            parameters.append(click.Option(words, type=default))
+        elif isinstance(default, tuple):
+            parameters.append(click.Option(words, type=several_of(type(default[0])), default=default))
+        else:
+            flag = isinstance(default, bool) or None
+            kind = Path if isinstance(default, Path) else None
+            parameters.append(click.Option(words, type=kind, default=default, is_flag=flag))
     about = "\b\n" + main.__globals__["__doc__"].replace("\n\n", "\n\n\b\n")  # the lines stay as they are
     return click.Command(main.__name__, callback=called, params=parameters, help=about)
 
@@ -170,13 +173,18 @@ def python(*words, **given):
 # ---------------------------------------------------------------- tables and sheets
 
 
+def write(path, header, rows):
+    """Write a table as CSV, and make the folder that it lies in."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
+
+
 def table(title, header, rows, path=None):
     """Print a table, and write it as CSV where a path is given."""
     print_table(Table(title, [dict(zip(header, map(str, row), strict=True)) for row in rows]))
     if path:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([header, *rows])
+        write(path, header, rows)
 
 
 def told(figures):
@@ -186,7 +194,7 @@ def told(figures):
 
 def sheet(path, cells, columns, **given):
     """Write cells of label, picture and caption as a sheet; ``given`` are other options of `contact_sheet`."""
-    pictures, captions = [cell[:2] for cell in cells], [caption for *_, caption in cells]
+    pictures, captions = zip(*(((label, picture), caption) for label, picture, caption in cells), strict=True)
     given |= {"captions": captions} if any(captions) else {}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(png(contact_sheet(pictures, columns=columns, **given)))

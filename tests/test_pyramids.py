@@ -12,9 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pyrtools.pyramids import SteerablePyramidSpace
 from pyrtools.pyramids.filters import parse_filter
+from subbands import decompose
 from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION, UNIT32
 
-from benchmarks.subbands import decompose
 from simdtex import random
 from simdtex.machine.opencl import kernel_folder
 from simdtex.methods.pyramid.pyramids import Transform, most_levels

@@ -7,10 +7,10 @@ from cases import REFERENCE, assert_same_bits, opencl, texture
 from scipy.ndimage import map_coordinates
 from scipy.stats import wasserstein_distance
 from skimage import data
+from subbands import decompose
 from tolerances import FAVOUR, SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
 
 import simdtex
-from benchmarks.subbands import decompose
 from simdtex.methods.pyramid.solid import FAMILIES
 
 SIDE = 32
