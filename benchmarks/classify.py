@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How well `simdtex.classify` labels textures, beside classifiers of other kinds.
 
-    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown,calibration] [--draws N] [--seed N]
-                                  [--side N] [--out DIR] [--device TEXT]
+    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown] [--draws N] [--seed N] [--side N]
+                                  [--out DIR] [--device TEXT]
 
 Textures are the pictures of a folder, and brick, grass and gravel of scikit-image. What is learned from and what is
 labelled lie apart: the left and the right half of a picture, or of one with 512 or more pixels a side [:128, :128] and
 [-256:, -256:]. Each draw takes five textures at random, for a mosaic with straight borders (quadrants, and a square in
 the middle) and one with curved borders. ``--out`` takes a table for each part:
 
-accuracy     shares of right labels 16 or more pixels from borders, and of all pixels; of the classifier, and of
-             random forests on local binary patterns and on Gabor energies, without and with the same Potts field.
-             The baselines need scikit-learn (``pip install -e '.[benchmarks]'``).
-unknown      the area under the curve (AUROC) of fits: of each class alone, its held-out part against whole pictures
-             of every other texture; and in mosaics of which one class was not learned.
-calibration  the shares of pixels called unknown that are of a known texture, by the probability asked for.
+accuracy  shares of right labels 16 or more pixels from borders, and of all pixels; of the classifier, and of
+          random forests on local binary patterns, without and with the same Potts field. The baselines need
+          scikit-learn (``pip install -e '.[benchmarks]'``).
+unknown   the area under the curve (AUROC) of fits: of each class alone, its held-out part against whole pictures of
+          every other texture; and in mosaics of which one class was not learned; and the shares of pixels of unknown
+          and of known textures that are called unknown.
 """
 
 from collections import defaultdict
@@ -25,35 +25,30 @@ from typing import Any, NamedTuple
 import common
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
-from scipy.signal import fftconvolve
 from scipy.stats import rankdata
 from skimage import data
 from skimage.feature import local_binary_pattern
-from skimage.filters import gabor_kernel
 
 import simdtex
 from simdtex.ops.classes import WEIGHTS, gaussian, potts, window
 
-ASKED = (0.01, 0.05, 0.1)  # probabilities of calling a known texture unknown
+ASKED = 0.05  # the probability of calling a known texture unknown
 FIELDS = [(coupling, weight) for coupling in (8, 11) for weight in (2, 4, 7, 12)]  # of the baselines; they get the best
 UNITS = 2**18  # of evidence and votes
 SHARES = ["straight, away", "straight, all", "curved, away", "curved, all"]
 LUMA = (0.299, 0.587, 0.114)
 NUMBER = 5  # textures of a mosaic
 PATTERNS = ((8, 1), (8, 2), (16, 3))  # points and radius of local binary patterns
-FREQUENCIES, DIRECTIONS = (0.05, 0.1, 0.2, 0.35), 6  # of Gabor filters; cycles a pixel
 SHOWN = 3000  # pixels of each class that a forest learns from
 LEAST = 0.01  # added to a forest's probabilities, which may be 0
 AWAY = 16  # pixels from a border beyond which a pixel lies away from it
 
 
 class Texture(NamedTuple):
-    """Parts of a picture, (rows, cols, 3) uint8: for training, for tests, and of the test part two apart."""
+    """Parts of a picture for training and for tests, (rows, cols, 3) uint8."""
 
     training: np.ndarray
     test: np.ndarray
-    further: np.ndarray
-    rest: np.ndarray
 
 
 class Mosaic(NamedTuple):
@@ -74,10 +69,8 @@ def parted(picture):
     colour = picture[..., :3] if picture.ndim == 3 else np.stack([picture] * 3, -1)
     rows, cols = colour.shape[:2]
     if min(rows, cols) >= 512:
-        test = colour[-256:, -256:]
-        return Texture(colour[:128, :128], test, colour[-128:, :128], test)
-    test = colour[:, cols // 2 :]
-    return Texture(colour[:, : cols // 2], test, test[rows // 2 :], test[: rows // 2])
+        return Texture(colour[:128, :128], colour[-256:, -256:])
+    return Texture(colour[:, : cols // 2], colour[:, cols // 2 :])
 
 
 def textures(folder, only=""):
@@ -158,21 +151,7 @@ def patterns(picture):
         yield from (code == value for value in range(points + 2))
 
 
-def energies(picture):
-    """The energy of each Gabor filter in a grey picture."""
-    values = picture / 255
-    for frequency in FREQUENCIES:
-        for turn in range(DIRECTIONS):
-            kernel = gabor_kernel(frequency, theta=np.pi * turn / DIRECTIONS)
-            rows, cols = (length // 2 for length in kernel.shape)
-            padded = np.pad(values, ((rows, rows), (cols, cols)), mode="symmetric")
-            yield abs(fftconvolve(padded, kernel, mode="valid"))
-
-
-FEATURES = {"binary patterns": patterns, "Gabor energies": energies}
-
-
-def probabilities(training, pictures, features, window):
+def probabilities(training, pictures, window):
     """Logarithms of probabilities by a random forest, (classes, rows, cols) for each of grey pictures."""
     try:
         from sklearn.ensemble import RandomForestClassifier
@@ -180,7 +159,7 @@ def probabilities(training, pictures, features, window):
         raise SystemExit("the baselines need scikit-learn: pip install -e '.[benchmarks]'") from None
 
     def pixels(picture):
-        found = averaged(features(picture), picture, window)
+        found = averaged(patterns(picture), picture, window)
         return found.reshape(-1, found.shape[-1])
 
     rng = np.random.default_rng(1)
@@ -208,15 +187,13 @@ def labelled(bench, picture, samples, colour=False, **options):
     """Labels and output of the classifier, for pictures with three bands, which are made grey unless in colour."""
     kind = np.asarray if colour else grey
     given = {"rng": 1, "device": bench.machine, "channel_axis": -1 if colour else None} | options
-    for name, pictures in {"textures": samples, "validation": options.get("validation")}.items():
-        if pictures:
-            given[name] = {texture: kind(one) for texture, one in pictures.items()}
+    given["textures"] = {texture: kind(one) for texture, one in samples.items()}
     return simdtex.classify(kind(picture), full_output=True, **given)
 
 
-def parts(textures, part="training"):
-    """A part of every texture, by name."""
-    return {name: getattr(one, part) for name, one in textures.items()}
+def parts(textures):
+    """The training part of every texture, by name."""
+    return {name: one.training for name, one in textures.items()}
 
 
 def field(machine, evidence, coupling, weight, sweeps=10):
@@ -236,7 +213,7 @@ def field(machine, evidence, coupling, weight, sweeps=10):
 
 
 def measure_accuracy(bench):
-    """Accuracy of the classifier and of the baselines, and in how many mosaics each is ahead of the classifier."""
+    """Accuracy of the classifier and of the baseline, and in how many mosaics each is ahead of the classifier."""
     found, pairs = defaultdict(list), bench.pairs()
     for pair in pairs:
         samples, pictures = parts(pair[0].textures), [grey(m.picture) for m in pair]
@@ -247,16 +224,16 @@ def measure_accuracy(bench):
         for kind, (text, weight) in product(("grey", "colour"), (("", {}), (", no field", {"weight": 0}))):
             options = {"colour": kind == "colour", "unknown": 0, **weight}
             note(f"classify, {kind}{text}", [labelled(bench, m.picture, samples, **options)[0] for m in pair])
-        for name, size in product(FEATURES, (4, 10)):
-            chances = probabilities([grey(one) for one in samples.values()], pictures, FEATURES[name], size)
-            note((name, size), [1 + one.argmax(0) for one in chances])
+        for size in (4, 10):
+            chances = probabilities([grey(one) for one in samples.values()], pictures, size)
+            note(size, [1 + one.argmax(0) for one in chances])
             for setting in FIELDS:
-                note((name, size, *setting), [field(bench.machine, one, *setting) for one in chances])
+                note((size, *setting), [field(bench.machine, one, *setting) for one in chances])
     kept = {method: np.array(shares) for method, shares in found.items() if isinstance(method, str)}
-    for name, size in product(FEATURES, (4, 10)):
-        kept[f"{name}, window {size}, no field"] = np.array(found[name, size])
-        best = max(FIELDS, key=lambda setting: np.mean(found[name, size, *setting]))
-        kept[f"{name}, window {size}, field {best[0]}, {best[1]}"] = np.array(found[name, size, *best])
+    for size in (4, 10):
+        kept[f"binary patterns, window {size}, no field"] = np.array(found[size])
+        best = max(FIELDS, key=lambda setting: np.mean(found[size, *setting]))
+        kept[f"binary patterns, window {size}, field {best[0]}, {best[1]}"] = np.array(found[size, *best])
     reference = kept["classify, grey"][..., 1]
     for method, shares in kept.items():
         for draw, curved in np.argwhere(shares[..., 1] > reference) if "classify" not in method else ():
@@ -274,7 +251,7 @@ def measure_unknown(bench):
     alone, left = {}, {}
 
     def judged(strange, known):
-        return auroc(strange, known), (strange < ASKED[1]).mean()
+        return auroc(strange, known), (strange < ASKED).mean(), (known < ASKED).mean()
 
     for name, own in bench.known.items():
         classifier = simdtex.TextureClassifier(rng=1, device=bench.machine)
@@ -292,40 +269,14 @@ def measure_unknown(bench):
     rows = []
     for case, values in {"one class, other pictures": alone, "a class left out of a mosaic": left}.items():
         worst = ", ".join(f"{one} {values[one][0]:.3f}" for one in sorted(values, key=values.get)[:3])
-        area, share = np.mean([*values.values()], 0)
-        rows.append([case, f"{area:.3f}", worst, f"{100 * share:.0f} %"])
-    return ["case", "AUROC, mean", "worst", "called unknown at 5 %"], rows
-
-
-def measure_calibration(bench):
-    """The shares of known textures that are called unknown, by problem and by the probability that was asked for."""
-    found = defaultdict(list)
-
-    def note(problem, fits):
-        found[problem].append([np.mean([(fit < asked).mean() for fit in fits]) for asked in ASKED])
-
-    def held(textures, **options):
-        samples = parts(textures)
-        return [own_fit(labelled(bench, rest, samples, **options)[1]) for rest in parts(textures, "rest").values()]
-
-    groups = [("five classes", pair[0].textures) for pair in bench.pairs()]
-    groups += [("one class", {name: one}) for name, one in bench.known.items()]
-    for problem, group in groups:
-        note(problem, held(group))
-        note(f"{problem}, with validation", held(group, validation=parts(group, "further")))
-    for number, pair in enumerate(bench.pairs()):
-        output = labelled(bench, pair[number % 2].picture, parts(pair[0].textures))[1]
-        note("five classes, in mosaics", [own_fit(output)])
-    return ["problem", *(f"{100 * asked:g} %" for asked in ASKED), "most at 5 %"], [
-        [problem, *(f"{100 * share:.1f} %" for share in np.mean(shares, 0)), f"{100 * np.max(shares, 0)[1]:.0f} %"]
-        for problem, shares in sorted(found.items())
-    ]
+        area, *shares = np.mean([*values.values()], 0)
+        rows.append([case, f"{area:.3f}", worst, *(f"{100 * share:.0f} %" for share in shares)])
+    return ["case", "AUROC, mean", "worst", "unknown called so at 5 %", "known called unknown"], rows
 
 
 PARTS = {
     "accuracy": measure_accuracy,
     "unknown": measure_unknown,
-    "calibration": measure_calibration,
 }
 
 

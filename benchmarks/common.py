@@ -9,11 +9,9 @@ import sys
 import time
 from contextlib import suppress
 from fnmatch import fnmatch
-from io import BytesIO
 from pathlib import Path
 
 import click
-import numpy as np
 import PIL.Image
 from skimage import data
 
@@ -173,18 +171,13 @@ def python(*words, **given):
 # ---------------------------------------------------------------- tables and sheets
 
 
-def write(path, header, rows):
-    """Write a table as CSV, and make the folder that it lies in."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows])
-
-
 def table(title, header, rows, path=None):
     """Print a table, and write it as CSV where a path is given."""
     print_table(Table(title, [dict(zip(header, map(str, row), strict=True)) for row in rows]))
     if path:
-        write(path, header, rows)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
 def told(figures):
@@ -193,20 +186,8 @@ def told(figures):
 
 
 def sheet(path, cells, columns, **given):
-    """Write cells of label, picture and caption as a sheet; ``given`` are other options of `contact_sheet`."""
+    """Write cells of label, picture and caption as a sheet of 256 colours; ``given`` are other options of its."""
     pictures, captions = zip(*(((label, picture), caption) for label, picture, caption in cells), strict=True)
-    given |= {"captions": captions} if any(captions) else {}
+    drawn = contact_sheet(pictures, columns=columns, captions=captions if any(captions) else None, **given)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(png(contact_sheet(pictures, columns=columns, **given)))
-
-
-def png(picture):
-    """A picture as a PNG: in shades of grey where it has no colours, else of 256 colours."""
-    found = PIL.Image.fromarray(picture)
-    if (picture == picture[..., :1]).all():
-        found = found.convert("L")
-    elif len(np.unique(picture.reshape(-1, 3), axis=0)) > 256:
-        found = found.quantize(256, PIL.Image.Quantize.MEDIANCUT, dither=PIL.Image.Dither.NONE)
-    buffer = BytesIO()
-    found.save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
+    PIL.Image.fromarray(drawn).quantize(256, dither=PIL.Image.Dither.NONE).save(path, optimize=True)

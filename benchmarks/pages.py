@@ -9,7 +9,6 @@ Writes a PNG file for each name, the same bytes every time. ``--quick`` divides 
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from math import inf
 
 import common
 import numpy as np
@@ -19,13 +18,9 @@ from skimage.transform import resize
 import simdtex
 from simdtex.experiments.quality import seam
 from simdtex.machine import Machine
-from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
-from simdtex.model.display import source_colours
-from simdtex.model.stretched import TOP, Stretched
+from simdtex.model.stretched import Stretched
 from simdtex.report.sheet import view
-
-ALPHAS = (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf)
 
 
 def reduced(picture, factor):
@@ -102,56 +97,6 @@ class Runs:
 # ---------------------------------------------------------------- multiresolution sampling: label and picture
 
 
-def enlarged(picture, shape, step=None):
-    """A decimated picture at a size, each of its pixels as a square of `step` pixels a side."""
-    step, limits = step or shape[0] / len(picture), zip(shape, picture.shape[:2], strict=True)
-    rows, cols = (np.minimum((np.arange(length) / step).astype(int), limit - 1) for length, limit in limits)
-    return picture[rows[:, np.newaxis], cols]
-
-
-def levels(runs):
-    """G and L of the gravel, level by level."""
-    gravel, machine = SAMPLES["gravel"], runs.machine
-    planes = machine.put(Stretched(gravel[..., None]).planes)
-    gaussian, laplacian = (
-        [machine.get(band)[0] / TOP for band in bands] for bands in pyramid(machine, planes, 5, torus=True)
-    )
-    laplacian = [*(2 * band + 0.5 for band in laplacian[:-1]), gaussian[-1]]
-    for name, values in ((name, one) for name, own in (("G", gaussian), ("L", laplacian)) for one in enumerate(own)):
-        level, shown = values[0], np.round(np.clip(values[1], 0, 1) * 255).astype(np.uint8)
-        label = f"{name}_{level}, {len(shown)} x {len(shown)}"
-        yield label + (" = G_4" if (name, level) == ("L", 4) else ""), enlarged(shown, gravel.shape)
-
-
-def sources(runs):
-    """Source maps of the levels in false colours, at several thresholds."""
-    gravel, side = runs.crop(SAMPLES["gravel"]), runs.small(160)
-    for alpha in (0, 0.3, 1):
-        image, output = runs.synth(SAMPLES["gravel"], 160, method="multires", alpha=alpha)
-        for stage in (stage for stage in output.stages if stage.level in (5, 3, 2, 1, 0)):
-            own = [-(-n // 2**stage.level) for n in gravel.shape]
-            colours = enlarged(source_colours(stage.source, own), (side, side), 2**stage.level)
-            yield f"alpha {alpha:g}, level {stage.level}", colours
-        yield f"alpha {alpha:g}", image
-
-
-def thresholds(runs):
-    """One sample at many alphas, as in Figure 11 of the paper."""
-    yield "the sample", runs.crop(SAMPLES["gravel"])
-    for alpha in ALPHAS:
-        seams = "cut" if alpha == inf else "blend"  # where all are strangers, a blend leaves no contrast
-        image, output = runs.synth(SAMPLES["gravel"], 256, method="multires", alpha=alpha, seams=seams)
-        label = "infinity" if alpha == inf else f"{alpha:g}"
-        yield f"alpha {label}: {output.statistics['levels'][-1]['candidates']:.2f} candidates", image
-
-
-def parities(runs):
-    """The two parities at the same alphas."""
-    for parity, alpha in product(("match", "free"), (0, 0.05, 0.2, 0.4)):
-        options = {"alpha": alpha, "parity": parity, "seams": "cut"}
-        yield f"{parity}, alpha {alpha:g}", runs.synth(SAMPLES["gravel"], 192, method="multires", **options)[0]
-
-
 def mended(runs):
     """Samples laid beside themselves, as they are and mended."""
     for how, name in product(("keep", "mend"), ("brick", "gravel", "tissue", "wood")):
@@ -176,29 +121,6 @@ def gallery(chosen, runs):
         kind, _, what = name.rpartition(": ")
         yield what, runs.crop(sample)
         yield kind, runs.pyramid(sample, 192)
-
-
-def iterations(runs):
-    """What more iterations do."""
-    for name, kind, count in product(("gravel", "fur"), ("steerable", "laplacian"), (1, 5, 20, 100)):
-        options = {"pyramid": kind, "iterations": runs.small(count)}
-        yield f"{kind}, {count}", runs.pyramid(SAMPLES[name], 144, **options)
-
-
-def tried(option, chosen, runs):
-    """Samples under the two values of an option."""
-    values = {"color": ("decorrelate", "channels"), "edges": ("reflect", "wrap")}[option]
-    for name, sample in chosen.items():
-        yield name, runs.crop(sample)
-        yield from ((f"{option}={value}", runs.pyramid(sample, 144, **{option: value})) for value in values)
-
-
-COLOURED = {
-    "tissue": data.immunohistochemistry()[330:410, 270:350],
-    "fur": SAMPLES["fur"],
-    "gravel as RGB": np.repeat(data.gravel()[:96, :96, None], 3, axis=2),
-}
-EDGED = {"brick": SAMPLES["brick"], "retina": reduced(data.retina(), 2)[330:426, 130:226]}
 
 
 def mixtures(runs):
@@ -226,31 +148,13 @@ def solids(runs):
         yield name, view(runs.block(sample, 96)[0], size=max(96, runs.small(288)))
 
 
-def solid_options(runs):
-    """Two slices of a block made in each of the ways."""
-    ways = [{"solids": way, "slices": own} for way, own in product(("average", "turns"), ("each", "together"))]
-    for options in [*ways, {"pyramid": "laplacian"}]:
-        block, output = runs.block(SAMPLES["tissue"], 64, **options)
-        apart = np.mean(list(output.statistics["iterations"][-1]["distances"].values()))
-        yield f"{', '.join(options.values())}: {apart:.3f}", block[len(block) // 2]
-        yield "y-z", block[:, :, len(block) // 2]
-
-
 MADE = {
-    "multires/pyramid": (levels, 5, None),
-    "multires/sources": (sources, 6, None),
-    "multires/alpha": (thresholds, 4, None),
-    "multires/parity": (parities, 4, None),
     "multires/edges": (mended, 4, None),
     "multires/seams": (joined, 3, None),
-    "pyramid/iterations": (iterations, 4, 1),
     "pyramid/gallery-strong": (partial(gallery, STRONG), 4, 1),
     "pyramid/gallery-failures": (partial(gallery, FAILURES), 4, 1),
-    "pyramid/colour": (partial(tried, "color", COLOURED), 3, 1),
-    "pyramid/edges": (partial(tried, "edges", EDGED), 3, 1),
     "pyramid/mixtures": (mixtures, 4, 1),
     "pyramid/solid": (solids, 1, 1),
-    "pyramid/solid-options": (solid_options, 4, None),
 }
 """Name -> what yields the labels and pictures of a sheet, its columns, and the scale of its pictures."""
 

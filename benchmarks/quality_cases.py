@@ -49,9 +49,8 @@ def main(out=common.DOCS / "study" / "quality.csv", device=None):
     for name, picture, source in cases(photograph, sample, device):
         found = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
         table.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
-        print(*table[-1], sep="  ", flush=True)
     headings = [figure.removesuffix("_distance").replace("_", " ") for figure in FIGURES]
-    common.write(out, ["picture", *headings], table)
+    common.table("", ["picture", *headings], table, out)
 
 
 if __name__ == "__main__":

@@ -97,14 +97,14 @@ def main(out=Path, method="mrf", samples=Path, only="", options=list, seeds=3, d
                 figure: np.mean([figures[figure] for _, figures in runs]) for figure in wanted if figure in runs[0][1]
             }
             rows.append([name, label, *(f"{mean[figure]:.2f}" if figure in mean else "" for figure in wanted)])
-            print(f"{name:12}{label:24}", *rows[-1][2:], flush=True)
+            print(*rows[-1], flush=True)
             for figure, value in mean.items():
                 means.setdefault((label, figure), {})[name] = value
             if options or label not in UNSEEN.split("|"):
                 cells.append((label, runs[-1][0], common.told(mean) if options else ""))
         common.sheet(out / f"{method}-{name}.png", cells, min(4, len(cells)))
     header = ["sample", "setting", *(figure.replace("_", " ") for figure in wanted)]
-    common.write(out / f"{method}.csv", header, rows)
+    common.table("Means over the seeds", header, rows, out / f"{method}.csv")
     ends = {case: worst(case[1], values) for case, values in means.items()}
     lines = [
         [*case, f"{np.mean(list(means[case].values())):.3f}", f"{ends[case][1]:.3f}", ends[case][0]] for case in ends

@@ -4,7 +4,7 @@
 import gzip
 import io
 import struct
-import zlib
+from functools import cache
 
 import numpy as np
 import tifffile
@@ -156,26 +156,8 @@ def volumes():
         "text.nrrd": header % (b"ascii", b"") + b" ".join(b"%d" % v for v in block.ravel()),
         "detached.nrrd": header % (b"raw", b"data file: ../beside/secret.raw\n"),
         "three.npz": _saved(np.savez, a=block, b=block),
-        "bomb.npz": _bomb(),
+        "bomb.npz": _saved(np.savez_compressed, volume=np.broadcast_to(np.uint8(0), (512, 1024, 1024))),
     }
-
-
-def _bomb():
-    """An archive of half a mebibyte that opens to 512: pieces of zeros, packed once."""
-    zeros, pieces = bytes(2**20), 512
-    told = {"descr": "|u1", "fortran_order": False, "shape": (pieces, 1024, 1024)}
-    head = _saved(np.lib.format.write_array_header_1_0, told)
-    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    packed = packer.compress(head) + packer.flush(zlib.Z_FULL_FLUSH)
-    packed += (packer.compress(zeros) + packer.flush(zlib.Z_FULL_FLUSH)) * pieces + packer.flush()
-    sum_of = zlib.crc32(head)
-    for _ in range(pieces):
-        sum_of = zlib.crc32(zeros, sum_of)
-    name, sizes = b"volume.npy", (len(packed), len(head) + pieces * len(zeros))
-    shared = struct.pack("<HHHHHIIIHH", 20, 0, 8, 0, 33, sum_of, *sizes, len(name), 0)
-    local = b"PK\x03\x04" + shared + name + packed
-    central = b"PK\x01\x02" + struct.pack("<H", 20) + shared + struct.pack("<HHHII", 0, 0, 0, 0, 0) + name
-    return local + central + b"PK\x05\x06" + struct.pack("<HHHHIIH", 0, 0, 1, 1, len(central), len(local), 0)
 
 
 def strange():
@@ -189,12 +171,18 @@ def strange():
     }
 
 
+@cache
 def build():
     """Role -> name -> bytes; the same on every call."""
     roles = {"picture": pictures, "mask": masks, "table": tables, "grid": grids, "volume": volumes, "strange": strange}
     made = {role: make() for role, make in roles.items()}
     made["picture"]["page.png"] = made["strange"]["page.eps"]
     return made
+
+
+def named(words):
+    """The files that a command line names: name -> bytes."""
+    return {name: data for files in build().values() for name, data in files.items() if name in words}
 
 
 WORDS = (
@@ -206,33 +194,48 @@ NUMBERS = tuple(
 )
 
 
+def damaged(data, how, rng):
+    """Return the content of a file after damage of a kind, ``bits`` for twenty flipped ones; None for no file."""
+    if how in ("cut", "empty", "remove"):
+        return {"cut": data[: rng.randrange(len(data) or 1)], "empty": b"", "remove": None}[how]
+    data = bytearray(data)
+    for _ in range(1 if how == "bit" else 20):
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    return bytes(data)
+
+
+def put(path, data):
+    """Give a file this content, or remove it."""
+    if data is None:
+        path.unlink(missing_ok=True)
+    else:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+
 def mutated(rng, data, others):
     """The bytes of a file with a few of them changed: flips, cuts, splices, numbers, repeats, words of text."""
     data = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
-        kind = rng.randrange(8)
         at = rng.randrange(len(data) + 1)
         if rng.random() < 0.5:  # headers tell most
             at = min(at, rng.randrange(200))
-        if kind == 0 and at < len(data):
-            data[at] ^= 1 << rng.randrange(8)
-        elif kind == 1:
+        digits = [i for i, byte in enumerate(data[:2000]) if 48 <= byte <= 57]
+        other, begin = rng.choice(others), rng.randrange(2000)
+        kind = rng.choice(("flip", "cut", "splice", "number", "repeat", "drop", "byte", "word"))
+        if kind in ("flip", "byte") and at < len(data):
+            data[at] = data[at] ^ 1 << rng.randrange(8) if kind == "flip" else rng.randrange(256)
+        elif kind == "cut":
             del data[at:]
-        elif kind == 2:
-            other = rng.choice(others)
-            begin = rng.randrange(len(other) + 1)
+        elif kind == "splice":
             data[at : at + rng.randrange(64)] = other[begin : begin + rng.randrange(64)]
-        elif kind == 3:
+        elif kind == "number":
             data[at : at + 4] = rng.choice(NUMBERS)
-        elif kind == 4:
+        elif kind == "repeat":
             data[at:at] = data[at : at + rng.randrange(40)] * rng.choice((1, 2, 50))
-        elif kind == 5:
+        elif kind == "drop":
             del data[at : at + rng.randrange(40)]
-        elif kind == 6 and at < len(data):
-            data[at] = rng.randrange(256)
-        else:
-            digits = [i for i, byte in enumerate(data[:2000]) if 48 <= byte <= 57]
-            if digits:
-                at = rng.choice(digits)
-                data[at : at + 1] = rng.choice(WORDS)
+        elif kind == "word" and digits:
+            at = rng.choice(digits)
+            data[at : at + 1] = rng.choice(WORDS)
     return bytes(data)
