@@ -19,11 +19,14 @@ from click.testing import CliRunner
 
 from fuzz import corpus
 from fuzz.corpus import damaged, put
-from fuzz.lines import METHOD_OF, OTHERS, RUNS, Maker
+from fuzz.lines import OTHERS, PLAIN, RUNS, Maker
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint
 from simdtex.cli import load
 from simdtex.cli import main as simdtex
+
+KEEPING = ("synth", "multires", "pyramid", "fill", "extend", "mix", "solid", "simulate", "classify")
+"""The jobs that keep a checkpoint."""
 
 ALWAYS = ("--seed", "5", "--device", "reference", "--quiet")
 FREE = ("output", "checkpoint", "help", "seed", "device", "quiet", *OTHERS)
@@ -73,7 +76,7 @@ def states(name):
     Checkpoint._write = keeping
     try:
         clear()
-        code, said, _ = call(*RUNS[name].split(), *ALWAYS, *KEEP)
+        code, said, _ = call(*RUNS[name], *ALWAYS, *KEEP)
     finally:
         Checkpoint._write = save
     assert code == 0, said
@@ -106,12 +109,12 @@ def damage(name, rng):
 
 def other_option(name, rng):
     """Give a command one more option and a checkpoint without it; return how that ended, and what is wrong."""
-    words, data = RUNS[name].split(), rng.choice(states(name)[1])
+    words, data = RUNS[name], rng.choice(states(name)[1])
     samples = [word for word in words[1:3] if word.endswith(".png")]
     options = [one for one in load(words[0]).params if isinstance(one, click.Option) and one.name not in FREE]
     option, maker = rng.choice(options), Maker(rng)
-    maker.method = METHOD_OF.get(name, name if name in ("multires", "pyramid") else "mrf")
-    line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], words[0], True), *ALWAYS]
+    maker.job = name
+    line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], True), *ALWAYS]
     clear(maker.files)
     before = files()
     valid = call(*line)[0] == 0
@@ -143,13 +146,13 @@ def begin(place, _device):
     warnings.simplefilter("ignore")
     checkpoints.FIRST, checkpoints.SHARE = 0.0, 0
     os.chdir(place)
-    for name, data in corpus.named(" ".join(RUNS.values()).replace("=", " ").split()).items():
+    for name, data in corpus.named(PLAIN.values()).items():
         Path(name).write_bytes(data)
     GIVEN.update(files())
 
 
 def one_try(rng):
     """Damage a checkpoint, or give it with another option; return as `fuzz.worker.one_try` does."""
-    name, (what, job) = rng.choice(list(RUNS)), rng.choice((("damage", damage), ("another option", other_option)))
+    name, (what, job) = rng.choice(KEEPING), rng.choice((("damage", damage), ("another option", other_option)))
     end, fault = job(name, rng)
     return f"{name}, {what}", f"{what}: {end}", [(name, fault)] if fault else []

@@ -156,7 +156,7 @@ def volumes():
         "text.nrrd": header % (b"ascii", b"") + b" ".join(b"%d" % v for v in block.ravel()),
         "detached.nrrd": header % (b"raw", b"data file: ../beside/secret.raw\n"),
         "three.npz": _saved(np.savez, a=block, b=block),
-        "bomb.npz": _saved(np.savez_compressed, volume=np.broadcast_to(np.uint8(0), (512, 1024, 1024))),
+        "bomb.npz": _saved(np.savez_compressed, volume=np.broadcast_to(np.uint8(0), (128, 1024, 1024))),
     }
 
 
