@@ -235,11 +235,6 @@ def measure_accuracy(bench):
         best = max(FIELDS, key=lambda setting: np.mean(found[size, *setting]))
         kept[f"binary patterns, window {size}, field {best[0]}, {best[1]}"] = np.array(found[size, *best])
     reference = kept["classify, grey"][..., 1]
-    for method, shares in kept.items():
-        for draw, curved in np.argwhere(shares[..., 1] > reference) if "classify" not in method else ():
-            figures = f"{shares[draw, curved, 1]:.3f}, classify {reference[draw, curved]:.3f}"
-            names = ", ".join(pairs[draw][curved].textures)
-            print(f"ahead: {method}: {figures}; {('straight', 'curved')[curved]} {names}")
     return ["classifier", *SHARES, f"ahead, of {reference.size}"], [
         [method, *(f"{share:.3f}" for share in shares.mean(0).ravel()), int((shares[..., 1] > reference).sum())]
         for method, shares in kept.items()

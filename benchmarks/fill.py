@@ -6,10 +6,9 @@
 
 Textures are those of scikit-image that every study has, or the pictures of a folder. ``fill``: four holes of each are
 filled by `simdtex.fill`, with the defaults and with every set of ``--options``, and beside it by
-`skimage.restoration.inpaint_biharmonic` and, if OpenCV is installed (``pip install opencv-python-headless``), by its
-``inpaint`` after Telea; the original is measured like a filling of its own hole. ``tile``: `simdtex.extend` makes each
-seamless by bands of several widths, and continues it to the right and downwards. ``--out`` takes a table for each part
-and a sheet for each texture, at 1:1. The figures, of which 1 is that of real texture:
+`skimage.restoration.inpaint_biharmonic`; the original is measured like a filling of its own hole. ``tile``:
+`simdtex.extend` makes each seamless by bands of several widths, and continues it to the right and downwards. ``--out``
+takes a table for each part and a sheet for each texture, at 1:1. The figures, of which 1 is that of real texture:
 
 rim     mean squared distance from the 7 x 7 patches that cross the rim to the nearest patch of the known part, over
         the same of patches of the known part; a patch is not compared with those within 8 pixels.
@@ -19,7 +18,6 @@ step    the same between two new pixels: below 1 what is new is blurred.
 tiles   `simdtex.quality.seam`: the step across the seam of a seamless picture laid side by side with itself.
 """
 
-from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
@@ -91,13 +89,6 @@ def biharmonic(picture, hole):
     return np.rint(found.clip(0, 1) * 255).astype(picture.dtype)
 
 
-def telea(picture, hole):
-    """The hole filled by OpenCV's fast marching after Telea (2004), reaching 3 pixels."""
-    import cv2
-
-    return cv2.inpaint(picture, hole.astype(np.uint8), 3, cv2.INPAINT_TELEA)
-
-
 def cut(picture, hole):
     """The picture with its hole in a colour that it does not have, for the eye."""
     shown = picture if picture.ndim == 3 else np.stack([picture] * 3, -1)
@@ -110,9 +101,7 @@ def fillings(picture, hole, settings, seeds, machine):
         for seed in range(1, seeds + 1):
             options = {"channel_axis": common.axis(picture), "rng": seed, "device": machine} | given
             yield label, simdtex.fill(picture, hole, **options)
-    for method in (biharmonic, telea):
-        with suppress(ModuleNotFoundError):
-            yield method.__name__, method(picture, hole)
+    yield "biharmonic", biharmonic(picture, hole)
     yield "original", picture
 
 

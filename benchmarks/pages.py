@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pictures of the pages on multiresolution sampling and on pyramid matching.
 
-    python benchmarks/pages.py [--only multires/edges,pyramid/solid] [--out docs] [--quick] [--device TEXT]
+    python benchmarks/pages.py [--only multires/edges,pyramid/solid] [--out docs] [--device TEXT]
 
-Writes a PNG file for each name, the same bytes every time. ``--quick`` divides sides and iterations by 4.
+Writes a PNG file for each name, the same bytes every time.
 """
 
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
@@ -17,7 +16,6 @@ from skimage.transform import resize
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.machine import Machine
 from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import Stretched
 from simdtex.report.sheet import view
@@ -62,90 +60,69 @@ FAILURES = {
 """Textures with structures beyond them, and of what kind they are."""
 
 
-@dataclass
-class Runs:
-    """Runs on a machine, whose sides and iterations are divided by a number."""
-
-    machine: Machine
-    part: int
-
-    def small(self, n):
-        """A side, or a number of iterations."""
-        return max(1, n // self.part)
-
-    def crop(self, sample):
-        return sample[: self.small(sample.shape[0]), : self.small(sample.shape[1])]
-
-    def given(self, sample, options):
-        return {"channel_axis": common.axis(sample), "rng": 1, "device": self.machine, "full_output": True} | options
-
-    def synth(self, sample, side, **options):
-        """A picture and its output."""
-        return simdtex.synthesize(self.crop(sample), (self.small(side),) * 2, **self.given(sample, options))
-
-    def pyramid(self, sample, side, **options):
-        return self.synth(sample, side, method="pyramid", **options)[0]
-
-    def mix(self, samples, side, **options):
-        given, cropped = self.given(samples[0], options), [self.crop(one) for one in samples]
-        return simdtex.mix(cropped, (self.small(side),) * 2, **given)[0]
-
-    def block(self, sample, side, **options):
-        return simdtex.synthesize_solid(self.crop(sample), (self.small(side),) * 3, **self.given(sample, options))
+def synth(machine, sample, side, **options):
+    """A picture with a side."""
+    given = {"channel_axis": common.axis(sample), "rng": 1, "device": machine} | options
+    return simdtex.synthesize(sample, (side, side), **given)
 
 
 # ---------------------------------------------------------------- multiresolution sampling: label and picture
 
 
-def mended(runs):
+def mended(machine):
     """Samples laid beside themselves, as they are and mended."""
     for how, name in product(("keep", "mend"), ("brick", "gravel", "tissue", "wood")):
-        one = runs.crop(SAMPLES[name])
+        one = SAMPLES[name]
         if how == "mend":
             one = one.reshape(-1, *one.shape[2:])[mend(Stretched(one.reshape(*one.shape[:2], -1)).planes)]
         yield f"{name}, {how}: seam {seam(one):.2f}", np.tile(one, (2, 2, 1)[: one.ndim])
 
 
-def joined(runs):
+def joined(machine):
     """Textures of the same places, whose bands are cut where they meet, and fade into each other."""
     for how, name in product(("cut", "blend"), ("gravel", "brick", "tissue")):
         one = SAMPLES[name]
-        yield f"{name}, {how}", runs.synth(one, 2 * len(one), method="multires", alpha=0.3, seams=how)[0]
+        yield f"{name}, {how}", synth(machine, one, 2 * len(one), method="multires", alpha=0.3, seams=how)
 
 
 # ---------------------------------------------------------------- pyramid matching
 
 
-def gallery(chosen, runs):
+def gallery(chosen, machine):
     for name, sample in chosen.items():
         kind, _, what = name.rpartition(": ")
-        yield what, runs.crop(sample)
-        yield kind, runs.pyramid(sample, 192)
+        yield what, sample
+        yield kind, synth(machine, sample, 192, method="pyramid")
 
 
-def mixtures(runs):
+def mixtures(machine):
     """Mixtures of two samples, and a picture to begin with."""
     wood, stroma = SAMPLES["wood"], data.immunohistochemistry()[250:346, 160:256]
     gravel, grass = SAMPLES["gravel"], FAR["grass"]
-    split = (2, 3) if runs.part == 1 else (1, 0)
-    start = resize(data.camera()[70:270, 120:320], (runs.small(128),) * 2, anti_aliasing=True)
-    yield from (("A: wood", runs.crop(wood)), ("B: stroma", runs.crop(stroma)))
+    start = resize(data.camera()[70:270, 120:320], (128, 128), anti_aliasing=True)
+
+    def mix(*samples, **options):
+        given = {"channel_axis": common.axis(samples[0]), "rng": 1, "device": machine} | options
+        return simdtex.mix(samples, (128, 128), **given)
+
+    yield from (("A: wood", wood), ("B: stroma", stroma))
     for name, options in (("palette A, pattern B", (0, 1)), ("palette B, pattern A", (1, 0))):
-        yield name, runs.mix([wood, stroma], 128, palette=options[0], pattern=options[1])
-    yield from (("C: gravel", runs.crop(gravel)), ("D: grass, reduced", runs.crop(grass)))
+        yield name, mix(wood, stroma, palette=options[0], pattern=options[1])
+    yield from (("C: gravel", gravel), ("D: grass, reduced", grass))
     for low, high in ((0, 1), (1, 0)):
         label = f"low {'CD'[low]}, high {'CD'[high]}, split 2"
-        yield label, runs.mix([gravel, grass], 128, low=low, high=high, split=split[0])
+        yield label, mix(gravel, grass, low=low, high=high, split=2)
     for a, b in ((3, 1), (1, 1), (1, 3)):
-        yield f"{a} A + {b} B", runs.mix([wood, stroma], 128, average=[a, b])
-    yield "low C, high D, split 3", runs.mix([gravel, grass], 128, low=0, high=1, split=split[1])
-    yield "A, begun with a picture", runs.mix([wood], 128, start=start, iterations=runs.small(5))
+        yield f"{a} A + {b} B", mix(wood, stroma, average=[a, b])
+    yield "low C, high D, split 3", mix(gravel, grass, low=0, high=1, split=3)
+    yield "A, begun with a picture", mix(wood, start=start, iterations=5)
 
 
-def solids(runs):
+def solids(machine):
     """Two blocks as one sees them."""
     for name, sample in (("gravel, reduced", FAR["gravel"]), ("tissue", SAMPLES["tissue"])):
-        yield name, view(runs.block(sample, 96)[0], size=max(96, runs.small(288)))
+        given = {"channel_axis": common.axis(sample), "rng": 1, "device": machine}
+        yield name, view(simdtex.synthesize_solid(sample, (96, 96, 96), **given), size=288)
 
 
 MADE = {
@@ -160,10 +137,10 @@ MADE = {
 
 
 @common.command
-def main(only="", out=common.DOCS, quick=False, device=None):
-    runs = Runs(common.opened(device), 4 if quick else 1)
+def main(only="", out=common.DOCS, device=None):
+    machine = common.opened(device)
     for name, (made, columns, scale) in common.chosen(MADE, only).items():
-        common.sheet(out / f"{name}.png", [(*cell, "") for cell in made(runs)], columns, scale=scale)
+        common.sheet(out / f"{name}.png", [(*cell, "") for cell in made(machine)], columns, scale=scale)
         print(out / f"{name}.png", flush=True)
 
 

@@ -44,13 +44,13 @@ def cases(photograph, sample, device):
 
 @common.command
 def main(out=common.DOCS / "study" / "quality.csv", device=None):
-    photograph, table = data.gravel(), []
+    photograph, rows = data.gravel(), []
     sample = photograph[:128, :128]
     for name, picture, source in cases(photograph, sample, device):
         found = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
-        table.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
-    headings = [figure.removesuffix("_distance").replace("_", " ") for figure in FIGURES]
-    common.table("", ["picture", *headings], table, out)
+        rows.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
+    header = ["picture", *(figure.removesuffix("_distance").replace("_", " ") for figure in FIGURES)]
+    common.table("", header, rows, out)
 
 
 if __name__ == "__main__":

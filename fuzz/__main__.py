@@ -28,8 +28,8 @@ from pebble import ProcessExpired, ProcessPool
 from benchmarks.common import chosen, command
 from fuzz import KINDS, begin, one_try
 
-SECONDS = 63.0
-"""Seconds until the process of a try is killed; `simdtex demo` may take nearly as long."""
+SECONDS = 60.0
+"""Seconds until the process of a try is killed, which may wait for another on a busy machine."""
 
 LIFE = 3000
 """Tries of a process: what libraries keep would count as memory of later tries."""

@@ -28,7 +28,6 @@ LINES = {
     "schedules": (0.1, "schedules PICTURE -o out --size 9x9 --seeds 1 --schedule coloring --order 1"),
     "resume": (0.5, "resume PICTURE"),
     "devices": (0.1, "devices"),
-    "demo": (0.05, "demo -o out"),
     "bench": (0.05, "bench --json no/such/file.json"),  # else it measures for minutes
     "nothing": (0.3, "nothing"),
 }
@@ -109,14 +108,13 @@ class Try:
     """A command line and its files.
 
     ``args`` of ``simdtex``; ``files`` name -> bytes, in the folder it runs in; ``kind`` what is unusual about it;
-    ``old`` names of files that are there and may be replaced; ``interrupt`` seconds after which it gets a Ctrl-C.
+    ``old`` names of files that are there and may be replaced.
     """
 
     args: list[str]
     files: dict[str, bytes] = field(default_factory=dict)
     kind: str = "plain"
     old: list[str] = field(default_factory=list)
-    interrupt: float | None = None
 
 
 @cache
@@ -140,14 +138,10 @@ class Maker:
         if rng.random() < 0.05:
             args[rng.randrange(len(args))] = rng.choice((*TEXT, "--help", "-o", "--nothing", "-q", "--size"))
             self.kinds.add("odd words")
-        interrupt, old = rng.uniform(0.0005, 0.08) if rng.random() < 0.02 else None, []
-        if interrupt:
-            self.kinds.add("interrupted")
-        elif rng.random() < 0.1:
-            old = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
-            self.files |= dict.fromkeys(old, b"old")
-        args = [word for word in args if word != "nothing"] if rng.random() < 0.5 else args
-        return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old, interrupt)
+        there = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
+        old = there if rng.random() < 0.1 else []
+        self.files |= dict.fromkeys(old, b"old")
+        return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old)
 
     def drawn(self, found):
         """A word in place of one in capitals."""

@@ -5,12 +5,10 @@ The process has a home, a folder for temporary files and a limit to its address 
 moves or removes is noted.
 """
 
-import contextlib
 import os
 import re
 import resource
 import shutil
-import signal
 import sys
 import time
 import traceback
@@ -24,9 +22,6 @@ MEMORY = 2**30
 
 SECONDS = 10.0
 """Seconds that a try may take."""
-
-DEMO = 60.0
-"""Seconds that `simdtex demo` may take, whose samples are those of the package."""
 
 LOOKING = ("uname", "fc-list", sys.executable)
 """Programs that may be started: libraries identify the machine with them, and simdtex probes devices."""
@@ -64,7 +59,7 @@ class Worker:
 
         from simdtex.cli import main
 
-        self.main, self.around = main, self.listing()
+        self.main = main
         sys.addaudithook(self.hook)
         for words in list(RUNS.values())[:9] if device == "reference" else ():  # what they import is no memory of a try
             self.run(Try(words, corpus.named(PLAIN.values())))
@@ -92,16 +87,6 @@ class Worker:
             if isinstance(path, (str, bytes, os.PathLike)):
                 self.seen.append((what, os.path.abspath(os.fsdecode(path))))
 
-    def listing(self):
-        """Path -> size and time of everything but the try."""
-        found = {}
-        for path in self.root.rglob("*"):
-            if self.folder not in (path, *path.parents):
-                with contextlib.suppress(OSError):  # it is gone
-                    told = path.lstat()
-                    found[str(path)] = None if path.is_dir() else (told.st_size, told.st_mtime_ns)
-        return found
-
     def run(self, one):
         """Run a try; return its exit code and its faults."""
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -117,8 +102,7 @@ class Worker:
         before, began, code, faults = _kibibytes("VmRSS"), time.perf_counter(), 0, []
         self.seen, self.on = [], True
         try:
-            with _interrupted(one.interrupt):
-                self.main(args=list(one.args), prog_name="simdtex", standalone_mode=True)
+            self.main(args=list(one.args), prog_name="simdtex", standalone_mode=True)
         except SystemExit as error:
             code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
         except BaseException as error:  # what else comes out is what this is looking for
@@ -133,7 +117,7 @@ class Worker:
         said = os.pread(self.streams[1], 2**16, 0).decode(errors="replace")
         size = 1024 * (_kibibytes("VmHWM") - before)
         faults += [*([] if faults else said_wrong(one, code, said)), *self.left_wrong(one, code)]
-        if seconds > (DEMO if "demo" in one.args[:1] else SECONDS):
+        if seconds > SECONDS:
             faults.append(("time", one.args[0]))
         if size > MEMORY or "the memory does not suffice" in said:
             faults.append(("memory", one.args[0]))
@@ -159,15 +143,10 @@ class Worker:
             if any(part.startswith(".") or part.endswith((".tmp", ".part")) for part in Path(name).parts):
                 yield "left behind", f"{one.args[0]}: {_plain(re.sub(r'[a-z0-9_]{8}', '*', Path(name).name))}"
             elif not any(first == Path(word).parts[0] for word in named if word and Path(word).parts):
-                if first != "schedules-report" and one.args[0] != "demo":
+                if first != "schedules-report":
                     yield "file nobody named", f"{one.args[0]} {_plain(name)}"
-            elif code and not one.interrupt and name == first and there[name].is_file():
+            elif code and name == first and there[name].is_file():
                 yield "written on failure", f"{one.args[0]} {_plain(name)}"
-        now = self.listing()
-        for path in now.keys() ^ self.around.keys():
-            if not _of_libraries(path):
-                yield "left elsewhere", _plain(os.path.relpath(path, self.root))
-        self.around = now
         for what, path in self.seen:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]
@@ -183,11 +162,11 @@ def said_wrong(one, code, said):
     if "Traceback (most recent call last)" in said:
         yield "traceback", said.strip().splitlines()[-1][:200]
         return
-    if code not in ((0, 2, 130) if one.interrupt else (0, 2)):
+    if code not in (0, 2):
         yield "exit code", str(code)
     if warned := re.search(r"\w*Warning: .*", said):
         yield "warning", warned[0][:160]
-    if not code or one.interrupt:  # whose sentence may come after another, or within it
+    if not code:
         return
     sentence, lines = said.strip(), said.strip().splitlines()
     if usage := re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL):
@@ -203,8 +182,6 @@ def said_wrong(one, code, said):
         sentence = (plain or [""])[-1]
     if "[Errno" in sentence:
         yield "raw error", _plain(sentence)
-    if len(sentence) > 6000:
-        yield "long sentence", _plain(sentence[:100])
     if re.search(HIDDEN, sentence):
         yield "hidden name", _plain(sentence)
 
@@ -235,34 +212,6 @@ def _where(error):
 def _kibibytes(name):
     with open("/proc/self/status") as file:
         return int(next(line for line in file if line.startswith(name)).split()[1])
-
-
-@contextlib.contextmanager
-def _interrupted(seconds):
-    """Send a Ctrl-C after some seconds, unless the try has ended."""
-    if not seconds:
-        yield
-        return
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
-    before = signal.signal(signal.SIGINT, _leave)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGINT, lambda *_: None)
-        time.sleep(0.05)  # a Ctrl-C in an import comes again a little later
-        signal.signal(signal.SIGINT, before)
-
-
-def _leave(_, frame):
-    """Handle a Ctrl-C outside a command as `simdtex.__main__` does, but without ending the process."""
-    from simdtex.cli.command import postponed
-
-    if postponed(frame):
-        return
-    os.write(2, b"simdtex: stopped\n")
-    raise SystemExit(130)
 
 
 _worker = None
