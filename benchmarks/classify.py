@@ -12,15 +12,14 @@ the middle) and one with curved borders. ``--out`` takes a table for each part:
 accuracy  shares of right labels 16 or more pixels from borders, and of all pixels; of the classifier, and of
           random forests on local binary patterns, without and with the same Potts field. The baselines need
           scikit-learn (``pip install -e '.[benchmarks]'``).
-unknown   the area under the curve (AUROC) of fits: of each class alone, its held-out part against whole pictures of
-          every other texture; and in mosaics of which one class was not learned; and the shares of pixels of unknown
-          and of known textures that are called unknown.
+unknown   in mosaics of which one class was not learned: the area under the curve (AUROC) of the fit of the label, and
+          the shares of pixels of unknown and of known textures that are called unknown.
 """
 
 from collections import defaultdict
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import common
 import numpy as np
@@ -39,6 +38,7 @@ SHARES = ["straight, away", "straight, all", "curved, away", "curved, all"]
 LUMA = (0.299, 0.587, 0.114)
 NUMBER = 5  # textures of a mosaic
 PATTERNS = ((8, 1), (8, 2), (16, 3))  # points and radius of local binary patterns
+WINDOW = 4  # pixels of the Gaussian windows of their means
 SHOWN = 3000  # pixels of each class that a forest learns from
 LEAST = 0.01  # added to a forest's probabilities, which may be 0
 AWAY = 16  # pixels from a border beyond which a pixel lies away from it
@@ -136,11 +136,11 @@ def own_fit(output):
     return np.take_along_axis(output.fit, output.probability.argmax(-1)[..., None], -1)[..., 0]
 
 
-def averaged(planes, picture, window):
+def averaged(planes, picture):
     """Means of planes over Gaussian windows, with the mean and the contrast of the picture, (..., features)."""
     values = picture.astype(np.float32)
-    mean, square = (gaussian_filter(one, window) for one in (values, values * values))
-    means = [gaussian_filter(np.asarray(plane, np.float32), window) for plane in planes]
+    mean, square = (gaussian_filter(one, WINDOW) for one in (values, values * values))
+    means = [gaussian_filter(np.asarray(plane, np.float32), WINDOW) for plane in planes]
     return np.stack([*means, mean, np.sqrt(np.maximum(square - mean * mean, 0))], -1)
 
 
@@ -151,7 +151,7 @@ def patterns(picture):
         yield from (code == value for value in range(points + 2))
 
 
-def probabilities(training, pictures, window):
+def probabilities(training, pictures):
     """Logarithms of probabilities by a random forest, (classes, rows, cols) for each of grey pictures."""
     try:
         from sklearn.ensemble import RandomForestClassifier
@@ -159,7 +159,7 @@ def probabilities(training, pictures, window):
         raise SystemExit("the baselines need scikit-learn: pip install -e '.[benchmarks]'") from None
 
     def pixels(picture):
-        found = averaged(patterns(picture), picture, window)
+        found = averaged(patterns(picture), picture)
         return found.reshape(-1, found.shape[-1])
 
     rng = np.random.default_rng(1)
@@ -169,24 +169,10 @@ def probabilities(training, pictures, window):
     return [np.log(forest.predict_proba(pixels(one)).T.reshape(-1, *one.shape) + LEAST) for one in pictures]
 
 
-class Bench(NamedTuple):
-    """What every part is given: ``known`` textures by name, the numbers of draws, and a ``side`` in pixels."""
-
-    machine: Any
-    known: dict
-    draws: int
-    seed: int
-    side: int
-
-    def pairs(self):
-        """Two mosaics, straight and curved, for each draw."""
-        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(self.draws)]
-
-
-def labelled(bench, picture, samples, colour=False, **options):
+def labelled(machine, picture, samples, colour=False, **options):
     """Labels and output of the classifier, for pictures with three bands, which are made grey unless in colour."""
     kind = np.asarray if colour else grey
-    given = {"rng": 1, "device": bench.machine, "channel_axis": -1 if colour else None} | options
+    given = {"rng": 1, "device": machine, "channel_axis": -1 if colour else None} | options
     given["textures"] = {texture: kind(one) for texture, one in samples.items()}
     return simdtex.classify(kind(picture), full_output=True, **given)
 
@@ -212,9 +198,9 @@ def field(machine, evidence, coupling, weight, sweeps=10):
     return 1 + before
 
 
-def measure_accuracy(bench):
+def measure_accuracy(machine, pairs):
     """Accuracy of the classifier and of the baseline, and in how many mosaics each is ahead of the classifier."""
-    found, pairs = defaultdict(list), bench.pairs()
+    found = defaultdict(list)
     for pair in pairs:
         samples, pictures = parts(pair[0].textures), [grey(m.picture) for m in pair]
 
@@ -223,17 +209,14 @@ def measure_accuracy(bench):
 
         for kind, (text, weight) in product(("grey", "colour"), (("", {}), (", no field", {"weight": 0}))):
             options = {"colour": kind == "colour", "unknown": 0, **weight}
-            note(f"classify, {kind}{text}", [labelled(bench, m.picture, samples, **options)[0] for m in pair])
-        for size in (4, 10):
-            chances = probabilities([grey(one) for one in samples.values()], pictures, size)
-            note(size, [1 + one.argmax(0) for one in chances])
-            for setting in FIELDS:
-                note((size, *setting), [field(bench.machine, one, *setting) for one in chances])
+            note(f"classify, {kind}{text}", [labelled(machine, m.picture, samples, **options)[0] for m in pair])
+        chances = probabilities([grey(one) for one in samples.values()], pictures)
+        note("binary patterns, no field", [1 + one.argmax(0) for one in chances])
+        for setting in FIELDS:
+            note(setting, [field(machine, one, *setting) for one in chances])
     kept = {method: np.array(shares) for method, shares in found.items() if isinstance(method, str)}
-    for size in (4, 10):
-        kept[f"binary patterns, window {size}, no field"] = np.array(found[size])
-        best = max(FIELDS, key=lambda setting: np.mean(found[size, *setting]))
-        kept[f"binary patterns, window {size}, field {best[0]}, {best[1]}"] = np.array(found[size, *best])
+    best = max(FIELDS, key=lambda setting: np.mean(found[setting]))
+    kept[f"binary patterns, field {best[0]}, {best[1]}"] = np.array(found[best])
     reference = kept["classify, grey"][..., 1]
     return ["classifier", *SHARES, f"ahead, of {reference.size}"], [
         [method, *(f"{share:.3f}" for share in shares.mean(0).ravel()), int((shares[..., 1] > reference).sum())]
@@ -241,47 +224,35 @@ def measure_accuracy(bench):
     ]
 
 
-def measure_unknown(bench):
-    """AUROC of the fit of each class alone, and of the labels' own in mosaics of which one class was not learned."""
-    alone, left = {}, {}
+def measure_unknown(machine, pairs):
+    """AUROC of the fits of the labels in mosaics of which one class was not learned."""
+    left = {}
 
     def judged(strange, known):
         return auroc(strange, known), (strange < ASKED).mean(), (known < ASKED).mean()
 
-    for name, own in bench.known.items():
-        classifier = simdtex.TextureClassifier(rng=1, device=bench.machine)
-        classifier.fit(grey(own.training), np.ones(own.training.shape[:2], int))
-        others = [one for other, one in bench.known.items() if other != name]
-        whole = [picture for one in others for picture in (one.training, one.test)]
-        strange = np.concatenate([classifier.predict_fit(grey(picture))[::4, ::4].ravel() for picture in whole])
-        alone[name] = judged(strange, classifier.predict_fit(grey(own.test))[..., 0])
-    for number, pair in enumerate(bench.pairs()):
+    for number, pair in enumerate(pairs):
         mosaic = pair[number % 2]
         for label, missing in enumerate(mosaic.textures, 1):
             samples = {name: one for name, one in parts(mosaic.textures).items() if name != missing}
-            fit, strange = own_fit(labelled(bench, mosaic.picture, samples)[1]), mosaic.truth == label
+            fit, strange = own_fit(labelled(machine, mosaic.picture, samples)[1]), mosaic.truth == label
             left[f"{missing} (draw {number + 1})"] = judged(fit[strange], fit[~strange])
-    rows = []
-    for case, values in {"one class, other pictures": alone, "a class left out of a mosaic": left}.items():
-        worst = ", ".join(f"{one} {values[one][0]:.3f}" for one in sorted(values, key=values.get)[:3])
-        area, *shares = np.mean([*values.values()], 0)
-        rows.append([case, f"{area:.3f}", worst, *(f"{100 * share:.0f} %" for share in shares)])
-    return ["case", "AUROC, mean", "worst", "unknown called so at 5 %", "known called unknown"], rows
+    worst = ", ".join(f"{one} {left[one][0]:.3f}" for one in sorted(left, key=left.get)[:3])
+    area, *shares = np.mean([*left.values()], 0)
+    rows = [[f"{area:.3f}", worst, *(f"{100 * share:.0f} %" for share in shares)]]
+    return ["AUROC, mean", "worst", "unknown called so at 5 %", "known called unknown"], rows
 
 
-PARTS = {
-    "accuracy": measure_accuracy,
-    "unknown": measure_unknown,
-}
+PARTS = {"accuracy": measure_accuracy, "unknown": measure_unknown}
 
 
 @common.command
 def main(samples, only="", parts="", draws=10, seed=1, side=256, out=Path, device=None):
     chosen, known = common.chosen(PARTS, parts), textures(samples, only)
-    bench = Bench(common.opened(device), known, draws, seed, side)
+    machine, pairs = common.opened(device), [drawn(known, (seed, draw), side) for draw in range(draws)]
     print(f"textures: {len(known)}")
     for part, measure in chosen.items():
-        common.table(part, *measure(bench), out and out / f"{part}.csv")
+        common.table(part, *measure(machine, pairs), out and out / f"{part}.csv")
 
 
 if __name__ == "__main__":

@@ -49,9 +49,8 @@ def command(main):
         elif isinstance(default, tuple):
             parameters.append(click.Option(words, type=several_of(type(default[0])), default=default))
         else:
-            flag = isinstance(default, bool) or None
             kind = Path if isinstance(default, Path) else None
-            parameters.append(click.Option(words, type=kind, default=default, is_flag=flag))
+            parameters.append(click.Option(words, type=kind, default=default, is_flag=default is False))
     about = "\b\n" + main.__globals__["__doc__"].replace("\n\n", "\n\n\b\n")  # the lines stay as they are
     return click.Command(main.__name__, callback=called, params=parameters, help=about)
 
@@ -162,10 +161,7 @@ def in_turns(runs, jobs):
 def python(*words, **given):
     """What a Python process prints."""
     command = [sys.executable, *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, **given)
-    if done.returncode:
-        raise RuntimeError(done.stderr)
-    return done.stdout
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, **given).stdout
 
 
 # ---------------------------------------------------------------- tables and sheets

@@ -18,7 +18,7 @@ step    the same between two new pixels: below 1 what is new is blurred.
 tiles   `simdtex.quality.seam`: the step across the seam of a seamless picture laid side by side with itself.
 """
 
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import common
@@ -36,7 +36,7 @@ APART = 8  # patches nearer to one another are not compared
 QUERIES = 1024  # patches of the known part that are looked up
 FAR = 1e3  # what is unknown, in sample standard deviations: no patch with it is the nearest
 FIGURES = ("rim", "inside", "seam", "step")
-BANDS, ADDED = (4, 8, 16, 32), 64  # widths of bands, and what is added, pixels
+BANDS, ADDED = (4, 8, 16, 32), {"right": 64, "bottom": 64}  # widths of bands, and what is added, pixels
 
 
 def hole_shapes(shape):
@@ -138,17 +138,15 @@ def tiled(_name, picture, _settings, seeds, machine):
     """Make a texture seamless and continue it; yield as `filled` does."""
     yield "", "as it is", {"tiles": simdtex.quality.seam(picture)}, twice(picture)
     rows, cols = picture.shape[:2]
-    for band in (band for band in BANDS if 3 * band < min(rows, cols)):
-        for seed in range(1, seeds + 1):
-            given = {"channel_axis": common.axis(picture), "rng": seed, "device": machine}
-            made = simdtex.extend(picture, seamless=True, band=band, **given)
-            yield "", f"band {band}", seamless(made, band), twice(made)
-    for seed in range(1, seeds + 1):
-        given = {"channel_axis": common.axis(picture), "rng": seed, "device": machine}
-        made = simdtex.extend(picture, right=ADDED, bottom=ADDED, **given)
-        new = np.ones(made.shape[:2], bool)
-        new[:rows, :cols] = False
-        yield "", "continued", score(made, made, new), made
+    ways = {f"band {band}": {"seamless": True, "band": band} for band in BANDS if 3 * band < min(rows, cols)}
+    for (label, what), seed in product((ways | {"continued": ADDED}).items(), range(1, seeds + 1)):
+        made = simdtex.extend(picture, channel_axis=common.axis(picture), rng=seed, device=machine, **what)
+        if label == "continued":
+            new = np.ones(made.shape[:2], bool)
+            new[:rows, :cols] = False
+            yield "", label, score(made, made, new), made
+        else:
+            yield "", label, seamless(made, what["band"]), twice(made)
 
 
 PARTS = {"fill": (filled, FIGURES), "tile": (tiled, ("tiles", *FIGURES))}

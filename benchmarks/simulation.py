@@ -79,13 +79,6 @@ def hard_data(truth, number, seed):
     return np.ma.array(truth, mask=hidden.reshape(truth.shape)) if number else None
 
 
-def alone(image, known):
-    """Data that no pixel beside them shares the category of."""
-    around = np.pad(image, 1, mode="edge")
-    beside = (around[:-2, 1:-1], around[2:, 1:-1], around[1:-1, :-2], around[1:-1, 2:])
-    return int((~np.ma.getmaskarray(known) & ~np.any([one == image for one in beside], 0)).sum())
-
-
 def specks(image):
     """Bodies of 16 pixels or less in 10,000 pixels."""
     sizes = np.bincount(ndimage.label(image)[0].ravel())[1:]
@@ -97,11 +90,10 @@ def figures(made, image, truth, known):
     row, col = ([], []) if known is None else np.nonzero(~known.mask)
     data = np.stack([col, row, truth[row, col]], -1) if known is not None else None
     found = summary(made, image, data=data)
-    single = 0.0 if known is None else sum(alone(one, known) for one in made) / len(made)
     ends, anodi = found.dead_ends[1], found.anodi  # the training image comes last
     return [
         *(f"{found.shares[1, :-1].mean():.3f}", f"{ends[:-1].mean():.2f}", f"{ends[-1]:.2f}"),
-        *(f"{found.components[1, :-1].mean():.2f}", f"{np.mean([specks(one) for one in made]):.2f}", f"{single:.1f}"),
+        *(f"{found.components[1, :-1].mean():.2f}", f"{np.mean([specks(one) for one in made]):.2f}"),
         *(int(found.misses.sum()), f"{(made == truth).mean():.3f}", f"{anodi.by_level[0, 1]:.3f}"),
         *(f"{found.copied.mean():.2f}", f"{anodi.variety:.3f}", f"{anodi.likeness:.3f}", f"{anodi.ratio:.2f}"),
     ]
@@ -177,7 +169,7 @@ def soft(_images, _data, number, side, options, _out):
         yield [name, *(f"{part.mean():.2f}" for part in np.array_split(share, STRIPS, axis=1))]
 
 
-OF_MAPS = "share|dead ends|in the image|bodies|specks|alone|misses|right|js 4x4|copied|variety|likeness|ratio"
+OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
     "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
@@ -186,16 +178,7 @@ PARTS = {
 
 
 @common.command
-def main(
-    parts="",
-    images=tuple(IMAGES),
-    data=(0, 50, 200, 500),
-    number=50,
-    side=int,
-    options="",
-    out=Path,
-    device=None,
-):
+def main(parts="", images="", data=(0, 50, 200, 500), number=50, side=int, options="", out=Path, device=None):
     given = {"categorical": True, "rng": 1, "device": common.opened(device)} | common.parsed(options)
     if out:
         out.mkdir(parents=True, exist_ok=True)

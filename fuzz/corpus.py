@@ -22,16 +22,14 @@ def _saved(write, *args, **options):
 
 
 def _pixels(channels, dtype, rows=SIDE, cols=SIDE):
-    """A pattern with something of noise, in the whole range of a type."""
+    """A pattern with some noise, in the whole range of a type."""
     row, col, channel = np.ogrid[:rows, :cols, :channels]
     noise = np.random.default_rng(rows * cols * channels).integers(0, 60, (rows, cols, channels))
     values = (row // 3 + col // 3 + channel) % 2 * 150 + noise
     dtype = np.dtype(dtype)
     if dtype.kind == "f":
         return (values / 255).astype(dtype)
-    if dtype.kind == "b":
-        return values > 100
-    return (values * (np.iinfo(dtype).max // 255)).astype(dtype)
+    return values > 100 if dtype.kind == "b" else (values * (np.iinfo(dtype).max // 255)).astype(dtype)
 
 
 def _npy(values):
@@ -59,10 +57,8 @@ def pictures():
     holed, alpha = _pixels(1, np.float32)[..., 0].copy(), np.full((SIDE, SIDE, 1), 255, np.uint8)
     holed[2:5, 2:6], alpha[3:6, 3:7] = np.nan, 0
     made |= {
-        "jpeg.jpg": _drawn(rgb, "jpeg"),
-        "grey.jpg": _drawn(grey, "jpeg"),
-        "colour.bmp": _drawn(rgb, "bmp"),
-        "grey.gif": _drawn(grey, "gif"),
+        **{"jpeg.jpg": _drawn(rgb, "jpeg"), "grey.jpg": _drawn(grey, "jpeg")},
+        **{"colour.bmp": _drawn(rgb, "bmp"), "grey.gif": _drawn(grey, "gif")},
         **{f"animated.{kind}": _drawn(rgb, kind, **several) for kind in ("gif", "webp", "png")},
         "lossy.webp": _drawn(rgb, "webp", quality=50),
         "palette.png": _drawn(Image.fromarray(rgb).quantize(8)),
@@ -77,11 +73,8 @@ def pictures():
         "nan": holed,
         "fortran": np.asfortranarray(grey),
         "big-endian": short.astype(">u2"),
-        "complex": np.ones((4, 4), complex),
-        "object": np.array([[None]]),
-        "empty": np.zeros((0, 5), np.uint8),
-        "constant": np.full((9, 9), 7, np.uint8),
-        "one": np.full((1, 1), 7, np.uint8),
+        **{"complex": np.ones((4, 4), complex), "object": np.array([[None]]), "empty": np.zeros((0, 5), np.uint8)},
+        **{"constant": np.full((9, 9), 7, np.uint8), "one": np.full((1, 1), 7, np.uint8)},
         "huge-values": _pixels(1, np.float64)[..., 0] * 1e308,
         "tiny-values": _pixels(1, np.float64)[..., 0] * 1e-320,
         "inf": np.full((6, 6), np.inf),
@@ -113,14 +106,9 @@ def grids():
 
 def masks():
     """Pictures of black and white of the same size."""
-    mask = np.zeros((SIDE, SIDE), np.uint8)
-    mask[3:6, 3:7] = 255
-    return {
-        "hole.png": _drawn(mask),
-        "most.png": _drawn(255 - mask),
-        "black.png": _drawn(0 * mask),
-        "hole.npy": _npy(mask > 0),
-    }
+    mask = np.pad(np.full((3, 4), 255, np.uint8), ((3, SIDE - 6), (3, SIDE - 7)))
+    drawn = {"hole.png": _drawn(mask), "most.png": _drawn(255 - mask), "black.png": _drawn(0 * mask)}
+    return drawn | {"hole.npy": _npy(mask > 0)}
 
 
 def tables():
@@ -134,8 +122,7 @@ def tables():
         "labels.txt": b"x y v\n1 1 0\n2 5 1\n",
         "same.csv": b"x,y,v\n1,1,10\n1,1,20\n",
         "far.csv": b"x,y,v\n-1,1e300,10\n",
-        "nan.csv": b"x,y,v\nnan,1,10\n1,inf,3\n",
-        "bom.csv": b"\xef\xbb\xbfx,y,v\r\n1,1,10\r\n",
+        "nan.csv": b"\xef\xbb\xbfx,y,v\r\nnan,1,10\r\n1,inf,3\r\n",
         "empty.csv": b"",
     }
 

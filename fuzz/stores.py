@@ -23,14 +23,12 @@ SHAPE = 20, 21
 GREY = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]
 COLOUR = np.stack([GREY, GREY[::-1], 9 - GREY], -1)
 KNOWN = np.ma.masked_array(np.full(SHAPE, 4, np.uint8), np.indices(SHAPE).sum(0) % 9 > 0)
-GUIDE = GREY // 4, np.indices(SHAPE).sum(0).astype(np.uint8) // 20
 SMALL = {"order": 1, "levels": 2, "xi": -8.0, "rng": 11, "device": "reference"}
 
 TILED = {
     "known values": (GREY, 12, {"known": KNOWN}),
     "seam": (GREY, 16, {"boundary": "torus", "finish": 1.0}),
     "colour": (COLOUR, 18, {"channel_axis": -1}),
-    "guide": (GREY, 16, {"guide": GUIDE}),
 }
 """Runs in tiles: the sample, the side of a tile, and options."""
 

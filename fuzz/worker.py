@@ -33,10 +33,7 @@ HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8,}|\.tmp\b|<[a-z_.]+ object a
 """Names that no message may contain: of temporary files and objects."""
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
-CHANGES = (
-    *("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink"),
-    *("os.truncate", "os.chmod", "os.utime"),
-)
+CHANGES = tuple(map("os.{}".format, "rename remove mkdir rmdir link symlink truncate chmod utime".split()))  # noqa: SIM905
 
 
 class Worker:
@@ -151,7 +148,7 @@ class Worker:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]
             elif what == "write" and not path.startswith((str(folder), str(self.root / "tmp"), *SYSTEM)):
-                if not _of_libraries(path):
+                if not any(word in path for word in CACHES):
                     yield "written elsewhere", _plain(path)
             elif what == "read" and path.startswith(str(self.root / "beside")):
                 yield "read elsewhere", f"{one.args[0]} {Path(path).name}"
@@ -186,11 +183,6 @@ def said_wrong(one, code, said):
         yield "hidden name", _plain(sentence)
 
 
-def _of_libraries(path):
-    """Return whether a path is of a cache of a library: of fonts, of compiled kernels."""
-    return any(word in path for word in CACHES)
-
-
 def _plain(text):
     """Return a message without the numbers and names of one try, so that equal faults count as one."""
     text = re.sub(r"/dev/shm/fuzz[^ ]*/try/", "", text)
@@ -203,9 +195,8 @@ def _plain(text):
 def _where(error):
     """Return the kind of an error, and where in the package it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [frame for frame in frames if "/simdtex/" in frame.filename] or list(frames[-1:])
-    last = ours[-1]
-    name = last.filename[last.filename.find("simdtex/") :] if ours else "?"
+    last = ([frame for frame in frames if "/simdtex/" in frame.filename] or frames)[-1]
+    name = last.filename.rpartition("/simdtex/")[2]
     return f"{type(error).__name__} at {name}:{last.name}: {_plain(str(error))[:120]}"
 
 
