@@ -14,6 +14,11 @@ def begin(kind, root, device):
     import_module(KINDS[kind]).begin(tempfile.mkdtemp(dir=root), device)
 
 
+def seeded(seed, number):
+    """Return the generator of a try."""
+    return random.Random(f"{seed}-{number}")
+
+
 def one_try(kind, seed, number):
     """Return what was tried, how it ended, and the faults, pairs of a kind and a text."""
-    return import_module(KINDS[kind]).one_try(random.Random(f"{seed}-{number}"))
+    return import_module(KINDS[kind]).one_try(seeded(seed, number))

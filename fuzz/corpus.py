@@ -75,8 +75,7 @@ def pictures():
         "big-endian": short.astype(">u2"),
         **{"complex": np.ones((4, 4), complex), "object": np.array([[None]]), "empty": np.zeros((0, 5), np.uint8)},
         **{"constant": np.full((9, 9), 7, np.uint8), "one": np.full((1, 1), 7, np.uint8)},
-        "huge-values": _pixels(1, np.float64)[..., 0] * 1e308,
-        "tiny-values": _pixels(1, np.float64)[..., 0] * 1e-320,
+        **{f"{n}-values": _pixels(1, np.float64)[..., 0] * by for n, by in (("huge", 1e308), ("tiny", 1e-320))},
         "inf": np.full((6, 6), np.inf),
         "labels": (grey > 100).astype(np.uint8),
     }
@@ -149,7 +148,6 @@ def strange():
     return {
         "empty.png": b"",
         "text.png": b"hello\n",
-        "zeros.png": bytes(300),
         "page.eps": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\nshowpage\n%%EOF\n",
         "brackets.json": b"[" * 100_000,
     }

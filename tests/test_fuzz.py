@@ -1,7 +1,6 @@
 """The fuzzer: the same seed gives the same tries, faults are found, and a short run finds none."""
 
 import os
-import random
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +9,7 @@ from unittest.mock import MagicMock
 import pytest
 
 import fuzz.__main__ as driver
-from fuzz import KINDS, corpus, worker
+from fuzz import KINDS, corpus, seeded, worker
 from fuzz.lines import LINES, RUNS, Maker, Try
 from simdtex.cli import COMMANDS as KNOWN
 from simdtex.io import image
@@ -38,7 +37,7 @@ def test_every_command_is_tried():
 
 def test_a_seed_and_a_number_give_a_try():
     def made(seed):
-        return [Maker(random.Random(f"{seed}-{number}")).make() for number in range(50)]
+        return [Maker(seeded(seed, number)).make() for number in range(50)]
 
     tries = made(1)
     assert tries == made(1) != made(2)
