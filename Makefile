@@ -108,15 +108,12 @@ mutants:
 	set -f; OCL_ICD_VENDORS=/nonexistent $(PY) -m mutmut run --max-children 1 $(MUTANTS)
 	$(PY) -m mutmut results
 
-# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing/*.csv, which docs/testing.rst shows.
+# MINUTES=1 SEED=7 give others.
 MINUTES ?= 10
 SEED ?= 1
-RECORD ?=
 fuzz:
 	$(call install,test,[test])
-	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED) $(RECORD)
-	$(PY) -m fuzz.stores --seed $(SEED)
-	$(PY) -m fuzz.checkpoints --seed $(SEED)
+	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED)
 
 # What goes to the package index: built, checked, and tried in an empty environment.
 .PHONY: dist

@@ -1,77 +1,185 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well `simdtex.classify` labels textures, beside classifiers of other kinds, and how long it takes.
+"""How well `simdtex.classify` labels textures, beside classifiers of other kinds.
 
-    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown,calibration,order,defaults,time]
-                                  [--draws N] [--seed N] [--side N] [--out DIR] [--device TEXT]
+    python benchmarks/classify.py DIR [--only '*.png'] [--parts accuracy,unknown] [--draws N] [--seed N] [--side N]
+                                  [--out DIR] [--device TEXT]
 
 Textures are the pictures of a folder, and brick, grass and gravel of scikit-image. What is learned from and what is
 labelled lie apart: the left and the right half of a picture, or of one with 512 or more pixels a side [:128, :128] and
 [-256:, -256:]. Each draw takes five textures at random, for a mosaic with straight borders (quadrants, and a square in
 the middle) and one with curved borders. ``--out`` takes a table for each part:
 
-accuracy     shares of right labels 16 or more pixels from borders, and of all pixels; of the classifier, and of
-             random forests on local binary patterns and on Gabor energies, without and with the same Potts field.
-             The baselines need scikit-learn (``pip install -e '.[benchmarks]'``).
-unknown      the area under the curve (AUROC) of fits: of each class alone, its held-out part against whole pictures
-             of every other texture; and in mosaics of which one class was not learned.
-calibration  the shares of pixels called unknown that are of a known texture, by the probability asked for.
-order        accuracy by the order of neighbourhoods; of whole ones, and of the pixel given its neighbours: equation
-             (6) with the bandwidth of equation (8), by `simdtex.lcpdf` at every fourth row and column. Half the draws.
-defaults     accuracy with other values of the options. Half the draws.
-time         512x512 against five samples of 128x128 (by --side), seconds on the device by kernel, best of three;
-             and how much faster than the NumPy reference a small case is.
+accuracy  shares of right labels 16 or more pixels from borders, and of all pixels; of the classifier, and of
+          random forests on local binary patterns, without and with the same Potts field. The baselines need
+          scikit-learn (``pip install -e '.[benchmarks]'``).
+unknown   in mosaics of which one class was not learned: the area under the curve (AUROC) of the fit of the label, and
+          the share of the pixels of the unknown texture that are called unknown.
 """
 
 from collections import defaultdict
-from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import common
 import numpy as np
-from mosaics import FEATURES, accuracy, auroc, drawn, grey, own_fit, probabilities, textures
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.stats import rankdata
 from skimage import data
+from skimage.feature import local_binary_pattern
 
 import simdtex
 from simdtex.ops.classes import WEIGHTS, gaussian, potts, window
 
-ASKED = (0.01, 0.05, 0.1)  # probabilities of calling a known texture unknown
+ASKED = 0.05  # the probability of calling a known texture unknown
 FIELDS = [(coupling, weight) for coupling in (8, 11) for weight in (2, 4, 7, 12)]  # of the baselines; they get the best
-ORDERS = (1, 2, 4, 8, 18)
-STEP = 4  # rows and columns between the sites that the density of a pixel is computed at
-DEFAULTS = {"typical": (0.0, 0.6), "levels": (1, 2), "exemplars": (500, 4000), "coupling": (4, 12), "weight": (3, 12)}
 UNITS = 2**18  # of evidence and votes
 SHARES = ["straight, away", "straight, all", "curved, away", "curved, all"]
+LUMA = (0.299, 0.587, 0.114)
+NUMBER = 5  # textures of a mosaic
+PATTERNS = ((8, 1), (8, 2), (16, 3))  # points and radius of local binary patterns
+WINDOW = 4  # pixels of the Gaussian windows of their means
+SHOWN = 3000  # pixels of each class that a forest learns from
+LEAST = 0.01  # added to a forest's probabilities, which may be 0
+AWAY = 16  # pixels from a border beyond which a pixel lies away from it
 
 
-class Bench(NamedTuple):
-    """What every part is given: ``known`` textures by name, the numbers of draws, and a ``side`` in pixels."""
+class Texture(NamedTuple):
+    """Parts of a picture for training and for tests, (rows, cols, 3) uint8."""
 
-    machine: Any
-    known: dict
-    draws: int
-    seed: int
-    side: int
-
-    def pairs(self, part=1):
-        """Two mosaics, straight and curved, for each draw or for a part of the draws."""
-        return [drawn(self.known, (self.seed, draw), self.side) for draw in range(-(-self.draws // part))]
+    training: np.ndarray
+    test: np.ndarray
 
 
-def labelled(bench, picture, samples, colour=False, **options):
+class Mosaic(NamedTuple):
+    """A picture (rows, cols, 3), the ``truth`` (rows, cols), 1 the first of its textures, and those by name."""
+
+    picture: np.ndarray
+    truth: np.ndarray
+    textures: dict
+
+
+def grey(picture):
+    """The luma of a picture with three bands, uint8."""
+    return np.rint(picture @ LUMA).astype(np.uint8)
+
+
+def parted(picture):
+    """The parts of a picture of 256 or more pixels a side, by its corners, or of a smaller one, by its halves."""
+    colour = picture[..., :3] if picture.ndim == 3 else np.stack([picture] * 3, -1)
+    rows, cols = colour.shape[:2]
+    if min(rows, cols) >= 512:
+        return Texture(colour[:128, :128], colour[-256:, -256:])
+    return Texture(colour[:, : cols // 2], colour[:, cols // 2 :])
+
+
+def textures(folder, only=""):
+    """The textures of a folder, and brick, grass and gravel of scikit-image, by name."""
+    found = common.folder(folder, only)
+    found |= {name: getattr(data, name)() for name in ("brick", "grass", "gravel")}
+    return {name: parted(picture) for name, picture in found.items()}
+
+
+def regions(side, rng, curved, number=NUMBER):
+    """Labels 1 to 5 of a mosaic: quadrants and a square in the middle, or the greatest of random fields."""
+    if curved:
+        noise = rng.standard_normal((number, side, side))
+        fields = np.array([gaussian_filter(one, side / 7, mode="reflect") for one in noise])
+        return 1 + (fields / fields.std((1, 2), keepdims=True)).argmax(0)
+    half, quarter = side // 2, side // 4
+    found = 1 + np.add.outer(2 * (np.arange(side) >= half), np.arange(side) >= half)
+    found[quarter:-quarter, quarter:-quarter] = number
+    return found
+
+
+def laid(picture, side):
+    """A picture of a side, filled with another side by side."""
+    return np.tile(picture, [*(-(-side // length) for length in picture.shape[:2]), 1])[:side, :side]
+
+
+def drawn(known, seed, side=256):
+    """Two mosaics of the same five textures drawn at random, with straight borders and with curved ones."""
+    rng = np.random.default_rng(seed)
+    chosen = {name: known[name] for name in rng.choice(sorted(known), NUMBER, replace=False).tolist()}
+    found = []
+    for curved in (False, True):
+        truth = regions(side, rng, curved)
+        filled = np.array([laid(one.test, side) for one in chosen.values()])
+        found.append(Mosaic(np.take_along_axis(filled, truth[None, ..., None] - 1, 0)[0], truth, chosen))
+    return found
+
+
+def border_distance(truth):
+    """How far each pixel is from the nearest of another label; infinite if there is none."""
+    found = np.full(truth.shape, np.inf)
+    for label in np.unique(truth):
+        if not (own := truth == label).all():
+            found[own] = distance_transform_edt(own)[own]
+    return found
+
+
+def accuracy(labels, truth):
+    """The shares of right labels away from borders, and of all."""
+    right = labels == truth
+    return right[border_distance(truth) >= AWAY].mean(), right.mean()
+
+
+def auroc(unknown, known):
+    """The area under the curve of right against false alarms, of scores that are lower for the unknown."""
+    unknown, known = np.ravel(unknown), np.ravel(known)
+    ranks = rankdata(np.concatenate([unknown, known]))[len(unknown) :]
+    return (ranks.sum() - len(known) * (len(known) + 1) / 2) / len(known) / len(unknown)
+
+
+def own_fit(output):
+    """The fit of each pixel's most probable class, (rows, cols)."""
+    return np.take_along_axis(output.fit, output.probability.argmax(-1)[..., None], -1)[..., 0]
+
+
+def averaged(planes, picture):
+    """Means of planes over Gaussian windows, with the mean and the contrast of the picture, (..., features)."""
+    values = picture.astype(np.float32)
+    mean, square = (gaussian_filter(one, WINDOW) for one in (values, values * values))
+    means = [gaussian_filter(np.asarray(plane, np.float32), WINDOW) for plane in planes]
+    return np.stack([*means, mean, np.sqrt(np.maximum(square - mean * mean, 0))], -1)
+
+
+def patterns(picture):
+    """Where each local binary pattern occurs in a grey picture."""
+    for points, radius in PATTERNS:
+        code = local_binary_pattern(picture, points, radius, "uniform")
+        yield from (code == value for value in range(points + 2))
+
+
+def probabilities(training, pictures):
+    """Logarithms of probabilities by a random forest, (classes, rows, cols) for each of grey pictures."""
+    try:
+        from sklearn.ensemble import RandomForestClassifier
+    except ModuleNotFoundError:
+        raise SystemExit("the baselines need scikit-learn: pip install -e '.[benchmarks]'") from None
+
+    def pixels(picture):
+        found = averaged(patterns(picture), picture)
+        return found.reshape(-1, found.shape[-1])
+
+    rng = np.random.default_rng(1)
+    shown = [rng.permutation(pixels(one))[:SHOWN] for one in training]
+    forest = RandomForestClassifier(100, n_jobs=2, random_state=1, min_samples_leaf=3)
+    forest.fit(np.concatenate(shown), np.repeat(np.arange(len(shown)), [len(one) for one in shown]))
+    return [np.log(forest.predict_proba(pixels(one)).T.reshape(-1, *one.shape) + LEAST) for one in pictures]
+
+
+def labelled(machine, picture, samples, colour=False, **options):
     """Labels and output of the classifier, for pictures with three bands, which are made grey unless in colour."""
     kind = np.asarray if colour else grey
-    given = {"rng": 1, "device": bench.machine, "channel_axis": -1 if colour else None} | options
-    for name, pictures in {"textures": samples, "validation": options.get("validation")}.items():
-        if pictures:
-            given[name] = {texture: kind(one) for texture, one in pictures.items()}
+    given = {"rng": 1, "device": machine, "channel_axis": -1 if colour else None} | options
+    given["textures"] = {texture: kind(one) for texture, one in samples.items()}
     return simdtex.classify(kind(picture), full_output=True, **given)
 
 
-def parts(textures, part="training"):
-    """A part of every texture, by name."""
-    return {name: getattr(one, part) for name, one in textures.items()}
+def parts(textures):
+    """The training part of every texture, by name."""
+    return {name: one.training for name, one in textures.items()}
 
 
 def field(machine, evidence, coupling, weight, sweeps=10):
@@ -90,9 +198,9 @@ def field(machine, evidence, coupling, weight, sweeps=10):
     return 1 + before
 
 
-def measure_accuracy(bench):
-    """Accuracy of the classifier and of the baselines, and in how many mosaics each is ahead of the classifier."""
-    found, pairs = defaultdict(list), bench.pairs()
+def measure_accuracy(machine, pairs):
+    """Accuracy of the classifier and of the baseline, and in how many mosaics each is ahead of the classifier."""
+    found = defaultdict(list)
     for pair in pairs:
         samples, pictures = parts(pair[0].textures), [grey(m.picture) for m in pair]
 
@@ -101,175 +209,49 @@ def measure_accuracy(bench):
 
         for kind, (text, weight) in product(("grey", "colour"), (("", {}), (", no field", {"weight": 0}))):
             options = {"colour": kind == "colour", "unknown": 0, **weight}
-            note(f"classify, {kind}{text}", [labelled(bench, m.picture, samples, **options)[0] for m in pair])
-        for name, size in product(FEATURES, (4, 10)):
-            chances = probabilities([grey(one) for one in samples.values()], pictures, FEATURES[name], size)
-            note((name, size), [1 + one.argmax(0) for one in chances])
-            for setting in FIELDS:
-                note((name, size, *setting), [field(bench.machine, one, *setting) for one in chances])
+            note(f"classify, {kind}{text}", [labelled(machine, m.picture, samples, **options)[0] for m in pair])
+        chances = probabilities([grey(one) for one in samples.values()], pictures)
+        note("binary patterns, no field", [1 + one.argmax(0) for one in chances])
+        for setting in FIELDS:
+            note(setting, [field(machine, one, *setting) for one in chances])
     kept = {method: np.array(shares) for method, shares in found.items() if isinstance(method, str)}
-    for name, size in product(FEATURES, (4, 10)):
-        kept[f"{name}, window {size}, no field"] = np.array(found[name, size])
-        best = max(FIELDS, key=lambda setting: np.mean(found[name, size, *setting]))
-        kept[f"{name}, window {size}, field {best[0]}, {best[1]}"] = np.array(found[name, size, *best])
+    best = max(FIELDS, key=lambda setting: np.mean(found[setting]))
+    kept[f"binary patterns, field {best[0]}, {best[1]}"] = np.array(found[best])
     reference = kept["classify, grey"][..., 1]
-    for method, shares in kept.items():
-        for draw, curved in np.argwhere(shares[..., 1] > reference) if "classify" not in method else ():
-            figures = f"{shares[draw, curved, 1]:.3f}, classify {reference[draw, curved]:.3f}"
-            names = ", ".join(pairs[draw][curved].textures)
-            print(f"ahead: {method}: {figures}; {('straight', 'curved')[curved]} {names}")
     return ["classifier", *SHARES, f"ahead, of {reference.size}"], [
         [method, *(f"{share:.3f}" for share in shares.mean(0).ravel()), int((shares[..., 1] > reference).sum())]
         for method, shares in kept.items()
     ]
 
 
-def measure_unknown(bench):
-    """AUROC of the fit of each class alone, and of the labels' own in mosaics of which one class was not learned."""
-    alone, left = {}, {}
+def measure_unknown(machine, pairs):
+    """AUROC of the fits of the labels in mosaics of which one class was not learned."""
+    left = {}
 
     def judged(strange, known):
-        return auroc(strange, known), (strange < ASKED[1]).mean()
+        return auroc(strange, known), (strange < ASKED).mean()
 
-    for name, own in bench.known.items():
-        classifier = simdtex.TextureClassifier(rng=1, device=bench.machine)
-        classifier.fit(grey(own.training), np.ones(own.training.shape[:2], int))
-        others = [one for other, one in bench.known.items() if other != name]
-        whole = [picture for one in others for picture in (one.training, one.test)]
-        strange = np.concatenate([classifier.predict_fit(grey(picture))[::4, ::4].ravel() for picture in whole])
-        alone[name] = judged(strange, classifier.predict_fit(grey(own.test))[..., 0])
-    for number, pair in enumerate(bench.pairs()):
+    for number, pair in enumerate(pairs):
         mosaic = pair[number % 2]
         for label, missing in enumerate(mosaic.textures, 1):
             samples = {name: one for name, one in parts(mosaic.textures).items() if name != missing}
-            fit, strange = own_fit(labelled(bench, mosaic.picture, samples)[1]), mosaic.truth == label
+            fit, strange = own_fit(labelled(machine, mosaic.picture, samples)[1]), mosaic.truth == label
             left[f"{missing} (draw {number + 1})"] = judged(fit[strange], fit[~strange])
-    rows = []
-    for case, values in {"one class, other pictures": alone, "a class left out of a mosaic": left}.items():
-        worst = ", ".join(f"{one} {values[one][0]:.3f}" for one in sorted(values, key=values.get)[:3])
-        area, share = np.mean([*values.values()], 0)
-        rows.append([case, f"{area:.3f}", worst, f"{100 * share:.0f} %"])
-    return ["case", "AUROC, mean", "worst", "called unknown at 5 %"], rows
+    worst = ", ".join(f"{one} {left[one][0]:.3f}" for one in sorted(left, key=left.get)[:3])
+    area, share = np.mean([*left.values()], 0)
+    return ["AUROC, mean", "worst", "called unknown at 5 %"], [[f"{area:.3f}", worst, f"{100 * share:.0f} %"]]
 
 
-def measure_calibration(bench):
-    """The shares of known textures that are called unknown, by problem and by the probability that was asked for."""
-    found = defaultdict(list)
-
-    def note(problem, fits):
-        found[problem].append([np.mean([(fit < asked).mean() for fit in fits]) for asked in ASKED])
-
-    def held(textures, **options):
-        samples = parts(textures)
-        return [own_fit(labelled(bench, rest, samples, **options)[1]) for rest in parts(textures, "rest").values()]
-
-    groups = [("five classes", pair[0].textures) for pair in bench.pairs()]
-    groups += [("one class", {name: one}) for name, one in bench.known.items()]
-    for problem, group in groups:
-        note(problem, held(group))
-        note(f"{problem}, with validation", held(group, validation=parts(group, "further")))
-    for number, pair in enumerate(bench.pairs()):
-        output = labelled(bench, pair[number % 2].picture, parts(pair[0].textures))[1]
-        note("five classes, in mosaics", [own_fit(output)])
-    return ["problem", *(f"{100 * asked:g} %" for asked in ASKED), "most at 5 %"], [
-        [problem, *(f"{100 * share:.1f} %" for share in np.mean(shares, 0)), f"{100 * np.max(shares, 0)[1]:.0f} %"]
-        for problem, shares in sorted(found.items())
-    ]
-
-
-def densities(bench, mosaic, order):
-    """Logarithms of the LCPDF of each class at every fourth row and column, (classes, rows, cols)."""
-    picture = grey(mosaic.picture)
-    sites = np.stack(np.mgrid[: picture.shape[0] : STEP, : picture.shape[1] : STEP], -1)
-    flat, values = sites.reshape(-1, 2), picture[::STEP, ::STEP].ravel()
-    options = {"order": order, "boundary": "open", "device": bench.machine}
-    found = [simdtex.lcpdf(picture, grey(one), flat, **options) for one in parts(mosaic.textures).values()]
-    own = np.array(found)[:, np.arange(len(flat)), values]
-    return np.log(np.maximum(own, 1e-9)).reshape(-1, *sites.shape[:2])
-
-
-def measure_order(bench):
-    """Accuracy by order, for whole neighbourhoods and for the pixel given its neighbours, without and with a field."""
-    rows = []
-    for order in ORDERS:
-        shares = defaultdict(list)
-        for mosaic in (mosaic for pair in bench.pairs(2) for mosaic in pair):
-            options = {"order": order, "weight": 0, "unknown": 0}
-            labels, output = labelled(bench, mosaic.picture, parts(mosaic.textures), **options)
-            evidence = np.log(np.maximum(np.moveaxis(output.probability, -1, 0), 1e-30))
-            logs, truth = densities(bench, mosaic, order), mosaic.truth[::STEP, ::STEP]
-            shares["whole"].append((labels == mosaic.truth).mean())
-            shares["whole, field"].append((field(bench.machine, evidence, 8, 7) == mosaic.truth).mean())
-            shares["pixel"].append((1 + logs.argmax(0) == truth).mean())
-            for coupling, weight in FIELDS:
-                labels = field(bench.machine, logs, coupling / STEP, weight)
-                shares[coupling, weight].append((labels == truth).mean())
-        mean = {name: np.mean(values) for name, values in shares.items()}
-        found = (mean["whole"], mean["whole, field"], mean["pixel"], max(mean[setting] for setting in FIELDS))
-        rows.append([order, *(f"{share:.3f}" for share in found)])
-    return ["order", "whole, no field", "whole, field", "pixel, no field", "pixel, field"], rows
-
-
-def measure_defaults(bench):
-    """Accuracy with the defaults, and with one option changed."""
-    settings, rows = {"defaults": {}}, []
-    settings |= {f"{name} {value:g}": {name: value} for name, values in DEFAULTS.items() for value in values}
-    for text, options in settings.items():
-        shares = [
-            [accuracy(labelled(bench, m.picture, parts(m.textures), unknown=0, **options)[0], m.truth) for m in pair]
-            for pair in bench.pairs(2)
-        ]
-        rows.append([text, *(f"{share:.3f}" for share in np.mean(shares, 0).ravel())])
-    return ["options", *SHARES], rows
-
-
-def large(side, size):
-    """A picture and five samples, of brick, grass, gravel and two of them turned."""
-    pictures = [getattr(data, name)() for name in ("brick", "grass", "gravel")]
-    pictures += [np.rot90(pictures[0]), np.rot90(pictures[1])]
-    place = np.add.outer(np.arange(side) // -(-side // 3) * 3, np.arange(side) // -(-side // 3)) % 5
-    picture = np.choose(place, [one[-side:, -side:] for one in pictures])
-    return picture, {str(number): one[:size, :size] for number, one in enumerate(pictures)}
-
-
-def measure_time(bench):
-    """Seconds of a run on the device by kernel, and the ratio to the NumPy reference."""
-
-    def fastest(side, size, machine):
-        job = partial(simdtex.classify, *large(side, size), rng=1, device=machine, full_output=True)
-        (_, output), seconds = min(common.in_turns(3, {"": partial(common.timed, job)})[""], key=lambda run: run[1])
-        return seconds, output.statistics.get("kernels", [])
-
-    seconds, kernels = fastest(2 * bench.side, bench.side // 2, bench.machine)
-    rows = [[f"{2 * bench.side}x{2 * bench.side}, the whole call", "", f"{seconds:.2f} s"]]
-    rows += [[one["name"], one["calls"], f"{one['seconds']:.3f} s"] for one in kernels]
-    side, size = bench.side // 4, bench.side * 3 // 16
-    plain, fast = (fastest(side, size, machine)[0] for machine in (simdtex.open_machine("reference"), bench.machine))
-    rows.append([f"{side}x{side}, five samples of {size}x{size}", "", f"{fast:.3f} s"])
-    rows.append(["the same by the reference", "", f"{plain:.3f} s, {plain / fast:.0f} times"])
-    return ["what", "launches", "time"], rows
-
-
-PARTS = {
-    "accuracy": measure_accuracy,
-    "unknown": measure_unknown,
-    "calibration": measure_calibration,
-    "order": measure_order,
-    "defaults": measure_defaults,
-    "time": measure_time,
-}
+PARTS = {"accuracy": measure_accuracy, "unknown": measure_unknown}
 
 
 @common.command
 def main(samples, only="", parts="", draws=10, seed=1, side=256, out=Path, device=None):
     chosen, known = common.chosen(PARTS, parts), textures(samples, only)
-    bench = Bench(common.opened(device, profile=True), known, draws, seed, side)
+    machine, pairs = common.opened(device), [drawn(known, (seed, draw), side) for draw in range(draws)]
     print(f"textures: {len(known)}")
     for part, measure in chosen.items():
-        (header, rows), seconds = common.timed(measure, bench)
-        common.show(f"{part}, {seconds:.0f} s", header, rows)
-        if out:
-            common.write(out / f"{part}.csv", header, rows)
+        common.table(part, *measure(machine, pairs), out and out / f"{part}.csv")
 
 
 if __name__ == "__main__":

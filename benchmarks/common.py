@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the benchmarks share: command lines, samples, times, processes, tables and sheets."""
 
-import argparse
 import ast
 import csv
 import inspect
@@ -10,11 +9,9 @@ import sys
 import time
 from contextlib import suppress
 from fnmatch import fnmatch
-from functools import wraps
-from io import BytesIO
 from pathlib import Path
 
-import numpy as np
+import click
 import PIL.Image
 from skimage import data
 
@@ -27,42 +24,47 @@ DOCS = Path(__file__).parent.parent / "docs"
 
 
 def command(main):
-    """Give a function a command line: its parameters are the options.
+    """Return a command whose options are the parameters of a function; one without a default is a path.
 
-    A parameter without a default is an argument. A default of a tuple takes one or more values, and a type takes one of
-    that type, or several in turn (list), and is None if it is not given.
+    A tuple is given as ``a,b``. A default that is a type is None if the option is missing; `list` may be given again.
     """
 
-    @wraps(main)
-    def called(words=None):
-        form = argparse.RawDescriptionHelpFormatter
-        parser = argparse.ArgumentParser(description=main.__globals__["__doc__"], formatter_class=form)
-        for name, one in inspect.signature(main).parameters.items():
-            default, given = one.default, {}
-            if default is one.empty:
-                parser.add_argument(name, type=Path)
-                continue
-            if isinstance(default, bool):
-                given = {"action": "store_true"}
-            elif isinstance(default, tuple):
-                given = {"nargs": "+", "type": type(default[0])}
-            elif default is list:
-                given, default = {"action": "append"}, None
-            elif callable(default):
-                given, default = {"type": default}, None
-            elif default is not None:
-                given = {"type": type(default)}
-            dashes = "-" if len(name) == 1 else "--"
-            parser.add_argument(dashes + name.replace("_", "-"), default=default, **given)
+    def called(**given):
         try:
-            return main(**vars(parser.parse_args(words)))
+            failed = main(**given)
         except (ValueError, TypeError) as error:
-            parser.error(str(error))
+            raise click.UsageError(str(error)) from None
+        if failed:
+            raise SystemExit(1)
 
-    return called
+    parameters = []
+    for name, one in inspect.signature(main).parameters.items():
+        default, words = one.default, [f"--{name.replace('_', '-')}"]
+        if default is one.empty:
+            parameters.append(click.Argument([name], type=Path))
+        elif default is list:
+            parameters.append(click.Option(words, multiple=True))
+        elif isinstance(default, type):
+            parameters.append(click.Option(words, type=default))
+        elif isinstance(default, tuple):
+            parameters.append(click.Option(words, type=several_of(type(default[0])), default=default))
+        else:
+            kind = Path if isinstance(default, Path) else None
+            parameters.append(click.Option(words, type=kind, default=default, is_flag=default is False))
+    about = "\b\n" + main.__globals__["__doc__"].replace("\n\n", "\n\n\b\n")  # the lines stay as they are
+    return click.Command(main.__name__, callback=called, params=parameters, help=about)
 
 
-def chosen(known, names=""):
+def several_of(kind):
+    """Return the function that reads values of a kind from ``"a,b"``."""
+
+    def values(text):
+        return text if isinstance(text, tuple) else tuple(kind(part) for part in text.split(","))
+
+    return values
+
+
+def chosen(known, names=()):
     """The entries of a dictionary that are named, by a list or as ``"a,b"``; all without names."""
     wanted = names.split(",") if isinstance(names, str) and names else names or list(known)
     for name in wanted:
@@ -84,9 +86,9 @@ def parsed(text):
     return options
 
 
-def opened(device, **given):
+def opened(device):
     """A machine, whose name is printed."""
-    machine = simdtex.open_machine(device, **given)
+    machine = simdtex.open_machine(device)
     print(f"device: {machine.name}")
     return machine
 
@@ -159,26 +161,19 @@ def in_turns(runs, jobs):
 def python(*words, **given):
     """What a Python process prints."""
     command = [sys.executable, *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, **given)
-    if done.returncode:
-        raise RuntimeError(done.stderr)
-    return done.stdout
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, **given).stdout
 
 
 # ---------------------------------------------------------------- tables and sheets
 
 
-def write(path, header, rows):
-    """Write a table as CSV, and make the folder that it lies in; a path of None is standard output."""
-    if path is not None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with open(sys.stdout.fileno() if path is None else path, "w", newline="", closefd=path is not None) as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows])
-
-
-def show(title, header, rows):
-    """Print a table."""
+def table(title, header, rows, path=None):
+    """Print a table, and write it as CSV where a path is given."""
     print_table(Table(title, [dict(zip(header, map(str, row), strict=True)) for row in rows]))
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
 def told(figures):
@@ -186,20 +181,9 @@ def told(figures):
     return "  ".join(f"{name} {value:.2f}" for name, value in figures.items())
 
 
-def sheet(path, cells, columns):
-    """Write cells of label, picture and caption as a sheet, each picture at 1:1."""
+def sheet(path, cells, columns, **given):
+    """Write cells of label, picture and caption as a sheet of 256 colours; ``given`` are other options of its."""
+    pictures, captions = zip(*(((label, picture), caption) for label, picture, caption in cells), strict=True)
+    drawn = contact_sheet(pictures, columns=columns, captions=captions if any(captions) else None, **given)
     path.parent.mkdir(parents=True, exist_ok=True)
-    pictures, captions = [cell[:2] for cell in cells], [caption for *_, caption in cells]
-    contact_sheet(pictures, path, columns=columns, captions=captions, scale=1)
-
-
-def png(picture):
-    """A picture as a PNG: in shades of grey where it has no colours, else of 256 colours."""
-    found = PIL.Image.fromarray(picture)
-    if (picture == picture[..., :1]).all():
-        found = found.convert("L")
-    elif len(np.unique(picture.reshape(-1, 3), axis=0)) > 256:
-        found = found.quantize(256, PIL.Image.Quantize.MEDIANCUT, dither=PIL.Image.Dither.NONE)
-    buffer = BytesIO()
-    found.save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
+    PIL.Image.fromarray(drawn).quantize(256, dither=PIL.Image.Dither.NONE).save(path, optimize=True)

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well holes are filled: parts of textures are cut out, filled, and compared with real texture.
+"""How well holes are filled and pictures made seamless and continued: what is new is compared with real texture.
 
-    python benchmarks/fill.py [--samples DIR] [--only brick,wood] [--seeds N] [--options NAME=VALUE,NAME=VALUE ...]
-                              [--holes rectangle,blob,scratch,border] [--out DIR] [--csv FILE] [--device TEXT]
+    python benchmarks/fill.py [--samples DIR] [--only brick,wood] [--parts fill,tile] [--seeds N]
+                              [--options search=exact] [--out DIR] [--device TEXT]
 
-Textures are those of scikit-image that every study has, or the pictures of a folder. Each hole is filled by
-`simdtex.fill`, with the defaults and with every set of ``--options``, and beside it by
-`skimage.restoration.inpaint_biharmonic` and, if OpenCV is installed (``pip install opencv-python-headless``), by its
-``inpaint`` after Telea; the original is measured like a filling of its own hole. ``--out`` writes a sheet for each
-texture, at 1:1. The figures, of which 1 is that of real texture:
+Textures are those of scikit-image that every study has, or the pictures of a folder. ``fill``: four holes of each are
+filled by `simdtex.fill`, with the defaults and with every set of ``--options``, and beside it by
+`skimage.restoration.inpaint_biharmonic`; the original is measured like a filling of its own hole. ``tile``:
+`simdtex.extend` makes each seamless by bands of several widths, and continues it to the right and downwards. ``--out``
+takes a table for each part and a sheet for each texture, at 1:1. The figures, of which 1 is that of real texture:
 
 rim     mean squared distance from the 7 x 7 patches that cross the rim to the nearest patch of the known part, over
         the same of patches of the known part; a patch is not compared with those within 8 pixels.
-inside  the same of the patches that lie in the hole.
-seam    mean absolute step between a pixel of the hole and a known one beside it, over that between known ones.
-step    the same between two pixels of the hole: below 1 the filling is blurred.
+inside  the same of the patches that lie in what is new.
+seam    mean absolute step between a new pixel and a known one beside it, over that between known ones.
+step    the same between two new pixels: below 1 what is new is blurred.
+tiles   `simdtex.quality.seam`: the step across the seam of a seamless picture laid side by side with itself.
 """
 
-from contextlib import suppress
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import common
@@ -36,6 +36,7 @@ APART = 8  # patches nearer to one another are not compared
 QUERIES = 1024  # patches of the known part that are looked up
 FAR = 1e3  # what is unknown, in sample standard deviations: no patch with it is the nearest
 FIGURES = ("rim", "inside", "seam", "step")
+BANDS, ADDED = (4, 8, 16, 32), {"right": 64, "bottom": 64}  # widths of bands, and what is added, pixels
 
 
 def hole_shapes(shape):
@@ -88,13 +89,6 @@ def biharmonic(picture, hole):
     return np.rint(found.clip(0, 1) * 255).astype(picture.dtype)
 
 
-def telea(picture, hole):
-    """The hole filled by OpenCV's fast marching after Telea (2004), reaching 3 pixels."""
-    import cv2
-
-    return cv2.inpaint(picture, hole.astype(np.uint8), 3, cv2.INPAINT_TELEA)
-
-
 def cut(picture, hole):
     """The picture with its hole in a colour that it does not have, for the eye."""
     shown = picture if picture.ndim == 3 else np.stack([picture] * 3, -1)
@@ -102,54 +96,90 @@ def cut(picture, hole):
 
 
 def fillings(picture, hole, settings, seeds, machine):
-    """What the hole is filled with, in turn: label, seed, picture, seconds."""
+    """What the hole is filled with, in turn: label and picture."""
     for label, given in settings.items():
         for seed in range(1, seeds + 1):
             options = {"channel_axis": common.axis(picture), "rng": seed, "device": machine} | given
-            yield label, seed, *common.timed(simdtex.fill, picture, hole, **options)
-    for method in (biharmonic, telea):
-        with suppress(ModuleNotFoundError):
-            yield method.__name__, 1, *common.timed(method, picture, hole)
-    yield "original", 1, picture, 0.0
+            yield label, simdtex.fill(picture, hole, **options)
+    yield "biharmonic", biharmonic(picture, hole)
+    yield "original", picture
 
 
-def report(results, path, figures=FIGURES):
-    """Print the means over seeds and holes, and write them as a table; results are picture, shape, label, figures."""
+def filled(name, picture, settings, seeds, machine):
+    """Fill the four holes of a texture; yield the hole, the filling, its figures and its picture."""
+    for shape, hole in hole_shapes(picture.shape[:2]).items():
+        yield shape, f"{name}, {shape}", None, cut(picture, hole)
+        for label, made in fillings(picture, hole, settings, seeds, machine):
+            if not (made[~hole] == picture[~hole]).all():
+                raise AssertionError(f"{label} changed known pixels of {name}")
+            yield shape, label, score(picture, made, hole), made
+
+
+def frame(shape, band):
+    """What `extend` makes anew of a picture to tile: a band along its edges."""
+    found = np.ones(shape, bool)
+    found[band:-band, band:-band] = False
+    return found
+
+
+def seamless(picture, band):
+    """The figures of a picture that was made seamless: it is seen with as much of its repetition as was made anew."""
+    wrapped = np.pad(picture, ((band, band), (band, band), (0, 0))[: picture.ndim], mode="wrap")
+    found = score(wrapped, wrapped, np.pad(frame(picture.shape[:2], band), band, constant_values=True))
+    return {"tiles": simdtex.quality.seam(picture)} | found
+
+
+def twice(picture):
+    """The picture laid out 2 x 2."""
+    return np.tile(picture, (2, 2, 1)[: picture.ndim])
+
+
+def tiled(_name, picture, _settings, seeds, machine):
+    """Make a texture seamless and continue it; yield as `filled` does."""
+    yield "", "as it is", {"tiles": simdtex.quality.seam(picture)}, twice(picture)
+    rows, cols = picture.shape[:2]
+    ways = {f"band {band}": {"seamless": True, "band": band} for band in BANDS if 3 * band < min(rows, cols)}
+    for (label, what), seed in product((ways | {"continued": ADDED}).items(), range(1, seeds + 1)):
+        made = simdtex.extend(picture, channel_axis=common.axis(picture), rng=seed, device=machine, **what)
+        if label == "continued":
+            new = np.ones(made.shape[:2], bool)
+            new[:rows, :cols] = False
+            yield "", label, score(made, made, new), made
+        else:
+            yield "", label, seamless(made, what["band"]), twice(made)
+
+
+PARTS = {"fill": (filled, FIGURES), "tile": (tiled, ("tiles", *FIGURES))}
+
+
+def means(results, figures):
+    """Rows of means over seeds and holes; results are picture, shape, label, figures."""
     names, shapes, labels = (list(dict.fromkeys(each)) for each in list(zip(*results, strict=True))[:3])
     groups = [(name, [r for r in results if r[0] == name]) for name in names]
     groups += [(f"all, {shape}", [r for r in results if r[1] == shape]) for shape in shapes if len(shapes) > 1]
-    lines = []
     for title, group in [*groups, ("all", results)]:
         for label in labels:
             values = [[r[3][figure] for r in group if r[2] == label and figure in r[3]] for figure in figures]
-            lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
-    header = ["picture", "filling", *figures]
-    common.show("Means over seeds and holes", header, lines)
-    if path:
-        common.write(path, header, lines)
+            yield [title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)]
 
 
 @common.command
-def main(samples=Path, only="", holes="", seeds=1, options=list, out=Path, csv=Path, device=None):
-    settings = {"fill": {}} | {text: common.parsed(text) for text in options or ()}
-    known, results = common.samples(samples, only), []
-    machine = common.opened(device)
-    for name, picture in known.items():
-        cells = []
-        for shape, hole in common.chosen(hole_shapes(picture.shape[:2]), holes).items():
-            cells.append((f"{name}, {shape}", cut(picture, hole), ""))
-            for label, seed, made, seconds in fillings(picture, hole, settings, seeds, machine):
-                if not (made[~hole] == picture[~hole]).all():
-                    raise AssertionError(f"{label} changed known pixels of {name}")
-                figures = score(picture, made, hole)
-                results.append((name, shape, label, figures))
-                line = f"{name:12} {shape:10} {label:20} seed {seed}  {common.told(figures)}  {seconds:.1f} s"
-                print(line, flush=True)
-                if seed == 1:
-                    cells.append((label, made, common.told(figures)))
-        if out:
-            common.sheet(out / f"fill-{name}.png", cells, 3 + len(settings))
-    report(results, csv)
+def main(samples=Path, only="", parts="", seeds=1, options=list, out=Path, device=None):
+    settings = {"fill": {}} | {text: common.parsed(text) for text in options}
+    known, machine = common.samples(samples, only), common.opened(device)
+    for part, (run, figures) in common.chosen(PARTS, parts).items():
+        results = []
+        for name, picture in known.items():
+            cells = {}
+            for shape, label, found, made in run(name, picture, settings, seeds, machine):
+                cells.setdefault((shape, label), (label, made, common.told(found) if found else ""))  # the first seed
+                if found:
+                    results.append((name, shape, label, found))
+            if out:
+                columns = 3 if part == "tile" else 3 + len(settings)
+                common.sheet(out / f"{part}-{name}.png", cells.values(), columns, scale=1)
+        rows = list(means(results, figures))
+        common.table("Means over seeds and holes", ["picture", "filling", *figures], rows, out and out / f"{part}.csv")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 """The picture and the times of the README, made from pictures that scikit-image carries.
 
     python benchmarks/front.py [--out docs/_static/front.jpg] [--side 162] [--device TEXT]
-    python benchmarks/front.py --times [--runs 5] [--methods multires pyramid] [--device TEXT]
+    python benchmarks/front.py --times [--runs 5] [--device TEXT]
 
 The picture has wood, tissue and stars below their samples, a photograph before and after a mast is removed, and a
 normal map of the wood, arranged like its texture; all of it at 1:1, with the default options and seed 1. ``--times``
@@ -107,31 +107,30 @@ def process(words, folder):
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, wall
 
 
-def print_times(device, runs, methods):
-    """Time every method on every sample as a process; print a line for each method."""
+def measured(device, runs):
+    """Rows of the times of every method, least to most of the samples, each a process of its own."""
     colour = {
         "tissue": data.immunohistochemistry()[300:428, 290:418],
         "wood": data.coffee()[270:398, 472:600],
         "stars": data.hubble_deep_field()[346:474, 166:294],
     }
-    print(f"{'':20} user CPU seconds   wall seconds")
     with tempfile.TemporaryDirectory() as folder:
         for name, sample in colour.items():
             write(Path(folder) / f"{name}.png", sample)
-        for method, options in common.chosen(METHODS, methods).items():
+        for method, options in METHODS.items():
             more = [*options, "--seed", "1", "--quiet", *(["--device", device] if device else [])]
             words = "-m simdtex synth {}.png -o more.png --size 256x256"
             jobs = {name: partial(process, [*words.format(name).split(), *more], folder) for name in colour}
             found = np.array([np.median(those, 0) for those in common.in_turns(runs, jobs).values()])
             (least, low), (most, high) = found.min(0), found.max(0)
-            print(f"{method:20} {least:.2f} to {most:.2f}       {low:.2f} to {high:.2f}", flush=True)
+            yield [method, f"{least:.2f} to {most:.2f}", f"{low:.2f} to {high:.2f}"]
 
 
 @common.command
-def main(out=FRONT, side=SIDE, times=False, runs=5, methods=tuple(METHODS), device=None):
+def main(out=FRONT, side=SIDE, times=False, runs=5, device=None):
     machine = common.opened(device)
     if times:
-        print_times(device, runs, methods)
+        common.table("", ["method", "user CPU seconds", "wall seconds"], list(measured(device, runs)))
         return
     front(machine, side).save(out, quality=90)
     print(f"{out}: {out.stat().st_size // 1024} KiB")

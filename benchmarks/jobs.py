@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times whole jobs of ``mrf`` on gravel in one process, to be run in turns with another checkout's (PYTHONPATH=...).
 
-python benchmarks/jobs.py [--size 256] [--side 128] [--search coherent exact] [--runs 9] [--fill] [--device TEXT]
+python benchmarks/jobs.py [--size 256] [--side 128] [--search coherent,exact] [--runs 9] [--fill] [--device TEXT]
 
 ``--side`` is that of the sample; ``--fill`` only fills a hole of 64x64 in a picture of 1024x1024. Prints the best and
 the median of the runs after the first, and the most memory that the process had.

@@ -72,11 +72,6 @@ def run(*job):
     return json.loads(common.python("-c", JOB, json.dumps(job)))
 
 
-def measured(kind, small, side, channels, dtype, device, options):
-    """Bytes that the process grew by, and bytes that were asked for."""
-    return run(kind, small, side, channels, dtype, device, options)[:2]
-
-
 @common.command
 def main(device=None, only="", quick=False):
     for name, (kind, options) in CASES.items():

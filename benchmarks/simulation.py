@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulates with and without hard data: prints what it takes, and how like the training image it is.
+"""How like the training image realisations are, with and without hard and soft data.
 
-python benchmarks/simulation.py [--side 250] [-n 50] [--data 0 50 200 500] [--images channels network lenses] [--runs 9]
+    python benchmarks/simulation.py [--parts maps,volumes,soft] [--images channels,network,lenses] [--data 0,50,200,500]
+                                    [--number 50] [--side N] [--options NAME=VALUE,...] [--out DIR] [--device TEXT]
 
-    [--options NAME=VALUE,NAME=VALUE] [--before NAME=VALUE,NAME=VALUE] [--jobs N] [--device TEXT] [--pictures DIR]
+``--options`` are those of `simdtex.simulate` that differ from its defaults, ``--number`` is that of realisations, and
+``--side`` makes other sizes. ``--out`` takes a table for each part.
 
-The training images are the channels of ``channels.py``, a network of thin lines without ends, and lenses; the data are
-read off another one of the same kind, at random places. The row *others* is of five more of the same kind, and dead
-ends of the training image stand behind the stroke. ``--options`` are those of `simdtex.simulate` that differ from its
-defaults. The time is that of a single realisation, the median of ``--runs`` (0: no times); *ratio* is over that of one
-without data, and *before* over that of one with the same data and the options ``--before``, all in turn in one process.
-``--pictures`` is a folder for the first realisations and the share of channels.
+maps     training images of channels, of a network of thin lines without ends, and of lenses; data are read off another
+         one of the same kind, at random places. The row *others* is of five more of the same kind. ``--out`` also takes
+         pictures: the training image, two realisations, and the share of category 1.
+volumes  channels of elliptic cross section along x in 100 x 100 x 30 voxels, at random depths: the share of channels,
+         the data missed, and the mean absolute differences, from the training image, of the indicator variograms and
+         of the connectivity functions along z, y and x, lags up to a third of a side; *another* is one more draw.
+soft     probabilities of channels that rise from 0.02 at the left to 0.98 at the right: the shares in six strips, the
+         means over the realisations, by the weight of the soft data; weight 0 is a run without.
 """
 
-from dataclasses import asdict
-from functools import partial
-from itertools import count, product
 from pathlib import Path
-from statistics import median
 
 import common
 import numpy as np
@@ -26,10 +26,9 @@ from scipy import ndimage
 from scipy.spatial import KDTree
 
 import simdtex
-from simdtex.experiments.ensemble import summary
+from simdtex.experiments.ensemble import channels as of_the_pages
+from simdtex.experiments.ensemble import connectivity, summary, variogram
 from simdtex.io import image as files
-from simdtex.methods import mrf
-from simdtex.options import resolve
 
 SPECK = 16  # pixels of a body that is one, at most
 OTHERS = 5
@@ -37,7 +36,8 @@ CELL = 1600  # pixels of a cell of the network, on average
 LINE = 4  # width of its lines, pixels
 STRETCH = 2  # cells are so many times as wide as high
 SIZES = ((56, 10), (22, 7))  # lengths and heights of lenses, pixels
-SHARE = 0.3  # of lenses
+SHARE = 0.3  # of lenses, and of channels in a volume
+STRIPS, WEIGHTS = 6, (0, 0.5, 1, 2)  # of soft data
 
 
 def network(shape, rng=None):
@@ -79,49 +79,24 @@ def hard_data(truth, number, seed):
     return np.ma.array(truth, mask=hidden.reshape(truth.shape)) if number else None
 
 
-def alone(image, known):
-    """Data that no pixel beside them shares the category of."""
-    around = np.pad(image, 1, mode="edge")
-    beside = (around[:-2, 1:-1], around[2:, 1:-1], around[1:-1, :-2], around[1:-1, 2:])
-    return int((~np.ma.getmaskarray(known) & ~np.any([one == image for one in beside], 0)).sum())
-
-
 def specks(image):
     """Bodies of 16 pixels or less in 10,000 pixels."""
     sizes = np.bincount(ndimage.label(image)[0].ravel())[1:]
     return 1e4 * (sizes <= SPECK).sum() / image.size
 
 
-def seconds(image, cases, settings, device, runs):
-    """Seconds of a realisation: {(data, setting): median}, for data by their number and options by their name."""
-    machine, jobs = simdtex.open_machine(device), {}
-    for (number, known), (name, given) in product(cases.items(), settings.items()):
-        options = asdict(resolve(mrf.Options, "simulate", {"categorical": True} | given))
-        options |= {"known": known, "device": machine}
-        seeds, job = count(), partial(common.timed, simdtex.synthesize, image, image.shape, **options)
-        jobs[number, name] = lambda job=job, seeds=seeds: job(rng=next(seeds))[1]
-    return {case: median(those) for case, those in common.in_turns(runs, jobs).items()}
-
-
-HEAD = (
-    "image      data    time ratio before share  dead ends bodies specks alone misses right js 4x4 copied variety"
-    " likeness ratio"
-)
-
-
-def line(name, number, times, made, image, truth, known):
+def figures(made, image, truth, known):
     """The figures of realisations in a row."""
     row, col = ([], []) if known is None else np.nonzero(~known.mask)
     data = np.stack([col, row, truth[row, col]], -1) if known is not None else None
     found = summary(made, image, data=data)
-    ends, own = found.dead_ends[1, :-1].mean(), found.dead_ends[1, -1]  # the training image comes last
-    single = 0.0 if known is None else sum(alone(one, known) for one in made) / len(made)
-    return (
-        f"{name:8} {number:>6} {times} {found.shares[1, :-1].mean():5.3f} {ends:5.2f}/{own:4.2f}"
-        f" {found.components[1, :-1].mean():6.2f} {np.mean([specks(one) for one in made]):6.2f} {single:5.1f}"
-        f" {found.misses.sum():6.0f} {(made == truth).mean():5.3f} {found.anodi.by_level[0, 1]:6.3f}"
-        f" {found.copied.mean():6.2f} {found.anodi.variety:7.3f} {found.anodi.likeness:8.3f} {found.anodi.ratio:5.2f}"
-    )
+    ends, anodi = found.dead_ends[1], found.anodi  # the training image comes last
+    return [
+        *(f"{found.shares[1, :-1].mean():.3f}", f"{ends[:-1].mean():.2f}", f"{ends[-1]:.2f}"),
+        *(f"{found.components[1, :-1].mean():.2f}", f"{np.mean([specks(one) for one in made]):.2f}"),
+        *(int(found.misses.sum()), f"{(made == truth).mean():.3f}", f"{anodi.by_level[0, 1]:.3f}"),
+        *(f"{found.copied.mean():.2f}", f"{anodi.variety:.3f}", f"{anodi.likeness:.3f}", f"{anodi.ratio:.2f}"),
+    ]
 
 
 def sheet(image, made):
@@ -131,37 +106,85 @@ def sheet(image, made):
     return np.hstack([part for one in shown for part in (one, gap)][:-1])
 
 
-@common.command
-def main(
-    side=250,
-    n=50,
-    data=(0, 50, 200, 500),
-    images=tuple(IMAGES),
-    runs=9,
-    jobs=int,
-    options="",
-    before=str,
-    device=None,
-    pictures=Path,
-):
-    given, shape = common.parsed(options), (side, side)
-    settings = {"now": given} | ({} if before is None else {"before": common.parsed(before)})
-    print(HEAD, flush=True)
+def maps(images, data, number, side, options, out):
+    """Rows of the figures of maps."""
+    shape = (side or 250,) * 2
     for name, draw in common.chosen(IMAGES, images).items():
         image, truth, *others = (draw(shape, seed) for seed in (1, 1001, *range(1002, 1002 + OTHERS)))
-        print(line(name, "others", f"{'':20}", np.stack(others), image, truth, None), flush=True)
-        cases = {number: hard_data(truth, number, 1) for number in dict.fromkeys([0, *data])}
-        taken = seconds(image, cases, settings, device, runs) if runs else {}
-        for number in data:
-            job = {"known": cases[number], "categorical": True, "rng": 1, "device": device, "jobs": jobs}
-            made = simdtex.simulate(image, n, shape=shape, **(job | given)).values
-            now, without, other = (taken.get(case) for case in ((number, "now"), (0, "now"), (number, "before")))
-            times = f"{now:6.3f}s {now / without:5.2f} " if now else f"{'':14}"
-            times += f"{now / other:6.2f}" if other else f"{'':6}"
-            print(line(name, number, times, made, image, truth, cases[number]), flush=True)
-            if pictures:
-                pictures.mkdir(parents=True, exist_ok=True)
-                files.write(pictures / f"{name}-{number}.png", sheet(image, made))
+        yield [name, "others", *figures(np.stack(others), image, truth, None)]
+        for count in data:
+            known = hard_data(truth, count, 1)
+            made = simdtex.simulate(image, number, shape=shape, known=known, **options).values
+            yield [name, count, *figures(made, image, truth, known)]
+            if out:
+                files.write(out / f"{name}-{count}.png", sheet(image, made))
+
+
+def model(shape, seed):
+    """Sinuous channels in a volume (layers, rows, cols): 1 in channels, 0 elsewhere, uint8."""
+    rng = np.random.default_rng(seed)
+    layers, rows, cols = shape
+    z, y, x = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij", sparse=True)
+    found = np.zeros(shape, bool)
+    while found.mean() < SHARE:
+        half, thick = rng.uniform(4, 7), rng.uniform(2, 3.5)
+        wave, swing = rng.uniform(40, 80), rng.uniform(4, 10)
+        middle = rng.uniform(0, rows) + swing * np.sin(2 * np.pi * (x / wave + rng.uniform()))
+        middle = middle + (x - cols / 2) * rng.normal(0, 0.1)
+        depth = rng.uniform(0, layers)
+        found |= ((y - middle) / half) ** 2 + ((z - depth) / thick) ** 2 < 1
+    return found.astype(np.uint8)
+
+
+def apart(volume, training):
+    """Mean absolute differences of variograms and of connectivity functions, over the axes, as text."""
+    most = [min(n, 90) // 3 for n in training.shape]
+    curves = [abs(variogram(volume, a, m) - variogram(training, a, m))[1:].mean() for a, m in enumerate(most)]
+    found, wanted = (connectivity(one, 1, min(most)).function for one in (volume, training))
+    return f"{np.mean(curves):.4f}", f"{np.nanmean(abs(found - wanted)):.4f}"
+
+
+def volumes(_images, _data, number, side, options, _out):
+    """Rows of the figures of volumes, two realisations each."""
+    shape = (3 * (side or 100) // 10, side or 100, side or 100)
+    training, truth = model(shape, 1), model(shape, 2)
+    for count in (0, 200):
+        known = hard_data(truth, count, 3)
+        for first in range(min(number, 2)):
+            made = simdtex.simulate(training, 1, first=first, shape=shape, known=known, **options).values[0]
+            missed = 0 if known is None else int((made != known).sum())
+            yield [count, f"{made.mean():.3f}", f"{training.mean():.3f}", missed, *apart(made, training)]
+    yield ["another", f"{truth.mean():.3f}", f"{training.mean():.3f}", "", *apart(truth, training)]
+
+
+def soft(_images, _data, number, side, options, _out):
+    """Rows of the shares of channels in strips."""
+    wanted = np.broadcast_to(np.linspace(0.02, 0.98, side or 120), (side or 120,) * 2)
+    shares = {"asked": wanted}
+    for weight in WEIGHTS:
+        given = {"probabilities": np.stack([1 - wanted, wanted]), "soft_weight": weight} if weight else {}
+        made = simdtex.simulate(of_the_pages()[0], min(number, 12), shape=wanted.shape, **given, **options).values
+        shares[f"weight {weight:g}"] = made.mean(0)
+    for name, share in shares.items():
+        yield [name, *(f"{part.mean():.2f}" for part in np.array_split(share, STRIPS, axis=1))]
+
+
+OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
+PARTS = {
+    "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
+    "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
+    "soft": (soft, ["channels", *map(str, range(1, STRIPS + 1))]),
+}
+
+
+@common.command
+def main(parts="", images="", data=(0, 50, 200, 500), number=50, side=int, options="", out=Path, device=None):
+    given = {"categorical": True, "rng": 1, "device": common.opened(device)} | common.parsed(options)
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    for part, (rows, header) in common.chosen(PARTS, parts).items():
+        found = list(rows(images, data, number, side, given, out))
+        common.table(part, header, found, out and out / f"simulation-{part}.csv")
 
 
 if __name__ == "__main__":

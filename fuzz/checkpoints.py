@@ -1,65 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage the checkpoints of every command, go on with other options, and check the result.
 
-    python -m fuzz.checkpoints [--damages 20] [--draws 2] [--moments 3] [--seed 1] [--record] [--commands NAME ...]
-
-Each command runs once, and its checkpoint is kept after every write. As many states as ``--moments`` are emptied,
-removed, cut ``--damages`` times, and a bit of them is flipped as often, and `simdtex resume` goes on: it writes the
-files of a run that was never stopped, or ends with exit code 2, one sentence and no file. Then the command is given
-again with one more option, as drawn by `fuzz.lines` ``--draws`` times: it is refused in one sentence and the checkpoint
-is as it was, or it writes the files that it writes without a checkpoint.
+Each command runs once, and its checkpoint is kept after every write. A try empties, removes or cuts one of them or
+flips a bit, and `simdtex resume` goes on: it writes the files of a run that was never stopped, or ends with exit code
+2, one sentence and no file. Or the command is given again with one more option, as drawn by `fuzz.lines`: it is refused
+in one sentence and the checkpoint is as it was, or it writes the files that it writes without a checkpoint.
 """
 
-import random
+import os
 import shutil
-import sys
-import tempfile
 import warnings
-from contextlib import chdir
+from functools import cache
 from pathlib import Path
 
 import click
 import numpy as np
 from click.testing import CliRunner
 
-from benchmarks.common import command
-from fuzz.damage import Ends, damaged, put
-from fuzz.lines import METHOD_OF, OTHERS, Maker
-from fuzz.record import write
+from fuzz import corpus
+from fuzz.corpus import damaged, put
+from fuzz.lines import OTHERS, PLAIN, RUNS, Maker
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint
 from simdtex.cli import load
 from simdtex.cli import main as simdtex
-from simdtex.io import image
 
-SHORT = "--order 1 --levels 2 --xi -6 --source-map where.npz"
-RUNS = {
-    "synth": f"synth L.png -o out.png --size 14x13 {SHORT}",
-    "multires": "synth RGB.png -o out.png --size 14x13 --method multires",
-    "pyramid": "synth RGB.png -o out.png --size 14x13 --method pyramid --iterations 2",
-    "fill": "fill L.png -o out.png --mask hole.png --order 1 --levels 1",
-    "extend": "extend L.png -o out.png --right 3 --order 1",
-    "mix": "mix L.png M.png -o out.png --size 14x13 --iterations 2",
-    "solid": "solid L.png -o out.npz --size 6 --iterations 2",
-    "simulate": "simulate L.png -o out.npz --size 14x13 -n 3 --order 1 --jobs 1",
-    "classify": "classify L.png -o out.png --texture a=L.png --texture b=M.png",
-}
+KEEPING = ("synth", "multires", "pyramid", "fill", "extend", "mix", "solid", "simulate", "classify")
+"""The jobs that keep a checkpoint."""
+
 ALWAYS = ("--seed", "5", "--device", "reference", "--quiet")
 FREE = ("output", "checkpoint", "help", "seed", "device", "quiet", *OTHERS)
 """Options that are not changed, as they say where the result is, or are tried otherwise."""
 
 KEPT, KEEP = Path("kept"), ("--checkpoint", "kept")
-
-
-def inputs():
-    """Write the inputs of the runs."""
-    row, col = np.indices((15, 16))
-    grey = np.clip(128 + 60 * np.sin(row / 2) + 50 * np.sin(col / 1.5 + row / 5), 0, 255).astype(np.uint8)
-    hole = np.zeros(grey.shape, np.uint8)
-    hole[3:5, 4:7] = hole[10:13, 9:12] = 255
-    for name, pixels in {"L": grey, "M": grey.T[:15, :], "hole": hole}.items():
-        image.write(Path(f"{name}.png"), pixels)
-    image.write(Path("RGB.png"), np.stack([grey, grey[::-1], 255 - grey], -1))
 
 
 def files():
@@ -74,14 +47,14 @@ def files():
     return found
 
 
-def clear(given, more=()):
-    """Bring the present folder back to the files that it had, and some more."""
+def clear(more=()):
+    """Bring the present folder back to the inputs, and some more files."""
     for path in Path().iterdir():
         if path.is_dir():
             shutil.rmtree(path)
-        elif path.name not in given:
+        elif path.name not in GIVEN:
             path.unlink()
-    for name in set(more) - set(given):
+    for name in set(more) - set(GIVEN):
         Path(name).write_bytes(more[name])
 
 
@@ -91,8 +64,9 @@ def call(*words):
     return done.exit_code, done.stderr, None if isinstance(done.exception, SystemExit) else done.exception
 
 
-def states(words):
-    """Run a command, and return its files and its checkpoint after every write."""
+@cache
+def states(name):
+    """Run a command; return its files, and its checkpoint after every write."""
     kept, save = [], Checkpoint._write
 
     def keeping(self, tree):
@@ -101,7 +75,8 @@ def states(words):
 
     Checkpoint._write = keeping
     try:
-        code, said, _ = call(*words, *ALWAYS, *KEEP)
+        clear()
+        code, said, _ = call(*RUNS[name], *ALWAYS, *KEEP)
     finally:
         Checkpoint._write = save
     assert code == 0, said
@@ -120,80 +95,64 @@ def refused(answer, before, data):
     return "the checkpoint was changed" if data is not None and KEPT.read_bytes() != data else ""
 
 
-def damage(name, given, expected, chosen, rng, count, ends):
-    """Go on with damaged checkpoints of a command."""
-    for data in chosen:
-        for how in ("empty", "remove", *("cut", "bit") * count):
-            clear(given)
-            content = damaged(data, how, rng)
-            put(KEPT, content)
-            answer = call("resume", KEPT)
-            done = answer[0] == 0
-            fault = ("" if files() == expected else "other files") if done else refused(answer, given, content)
-            ends.add("damage", "went on" if done else "said", fault and f"{name}, {how}: {fault}")
+def damage(name, rng):
+    """Go on with a damaged checkpoint of a command; return how that ended, and what is wrong."""
+    expected, kept = states(name)
+    content = damaged(rng.choice(kept), rng.choice(("empty", "remove", *("cut", "bit") * 9)), rng)
+    clear()
+    put(KEPT, content)
+    answer = call("resume", KEPT)
+    if answer[0] == 0:
+        return "went on", "" if files() == expected else "other files"
+    return "said", refused(answer, GIVEN, content)
 
 
-def other_options(name, words, given, kept, rng, draws, ends):
-    """Give a command with one more option to checkpoints of the one without."""
+def other_option(name, rng):
+    """Give a command one more option and a checkpoint without it; return how that ended, and what is wrong."""
+    words, data = RUNS[name], rng.choice(states(name)[1])
     samples = [word for word in words[1:3] if word.endswith(".png")]
     options = [one for one in load(words[0]).params if isinstance(one, click.Option) and one.name not in FREE]
-    for option in (option for option in options for _ in range(draws)):
-        maker = Maker(rng)
-        maker.method = METHOD_OF.get(name, name if name in ("multires", "pyramid") else "mrf")
-        line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], words[0], True), *ALWAYS]
-        clear(given, maker.files)
-        before = files()
-        valid = call(*line)[0] == 0
-        expected, data = files(), rng.choice(kept)
-        clear(given, maker.files)
-        put(KEPT, data)
-        answer = call(*line, *KEEP)
-        if answer[0] == 0:
-            found = files()
-            wrong = [path for path in {**found, **expected} if found.get(path) != expected.get(path)]
-            if option.name == "stages":  # those from there on
-                wrong = [path for path in wrong if path in found]
-            elif option.name == "report":  # which has the time in it
-                wrong = [path for path in wrong if Path(path).name not in ("index.html", "results.json")]
-            end, fault = "went on", "" if valid and not wrong else f"other files than without a checkpoint: {wrong}"
-        else:
-            end, fault = "refused" if valid else "wrong anyway", refused(answer, before, data)
-            if not fault and valid and "another" not in answer[1] and "--" not in answer[1]:
-                fault = f"no reason: {answer[1].strip()}"
-        ends.add("options", end, fault and f"{' '.join(line)}: {fault}")
+    option, maker = rng.choice(options), Maker(rng)
+    maker.job = name
+    line = [*words, *maker.option(option, samples[: 1 + (name == "mix")], True), *ALWAYS]
+    clear(maker.files)
+    before = files()
+    valid = call(*line)[0] == 0
+    expected = files()
+    clear(maker.files)
+    put(KEPT, data)
+    answer = call(*line, *KEEP)
+    if answer[0] == 0:
+        found = files()
+        wrong = [path for path in {**found, **expected} if found.get(path) != expected.get(path)]
+        if option.name == "stages":  # those from there on
+            wrong = [path for path in wrong if path in found]
+        elif option.name == "report":  # which has the time in it
+            wrong = [path for path in wrong if Path(path).name not in ("index.html", "results.json")]
+        fault = "" if valid and not wrong else f"other files than without a checkpoint: {wrong}"
+        return "went on", fault and f"{' '.join(line)}: {fault}"
+    fault = refused(answer, before, data)
+    if not fault and valid and "another" not in answer[1] and "--" not in answer[1]:
+        fault = f"no reason: {answer[1].strip()}"
+    return "refused" if valid else "wrong anyway", fault and f"{' '.join(line)}: {fault}"
 
 
-COLUMNS = {
-    "states that were damaged": ("damage", None),
-    "of these refused in a sentence": ("damage", "said"),
-    "options that were added": ("options", None),
-    "of these refused by the checkpoint": ("options", "refused"),
-    "refused without a checkpoint too": ("options", "wrong anyway"),
-    "accepted: files as without a checkpoint": ("options", "went on"),
-}
+GIVEN = {}
+"""The inputs of the runs."""
 
 
-@command
-def main(damages=20, moments=3, draws=2, seed=1, record=False, commands=tuple(RUNS)):
+def begin(place, _device):
+    """Prepare a process for tries."""
     warnings.simplefilter("ignore")
     checkpoints.FIRST, checkpoints.SHARE = 0.0, 0
-    rows, faults = [["run", *COLUMNS, "faults"]], 0
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        inputs()
-        given = files()
-        for name in commands:
-            rng, ends, words = random.Random(f"{seed}-{name}"), Ends(), RUNS[name].split()
-            clear(given)
-            expected, kept = states(words)
-            damage(name, given, expected, rng.sample(kept, min(moments, len(kept))), rng, damages, ends)
-            other_options(name, words, given, kept, rng, draws, ends)
-            rows.append([name, *(ends.total(*column) for column in COLUMNS.values()), ends.faults])
-            print(*rows[-1], flush=True)
-            faults += ends.faults
-    if record:
-        write("checkpoints.csv", rows)
-    return bool(faults)
+    os.chdir(place)
+    for name, data in corpus.named(PLAIN.values()).items():
+        Path(name).write_bytes(data)
+    GIVEN.update(files())
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def one_try(rng):
+    """Damage a checkpoint, or give it with another option; return as `fuzz.worker.one_try` does."""
+    name, (what, job) = rng.choice(KEEPING), rng.choice((("damage", damage), ("another option", other_option)))
+    end, fault = job(name, rng)
+    return f"{name}, {what}", f"{what}: {end}", [(name, fault)] if fault else []

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Command lines and files drawn from a seed: valid ones, unusual ones and nonsense."""
+"""Command lines and files drawn at random: valid ones, unusual ones and nonsense."""
 
-import random
 import re
-from base64 import b64decode, b64encode
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cache
 
 import click
@@ -14,12 +12,36 @@ from simdtex.cli import load
 from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.options import table
 
-COMMANDS = {
-    **{"synth": 48, "fill": 12, "tile": 5, "extend": 6, "maspar": 2, "simulate": 8, "estimate": 3, "classify": 4},
-    **{"solid": 8, "mix": 8, "resume": 0.5, "schedules": 0.1, "devices": 0.1, "demo": 0.05, "bench": 0.05},
-    **{"": 0.2, "nothing": 0.1},
+LINES = {
+    "synth": (20, "synth PICTURE -o OUT --size SIZE --order 1 --levels 2"),
+    "multires": (16, "synth PICTURE -o OUT --size SIZE --method multires"),
+    "pyramid": (12, "synth PICTURE -o OUT --size SIZE --method pyramid --iterations 1"),
+    "fill": (12, "fill PICTURE -o OUT --mask MASK --order 1"),
+    "extend": (6, "extend PICTURE -o OUT --right 3 --order 1"),
+    "mix": (8, "mix PICTURE PICTURE -o OUT --size SIZE --iterations 1"),
+    "solid": (8, "solid PICTURE -o BLOCK --size SIDE --iterations 1"),
+    "simulate": (8, "simulate PICTURE -o MAPS --size SIZE --number 2 --order 1 --jobs 1"),
+    "classify": (4, "classify PICTURE -o OUT --texture a=PICTURE --texture b=PICTURE"),
+    "tile": (5, "tile PICTURE -o OUT --order 1"),
+    "maspar": (2, "maspar PICTURE -o OUT --size SIZE --order 1 --array 4x4"),
+    "estimate": (3, "estimate GRID -o MAPS --size SIZE --known TABLE"),
+    "schedules": (0.1, "schedules PICTURE -o out --size 9x9 --seeds 1 --schedule coloring --order 1"),
+    "resume": (0.5, "resume PICTURE"),
+    "devices": (0.1, "devices"),
+    "bench": (0.05, "bench --json no/such/file.json"),  # else it measures for minutes
+    "nothing": (0.3, "nothing"),
 }
-"""Weight of each command; reports and their plots take long, so commands that always write one are rare."""
+"""Weight and command line of each job; words in capitals are drawn, or are those of `PLAIN`."""
+
+PLAIN = {
+    **{"PICTURE": "L.png", "MASK": "hole.png", "GRID": "grid.gslib", "TABLE": "known.csv"},
+    **{"OUT": "out.png", "BLOCK": "out.npz", "MAPS": "out.npz", "SIZE": "14x13", "SIDE": "6"},
+}
+RUNS = {
+    name: [re.sub(r"[A-Z]{3,}", lambda found: PLAIN[found[0]], word) for word in line.split()]
+    for name, (_, line) in LINES.items()
+}
+"""The valid command line of each job."""
 
 WHOLE = (0, -1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**30, -(2**31), -(2**63) - 1, "", "nan", "1.5", "x", "0x10")
 REAL = (0, -1, -0.0, "nan", "inf", "-inf", 1e308, -1e308, 1e-320, 5e-324, 2**31, 2**63, "1e999", "", "x", "1,5", 1e-30)
@@ -65,27 +87,20 @@ LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
 OTHERS = ("workers",)
 """Options that start processes or ask the network."""
 
-DEEP = {"synth": 0.6, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
-"""Share of tries with options that make sense alone."""
-
 OUTPUTS = {
-    "solid": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
-    **dict.fromkeys(
-        ("simulate", "estimate"), ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out")
-    ),
-    **dict.fromkeys(("schedules", "demo"), ("out",)),
-    "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
+    "BLOCK": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
+    "MAPS": ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out"),
+    "OUT": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
 }
 
-NEEDED = {
-    "maspar": (0.9, "--array 4x4|8x8|3x5|16x16"),
-    "schedules": (1, "--seeds 1 --schedule coloring --order 1"),
-    "bench": (1, "--json no/such/file.json"),  # else it measures for minutes
+METHOD_OF = {
+    "solid": "pyramid",
+    "mix": "pyramid",
+    "classify": "classifier",
+    "multires": "multires",
+    "pyramid": "pyramid",
 }
-"""Options that a command is given in a share of the tries, so that it takes no longer than others."""
-
-METHOD_OF = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier"}
-"""The method of commands that have one of their own."""
+"""The method of jobs whose method is not ``mrf``."""
 
 
 @dataclass
@@ -93,149 +108,93 @@ class Try:
     """A command line and its files.
 
     ``args`` of ``simdtex``; ``files`` name -> bytes, in the folder it runs in; ``kind`` what is unusual about it;
-    ``old`` names of files that are there and may be replaced; ``interrupt`` seconds after which it gets a Ctrl-C.
+    ``old`` names of files that are there and may be replaced.
     """
 
     args: list[str]
     files: dict[str, bytes] = field(default_factory=dict)
     kind: str = "plain"
     old: list[str] = field(default_factory=list)
-    interrupt: float | None = None
-
-    def as_json(self):
-        return asdict(self) | {"files": {name: b64encode(data).decode() for name, data in self.files.items()}}
-
-    @classmethod
-    def from_json(cls, found):
-        files = {name: b64decode(data) for name, data in found["files"].items()}
-        return cls(**found | {"files": files})
-
-
-@cache
-def seeds():
-    """The corpus."""
-    return corpus.build()
 
 
 @cache
 def everything():
     """The files of the corpus, for splices."""
-    return [data for files in seeds().values() for data in files.values() if len(data) < 10**5]
-
-
-def made(seed, number):
-    """Return the try of a number under a seed; the same on every call."""
-    return Maker(random.Random(f"{seed}-{number}")).make()
+    return [data for files in corpus.build().values() for data in files.values() if len(data) < 10**5]
 
 
 class Maker:
     """Makes command lines and their files."""
 
     def __init__(self, rng):
-        self.rng, self.files, self.kinds = rng, {}, set()
+        self.rng, self.files, self.kinds, self.job = rng, {}, set(), ""
 
     def make(self):
+        """Return a try."""
         rng = self.rng
-        name = rng.choices(list(COMMANDS), list(COMMANDS.values()))[0]
-        if name in ("", "nothing"):
-            return Try([word for word in (name, *rng.choices(TEXT, k=rng.randrange(3))) if word], kind="no command")
-        args = [name, *self.line(load(name), name)]
-        if rng.random() < 0.03:
-            args.insert(rng.randrange(len(args) + 1), rng.choice((*TEXT, "--help", "-o", "--nothing", "-q", "--size")))
+        self.job = rng.choices(list(LINES), [weight for weight, _ in LINES.values()])[0]
+        words = [re.sub(r"[A-Z]{3,}", self.drawn, word) for word in LINES[self.job][1].split()]
+        args = [*words, *self.options(words), *(["-q"] if rng.random() < 0.8 else [])]
+        if rng.random() < 0.05:
+            args[rng.randrange(len(args))] = rng.choice((*TEXT, "--help", "-o", "--nothing", "-q", "--size"))
             self.kinds.add("odd words")
-        interrupt = rng.uniform(0.0005, 0.08) if rng.random() < 0.02 else None
-        if interrupt:
-            self.kinds.add("interrupted")
-        old = self.old_outputs(args) if rng.random() < 0.1 else []
-        if interrupt and old and "--seed" not in args and any(one.name == "seed" for one in load(name).params):
-            args += ["--seed", "1"]  # so that new outputs can be compared with right ones
-        return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old, interrupt)
+        there = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
+        old = there if rng.random() < 0.1 else []
+        self.files |= dict.fromkeys(old, b"old")
+        return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old)
 
-    def old_outputs(self, args):
-        """Make files with the names of outputs, and return these."""
-        names = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
-        for name in names:
-            self.files[name] = b"old"
-        return names
+    def drawn(self, found):
+        """A word in place of one in capitals."""
+        rng, what = self.rng, found[0]
+        if what in OUTPUTS:
+            return self.output(OUTPUTS[what])
+        if what in ("SIZE", "SIDE"):
+            if rng.random() < 0.1:
+                self.kinds.add("options")
+                return rng.choice(SIZES)
+            return rng.choice(("4", "5x6x7")) if what == "SIDE" else f"{rng.randint(1, 12)}x{rng.randint(5, 12)}"
+        return self.file(what.lower())
 
-    # -- words of a command ---------------------------------------------------------------------------------------
-
-    def line(self, command, name):
-        """Arguments and options of a command."""
-        rng, words = self.rng, []
-        deep = rng.random() < DEEP.get(name, 0.5)
-        method = rng.choices(("mrf", "multires", "pyramid"), (3, 4, 3))[0] if name == "synth" else None
-        fitting = rng.random() < 0.9  # only options of the method
-        size = self.size(name, rng.random() < (0.97 if deep else 0.85))
-        options = []
-        for parameter in command.params:
-            if isinstance(parameter, click.Argument):
-                few = (3, 3, 1) if name == "mix" else (8, 1, 1)
-                count = rng.choices((1, 2, 3), few)[0] if parameter.nargs < 0 else 1
-                role = "grid" if name in ("simulate", "estimate") and rng.random() < 0.3 else "picture"
-                words += [self.file(role) for _ in range(count)]
-            else:
-                options.append(parameter)
-        samples = words[:]
-        words += ["-o", self.output(name)] if name not in ("devices", "bench", "resume") else []
-        if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3):
-            words += ["--size", size]
-        if method and rng.random() < 0.03:
-            method = "mrf"  # as without the option
-        else:
-            words += ["--method", method] if method else []
-        words += ["-q"] if rng.random() < 0.8 else []
-        if name == "fill" and rng.random() < 0.9:
-            words += ["--mask", self.file("mask")]
-        if name == "extend" and "--size" not in words:
-            words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
-        share, needed = NEEDED.get(name, (1, ""))
-        if share == 1 or rng.random() < share:
-            words += [rng.choice(word.split("|")) if "|" in word else word for word in needed.split()]
-        if name in ("simulate", "synth", "fill", "extend", "tile", "maspar") and method in (None, "mrf"):
-            words += ["--order", rng.choice("1124")]
-        if name == "classify" and rng.random() < 0.9:
-            words += ["--texture", f"a={samples[0] if rng.random() < 0.5 else self.file('picture')}"]
-        words += ["--number", rng.choice("1112")] if name == "simulate" else []
-        if name in ("solid", "mix") or method == "pyramid":
-            words += ["--iterations", "1"]
+    def options(self, words):
+        """Some options of a command with their values."""
+        rng, command = self.rng, words[0]
+        if command == "nothing":
+            return rng.choices(TEXT, k=rng.randrange(3))
+        samples = [word for word in words[1:3] if word in self.files]
         taken = {"-o", "--output", "--size", "--method", "-q", "--quiet", "--help", "--mask", "--device"}
-        usual = [option for option in options if not taken & set(option.opts) and option.name not in OTHERS]
-        if method and fitting:
-            usual = [option for option in usual if _of_method(option, method)]
-        self.method = METHOD_OF.get(name, method or "mrf")
-        if fitting:
-            useless = ("profile", *(("source_map", "also") if self.method == "pyramid" else ()))
-            usual = [option for option in usual if option.name not in useless]
+        usual = [option for option in load(command).params if isinstance(option, click.Option)]
+        usual = [option for option in usual if not taken & set(option.opts) and option.name not in OTHERS]
+        if command == "synth" and rng.random() < 0.9:
+            method = METHOD_OF.get(self.job, "mrf")
+            usual = [option for option in usual if method in (getattr(option, "methods", None) or (method,))]
+        found, modest = [], rng.random() < 0.5
         for option in rng.sample(usual, min(len(usual), rng.choice((0, 0, 1, 1, 2, 3, 5)))):
-            words += self.option(option, samples, name, deep and rng.random() < 0.9)
-        if "--tiles" in words and rng.random() < 0.9:
+            found += self.option(option, samples, modest and rng.random() < 0.9)
+        if "--tiles" in found and rng.random() < 0.9:
             words[words.index("-o") + 1] = "out.zarr"
-        if rng.random() < 0.02 and name != "devices":
-            words += ["--device", rng.choice(("reference", "0", "7", "nothing", "", "numpy", "-1"))]
+        if rng.random() < 0.02 and command != "devices":
+            found += ["--device", rng.choice(("reference", "0", "7", "nothing", "", "numpy", "-1"))]
             self.kinds.add("device")
-        return words
+        return found
 
-    def option(self, option, samples, command, modest):
+    def option(self, option, samples, modest):
+        """An option with a value, of those that make sense or of any."""
         rng, name, word = self.rng, option.name or "", option.opts[-1]
         if option.is_flag:
             return [rng.choice([*option.opts, *option.secondary_opts])]
-        kind = option.type.name
         if isinstance(option.type, click.Path):
-            return [word, self.path(name, command)]
+            return [word, self.path(name)]
         if not modest:
             self.kinds.add("options")
-        if kind == "integer":
-            values = MODEST.get(name, (0, 1, 3)) if modest else WHOLE
-            if not modest and name in LONG:
-                values = tuple(v for v in WHOLE if not (isinstance(v, int) and 10 < v < 2**31))
-            return [word, str(rng.choice(values))]
-        if kind == "float":
-            values = MODEST.get(name, (0, 0.25, 1, 2)) if modest else REAL
-            if not modest and name == "xi":
-                values = tuple(v for v in REAL if not isinstance(v, float) or v >= 0 or v < -1)
-            return [word, str(rng.choice(values))]
-        return [word, self.text(option, name, samples, modest)]
+        if option.type.name not in ("integer", "float"):
+            return [word, self.text(option, name, samples, modest)]
+        whole = option.type.name == "integer"
+        values = MODEST.get(name, (0, 1, 3) if whole else (0, 0.25, 1, 2)) if modest else WHOLE if whole else REAL
+        if not modest and name in LONG:
+            values = tuple(v for v in WHOLE if not (isinstance(v, int) and 10 < v < 2**31))
+        elif not modest and name == "xi":
+            values = tuple(v for v in REAL if not isinstance(v, float) or v >= 0 or v < -1)
+        return [word, str(rng.choice(values))]
 
     def text(self, option, name, samples, modest):
         rng, metavar = self.rng, option.metavar or ""
@@ -255,41 +214,25 @@ class Maker:
             )
         if ("x" in metavar.lower() and "HEIGHT" in metavar) or "COLS" in metavar:
             return rng.choice(("4x4", "2x8", *SIZES))
-        declared = table(METHODS[self.method]).get(name)
+        declared = table(METHODS[METHOD_OF.get(self.job, "mrf")]).get(name)
         valid = getattr(declared and declared.kind, "valid", None) or CHOICES.get(name)
         return rng.choice(valid or re.findall(r"[a-z][a-z-]+", option.help or "") or TEXT)
 
-    def size(self, name, modest):
-        rng = self.rng
-        if not modest:
-            self.kinds.add("options")
-            return rng.choice(SIZES)
-        if name == "demo":
-            return rng.choice(SIZES)
-        if name == "solid":
-            return rng.choice(("4", "5x6x7", "1x8x8"))
-        low = {"extend": 6, "schedules": 9}.get(name, 1 if rng.random() < 0.2 else 5)
-        return f"{rng.randint(low, max(12, low))}x{rng.randint(low, max(12, low))}"
-
-    # -- files ----------------------------------------------------------------------------------------------------
-
-    def path(self, name, command):
+    def path(self, name):
         """A file or a folder for an option that takes one."""
         rng = self.rng
         if name in ("stages", "report", "checkpoint"):
-            return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
+            return rng.choice(("pages", "pages", "a/b", "out.png"))
         if name in ("source_map", "picture", "json", "plot", "confidence"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
         role = {"sample_mask": "mask", "strokes": "mask", "truth": "mask", "known": "table"}.get(name, "picture")
-        if name == "start" and command == "solid":
+        if name == "start" and self.job == "solid":
             role = "volume"
-        if name == "known" and rng.random() < 0.4:
-            role = "picture"
-        return self.file(role)
+        return self.file("picture" if name == "known" and rng.random() < 0.4 else role)
 
-    def output(self, name):
+    def output(self, names):
+        """A name of an output."""
         rng = self.rng
-        names = OUTPUTS.get(name, OUTPUTS[""])
         if rng.random() < 0.85:
             return names[0] if rng.random() < 0.5 else rng.choice(names)
         if self.files and rng.random() < 0.2:
@@ -300,7 +243,7 @@ class Maker:
     def file(self, role):
         """Make a file of a role, usually a valid one, and return its name."""
         rng = self.rng
-        files = seeds()[role]
+        files = corpus.build()[role]
         if role == "picture" and rng.random() < 0.6:
             name = rng.choice(("L.png", "RGB.png", "L.tif", "uint8.npy", "labels.npy"))
         else:
@@ -320,15 +263,3 @@ class Maker:
             name = f"{rng.randrange(100)}-{name}"
         self.files[name] = data
         return name
-
-
-def _of_method(option, method):
-    """Return whether an option of ``synth`` is one of a method, as its help says."""
-    group = getattr(option, "group", "")
-    if group.startswith("Method "):
-        return group.startswith(f"Method {method}:")
-    head = (option.help or "").partition(":")[0] if ":" in (option.help or "") else ""
-    named = [
-        one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")
-    ]
-    return not named or method in named

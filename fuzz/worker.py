@@ -5,38 +5,23 @@ The process has a home, a folder for temporary files and a limit to its address 
 moves or removes is noted.
 """
 
-import contextlib
 import os
 import re
 import resource
 import shutil
-import signal
 import sys
 import time
 import traceback
-from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from fuzz import corpus
+from fuzz.lines import PLAIN, RUNS, Maker, Try
 
 MEMORY = 2**30
 """Bytes that a try may take beyond what its process has."""
 
 SECONDS = 10.0
 """Seconds that a try may take."""
-
-DEMO = 60.0
-"""Seconds that `simdtex demo` may take, whose samples are those of the package."""
-
-LOADING = (
-    "synth L.png -o out.png --size 8x8 --order 1",
-    "synth RGB.png -o out.tif --size 8x8 --method multires",
-    "synth L.png -o out.npy --size 8x8 --method pyramid --iterations 1",
-    "fill L.png --mask hole.png -o out.webp --order 1",
-    "extend L.png -o out.jpg --left 1 --order 1",
-    "solid L.png -o out.nrrd --size 4 --iterations 1",
-    "mix L.png L.png -o out.gif --size 6x6 --iterations 1",
-    "simulate L.png -o out.npz --size 6x6 --order 1 --number 1",
-)
-"""Commands that a worker runs first, so that modules need not be loaded during a try."""
 
 LOOKING = ("uname", "fc-list", sys.executable)
 """Programs that may be started: libraries identify the machine with them, and simdtex probes devices."""
@@ -48,29 +33,36 @@ HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8,}|\.tmp\b|<[a-z_.]+ object a
 """Names that no message may contain: of temporary files and objects."""
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
-CHANGES = (
-    *("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink"),
-    *("os.truncate", "os.chmod", "os.utime"),
-)
+CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.truncate", "os.chmod")
 
 
-@dataclass
-class Result:
-    """The result of a try: exit ``code``, standard error, ``seconds``, ``bytes`` of memory it added, ``faults``."""
+class Worker:
+    """Runs tries in a folder: ``try`` for a try, a home, temporary files, and files that must not be read."""
 
-    code: int | None
-    said: str
-    seconds: float
-    bytes: int
-    faults: list[tuple[str, str]] = field(default_factory=list)
+    def __init__(self, root, device):
+        self.root, self.folder, self.on, self.seen = Path(root), Path(root, "try"), False, []
+        for name in ("home", "tmp", "beside"):
+            (self.root / name).mkdir()
+        (self.root / "beside" / "secret.raw").write_bytes(bytes(range(216)))  # which a damaged header names
+        environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
+        os.environ.update({name: str(self.root / value) for name, value in environment.items()})
+        os.environ.update(SIMDTEX_DEVICE=device, COLUMNS="100", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+        self.streams = [os.memfd_create(name) for name in ("out", "err")]
+        for stream, number in zip(self.streams, (1, 2), strict=True):
+            os.dup2(stream, number)
+        import h5netcdf  # noqa: F401
+        import matplotlib.font_manager  # noqa: F401 - asks the system for its fonts, once
+        import zarr  # noqa: F401
 
+        from simdtex.cli import main
 
-class Watch:
-    """Notes what is opened, moved and started."""
-
-    def __init__(self):
-        self.on, self.seen = False, []
+        self.main = main
         sys.addaudithook(self.hook)
+        for words in list(RUNS.values())[:9] if device == "reference" else ():  # what they import is no memory of a try
+            self.run(Try(words, corpus.named(PLAIN.values())))
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        most = pages * resource.getpagesize() + MEMORY * 3 // 2  # half as much again as a try may take
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
 
     def hook(self, event, args):
         if not self.on:
@@ -92,170 +84,54 @@ class Watch:
             if isinstance(path, (str, bytes, os.PathLike)):
                 self.seen.append((what, os.path.abspath(os.fsdecode(path))))
 
-
-class Sandbox:
-    """The folder of a worker: ``try`` for a try, a home, temporary files, and files that must not be read."""
-
-    def __init__(self, root):
-        self.root = Path(root)
-        self.folder = self.root / "try"
-        for name in ("home", "tmp", "beside"):
-            (self.root / name).mkdir(parents=True, exist_ok=True)
-        (self.root / "beside" / "secret.raw").write_bytes(bytes(range(216)))  # which a damaged header names
-        self.around = self.listing()
-
-    def listing(self):
-        """Path -> size and time of everything but the try."""
-        found = {}
-        for path in self.root.rglob("*"):
-            if self.folder not in (path, *path.parents):
-                with contextlib.suppress(OSError):  # it is gone
-                    told = path.lstat()
-                    found[str(path)] = None if path.is_dir() else (told.st_size, told.st_mtime_ns)
-        return found
-
-    def fresh(self, files):
-        """An empty folder of a try but for its files."""
+    def run(self, one):
+        """Run a try; return its exit code and its faults."""
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir()
-        for name, data in files.items():
+        for name, data in one.files.items():
             (self.folder / name).write_bytes(data)
-
-
-class Worker:
-    """Runs tries in a folder."""
-
-    def __init__(self, root, device):
-        from fuzz.lines import Try, seeds
-
-        environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
-        os.environ.update({name: str(Path(root, value)) for name, value in environment.items()})
-        os.environ.update(SIMDTEX_DEVICE=device, COLUMNS="100", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
-        self.sandbox = Sandbox(root)
-        self.streams = [os.memfd_create(name) for name in ("out", "err")]
-        for stream, number in zip(self.streams, (1, 2), strict=True):
-            os.dup2(stream, number)
-        self.watch = Watch()
-        import h5netcdf  # noqa: F401
-        import matplotlib.font_manager  # noqa: F401 - asks the system for its fonts, once
-        import zarr  # noqa: F401
-
-        from simdtex.cli import main
-
-        self.main = main
-        files = {name: data for role in seeds().values() for name, data in role.items()}
-        for line in LOADING if device == "reference" else LOADING[:3]:
-            words = line.split()
-            self.run(Try(words, {name: files[name] for name in words if name in files}))
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-        most = pages * resource.getpagesize() + MEMORY * 3 // 2  # half as much again as a try may take
-        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
-
-    def run(self, one):
-        """Run a try, and check its result."""
-        self.sandbox.fresh(one.files)
-        os.chdir(self.sandbox.folder)
+        os.chdir(self.folder)
         for stream in self.streams:
             os.ftruncate(stream, 0)
             os.lseek(stream, 0, os.SEEK_SET)
         with open("/proc/self/clear_refs", "w") as file:
             file.write("5")  # forget the peak
-        before, began = _kibibytes("VmRSS"), time.perf_counter()
-        self.watch.seen, self.watch.on = [], True
-        code, wrong = 0, []
+        before, began, code, faults = _kibibytes("VmRSS"), time.perf_counter(), 0, []
+        self.seen, self.on = [], True
         try:
-            with _interrupted(one.interrupt):
-                self.main(args=list(one.args), prog_name="simdtex", standalone_mode=True)
+            self.main(args=list(one.args), prog_name="simdtex", standalone_mode=True)
         except SystemExit as error:
             code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
         except BaseException as error:  # what else comes out is what this is looking for
             code = 1
-            wrong.append(("traceback", _where(error)))
+            faults.append(("traceback", _where(error)))
         finally:
-            self.watch.on = False
-            os.chdir(self.sandbox.root)
+            self.on = False
+            os.chdir(self.root)
         seconds = time.perf_counter() - began
         sys.stdout.flush()
         sys.stderr.flush()
         said = os.pread(self.streams[1], 2**16, 0).decode(errors="replace")
         size = 1024 * (_kibibytes("VmHWM") - before)
-        result = Result(code, said, seconds, size, wrong)
-        result.faults += self.said_wrong(one, result)
-        result.faults += self.left_wrong(one, result)
-        if one.interrupt and any(what == "old output changed" for what, _ in result.faults):
-            result.faults = self.without_whole(one, result.faults)
-        if seconds > (DEMO if "demo" in one.args[:1] else SECONDS):
-            result.faults.append(("time", one.args[0]))
+        faults += [*([] if faults else said_wrong(one, code, said)), *self.left_wrong(one, code)]
+        if seconds > SECONDS:
+            faults.append(("time", one.args[0]))
         if size > MEMORY or "the memory does not suffice" in said:
-            result.faults.append(("memory", one.args[0]))
-        return result
+            faults.append(("memory", one.args[0]))
+        return code, faults
 
-    def without_whole(self, one, faults):
-        """Return the faults except of outputs that are as they should be without an interrupt.
-
-        The first of several outputs may be new, and all of them if a Ctrl-C comes after the last.
-        """
-        paths = {name: self.sandbox.folder / name for name in one.old}
-        left = {name: path.read_bytes() for name, path in paths.items() if path.is_file()}
-        self.run(replace(one, interrupt=None))
-        for name, data in left.items():
-            if data != one.files[name] and not (paths[name].is_file() and paths[name].read_bytes() == data):
-                return faults
-        return [fault for fault in faults if fault[0] != "old output changed"]
-
-    def said_wrong(self, one, result):
-        """Yield the faults of the exit code and the message."""
-        code, said = result.code, result.said
-        if any(kind == "traceback" for kind, _ in result.faults):
-            return
-        if "Traceback (most recent call last)" in said:
-            yield "traceback", said.strip().splitlines()[-1][:200]
-            return
-        if code not in ((0, 2, 130) if one.interrupt else (0, 2)):
-            yield "exit code", str(code)
-        if warned := re.search(r"\w*Warning: .*", said):
-            yield "warning", warned[0][:160]
-        if not code:
-            return
-        sentence = said.strip()
-        if one.interrupt:  # told at once, and what came of it later
-            sentence = sentence.removeprefix("simdtex: stopping where the state is at hand; once more stops at once\n")
-            if sentence.endswith("\nsimdtex: stopped"):  # after the sentence of a command that failed, or within it
-                return
-        usage = re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL)
-        lines = sentence.splitlines()
-        quiet = "-q" in one.args or "--quiet" in one.args
-        if usage or (not one.args and sentence.startswith("Usage: ")):
-            sentence = usage[1] if usage else ""
-        elif not lines or not lines[-1].startswith("simdtex: ") or (quiet and len(lines) > 1):
-            plain = [line for line in lines if line.startswith("simdtex: ")]
-            if not plain or any("\n" in word for word in one.args):
-                if not any("\n" in word for word in one.args):
-                    yield "sentence", _plain(sentence[-200:])
-            elif quiet:
-                yield "more than a sentence", _plain(lines[0][:160])
-        else:
-            sentence = lines[-1]
-        if "[Errno" in sentence:
-            yield "raw error", _plain(sentence)
-        if len(sentence) > 6000:
-            yield "long sentence", _plain(sentence[:100])
-        if re.search(HIDDEN, sentence):
-            yield "hidden name", _plain(sentence)
-
-    def left_wrong(self, one, result):
+    def left_wrong(self, one, code):
         """Yield the faults of the files that are there now, and of those that were opened."""
-        folder = self.sandbox.folder
+        folder = self.folder
         there = {str(path.relative_to(folder)): path for path in folder.rglob("*")}
         named = {word for arg in one.args for word in re.split(r"[=,]", arg)}
         if "--preview" in one.args:
             named |= {f"{Path(word).stem}-3x3.png" for word in named if word}
-        failed = bool(result.code) or any(kind == "traceback" for kind, _ in result.faults)
         for name, data in one.files.items():
             path = folder / name
             if not path.is_file():
                 yield "input gone", f"{one.args[0]} {_plain(name)}"
-            elif path.read_bytes() != data and (result.code or name not in one.old):
+            elif path.read_bytes() != data and (code or name not in one.old):
                 yield "old output changed" if name in one.old else "input changed", f"{one.args[0]} {path.suffix}"
         for name in there:
             if name in one.files:
@@ -264,28 +140,47 @@ class Worker:
             if any(part.startswith(".") or part.endswith((".tmp", ".part")) for part in Path(name).parts):
                 yield "left behind", f"{one.args[0]}: {_plain(re.sub(r'[a-z0-9_]{8}', '*', Path(name).name))}"
             elif not any(first == Path(word).parts[0] for word in named if word and Path(word).parts):
-                if first != "schedules-report" and one.args[0] != "demo":
+                if first != "schedules-report":
                     yield "file nobody named", f"{one.args[0]} {_plain(name)}"
-            elif failed and not one.interrupt and name == first and there[name].is_file():
+            elif code and name == first and there[name].is_file():
                 yield "written on failure", f"{one.args[0]} {_plain(name)}"
-        now = self.sandbox.listing()
-        for path in now.keys() ^ self.sandbox.around.keys():
-            if not _of_libraries(path):
-                yield "left elsewhere", _plain(os.path.relpath(path, self.sandbox.root))
-        self.sandbox.around = now
-        for what, path in self.watch.seen:
+        for what, path in self.seen:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]
-            elif what == "write" and not path.startswith((str(folder), str(self.sandbox.root / "tmp"), *SYSTEM)):
-                if not _of_libraries(path):
+            elif what == "write" and not path.startswith((str(folder), str(self.root / "tmp"), *SYSTEM)):
+                if not any(word in path for word in CACHES):
                     yield "written elsewhere", _plain(path)
-            elif what == "read" and path.startswith(str(self.sandbox.root / "beside")):
+            elif what == "read" and path.startswith(str(self.root / "beside")):
                 yield "read elsewhere", f"{one.args[0]} {Path(path).name}"
 
 
-def _of_libraries(path):
-    """Return whether a path is of a cache of a library: of fonts, of compiled kernels."""
-    return any(word in path for word in CACHES)
+def said_wrong(one, code, said):
+    """Yield the faults of the exit code and the message."""
+    if "Traceback (most recent call last)" in said:
+        yield "traceback", said.strip().splitlines()[-1][:200]
+        return
+    if code not in (0, 2):
+        yield "exit code", str(code)
+    if warned := re.search(r"\w*Warning: .*", said):
+        yield "warning", warned[0][:160]
+    if not code:
+        return
+    sentence, lines = said.strip(), said.strip().splitlines()
+    if usage := re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL):
+        sentence = usage[1]
+    elif not one.args and sentence.startswith("Usage: "):
+        return
+    elif not any("\n" in word for word in one.args):  # which is in the message as it is
+        plain = [line for line in lines if line.startswith("simdtex: ")]
+        if not plain:
+            yield "sentence", _plain(sentence[-200:])
+        elif len(lines) > 1 and {"-q", "--quiet"} & set(one.args):
+            yield "more than a sentence", _plain(lines[0][:160])
+        sentence = (plain or [""])[-1]
+    if "[Errno" in sentence:
+        yield "raw error", _plain(sentence)
+    if re.search(HIDDEN, sentence):
+        yield "hidden name", _plain(sentence)
 
 
 def _plain(text):
@@ -300,9 +195,8 @@ def _plain(text):
 def _where(error):
     """Return the kind of an error, and where in the package it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [frame for frame in frames if "/simdtex/" in frame.filename] or list(frames[-1:])
-    last = ours[-1]
-    name = last.filename[last.filename.find("simdtex/") :] if ours else "?"
+    last = ([frame for frame in frames if "/simdtex/" in frame.filename] or frames)[-1]
+    name = last.filename.rpartition("/simdtex/")[2]
     return f"{type(error).__name__} at {name}:{last.name}: {_plain(str(error))[:120]}"
 
 
@@ -311,29 +205,17 @@ def _kibibytes(name):
         return int(next(line for line in file if line.startswith(name)).split()[1])
 
 
-@contextlib.contextmanager
-def _interrupted(seconds):
-    """Send a Ctrl-C after some seconds, unless the try has ended."""
-    if not seconds:
-        yield
-        return
-    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
-    before = signal.signal(signal.SIGINT, _leave)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGINT, lambda *_: None)
-        time.sleep(0.05)  # a Ctrl-C in an import comes again a little later
-        signal.signal(signal.SIGINT, before)
+_worker = None
 
 
-def _leave(_, frame):
-    """Handle a Ctrl-C outside a command as `simdtex.__main__` does, but without ending the process."""
-    from simdtex.cli.command import postponed
+def begin(place, device):
+    """Prepare a process for tries in a folder."""
+    global _worker
+    _worker = Worker(place, device)
 
-    if postponed(frame):
-        return
-    os.write(2, b"simdtex: stopped\n")
-    raise SystemExit(130)
+
+def one_try(rng):
+    """Run a random command line; return what is unusual about it, its exit code, and the faults."""
+    one = Maker(rng).make()
+    code, faults = _worker.run(one)
+    return one.kind, f"exit code {code}", faults

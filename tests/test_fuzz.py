@@ -1,17 +1,16 @@
 """The fuzzer: the same seed gives the same tries, faults are found, and a short run finds none."""
 
-import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
-from fuzz import corpus
-from fuzz.lines import COMMANDS, Try, made
-from fuzz.record import Record
+import fuzz.__main__ as driver
+from fuzz import KINDS, corpus, seeded, worker
+from fuzz.lines import LINES, RUNS, Maker, Try
 from simdtex.cli import COMMANDS as KNOWN
 from simdtex.io import image
 
@@ -20,31 +19,28 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuz
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def fuzz(*args, module="fuzz", timeout=200):
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", module, *map(str, args)]
-    return subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout, check=False
-    )
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words", [("stores", "--tries", 30), ("checkpoints", "--damages", 4, "--draws", 1, "--commands", "fill")]
-)
-def test_damaged_stores_and_checkpoints(words):
-    done = fuzz(*words[1:], module=f"fuzz.{words[0]}", timeout=300)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_short_run_finds_nothing(kind):
+    command = [sys.executable, "-m", "fuzz", "--kinds", kind, "--tries", "25", "--seed", "3", "--workers", "1"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{kind}: 25 tries, 0 different faults\n" in done.stdout
+    assert any(end in done.stdout for end in ("exit code 0", "the bytes", "went on"))
 
 
 def test_every_command_is_tried():
-    assert set(KNOWN) <= {*COMMANDS, "live"}, "which serves a page until it is stopped"
+    """But demo, which has tests of its own, and live, which serves a page until it is stopped."""
+    assert set(KNOWN) <= {*(line.split()[0] for _, line in LINES.values()), "demo", "live"}
 
 
 def test_a_seed_and_a_number_give_a_try():
-    tries = [made(1, number) for number in range(50)]
-    assert tries == [made(1, number) for number in range(50)] != [made(2, number) for number in range(50)]
-    assert tries == [Try.from_json(json.loads(json.dumps(one.as_json()))) for one in tries]
+    def made(seed):
+        return [Maker(seeded(seed, number)).make() for number in range(50)]
+
+    tries = made(1)
+    assert tries == made(1) != made(2)
     assert len({one.args[0] for one in tries if one.args}) > 4
 
 
@@ -63,28 +59,29 @@ def test_valid_files_are_valid(tmp_path):
     assert read > 40
 
 
-def test_a_fault_is_counted_and_kept_once(tmp_path):
-    record, one = Record(1, tmp_path), Try(["synth", "a.png"], {"a.png": b"\0"})
-    result = {"code": 1, "seconds": 0.5, "bytes": 9, "said": "oh", "faults": [("traceback", "KeyError"), ("time", "x")]}
-    for _ in range(3):
-        record.add(one, result)
-    assert record.counts()["tries"] == "3" and record.counts()["different faults"] == 2
-    assert set(record.faults.values()) == {3} and {*record.files.values()} == {*tmp_path.iterdir()}
-    kept = json.loads(record.files["traceback", "KeyError"].read_text())
-    assert Try.from_json(kept["try"]) == one and kept["command"] == "simdtex synth a.png"
+@pytest.mark.parametrize(
+    ("code", "said", "faults"),
+    [
+        (2, "simdtex: the sample is empty; give another\n", []),
+        (2, "Usage: simdtex synth\nTry 'simdtex synth --help'\n\nError: Missing option '--size'.\n", []),
+        (2, "oh\n", ["sentence"]),
+        (2, "a\nsimdtex: b\n", ["more than a sentence"]),
+        (1, "simdtex: [Errno 2] no file\n", ["exit code", "raw error"]),
+        (0, "RuntimeWarning: overflow\n", ["warning"]),
+        (2, "simdtex: .tmpab12cd34 is damaged\n", ["hidden name"]),
+        (1, "Traceback (most recent call last):\nKeyError: 1\n", ["traceback"]),
+    ],
+)
+def test_what_a_command_says_wrong(code, said, faults):
+    assert [what for what, _ in worker.said_wrong(Try([*RUNS["synth"], "-q"]), code, said)] == faults
 
 
-@pytest.mark.slow
-def test_a_replay_says_what_is_wrong(tmp_path):
-    one = Try(["synth", "L.png", "-o", "out.png", "--size", "4x4", "-q", "--method", "multires"], corpus.pictures())
-    path = tmp_path / "try.json"
-    path.write_text(json.dumps({"command": "simdtex synth", "try": one.as_json()}))
-    done = fuzz("--replay", path)
-    assert done.returncode == 0 and "exit code 0" in done.stdout, done.stdout + done.stderr
-
-
-@pytest.mark.slow
-def test_a_short_run_finds_nothing(tmp_path):
-    done = fuzz("--tries", 25, "--seed", 3, "--workers", 1, "--out", tmp_path / "found")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "tries: 25\n" in done.stdout and int(re.search("exit code 0: (.+)", done.stdout)[1]) > 2
+def test_a_fault_is_counted_and_told_once_with_its_command(monkeypatch, capsys):
+    pool = MagicMock()
+    found = pool.return_value.__enter__.return_value.map.return_value.result
+    found.return_value = iter([("plain", "exit code 1", [("traceback", "KeyError")])] * 3)
+    monkeypatch.setattr(driver, "ProcessPool", pool)
+    count, ends, faults = driver.run("lines", 1, 3, 7, 5, 1, "reference")
+    assert (count, ends["exit code 1"], faults["traceback", "KeyError"]) == (3, 3, 3)
+    said = capsys.readouterr().out
+    assert said.count("KeyError") == 1 and "python -m fuzz --kinds lines --seed 7 --first 5 --tries 1\n" in said

@@ -498,8 +498,6 @@ def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
         assert_same_bits(candidates, shown.candidates)
         assert progress.doing == f"level {progress.level}"
         assert progress.stage in (None, f"level{progress.level}")
-        [marks] = progress.maps().values()
-        assert marks.shape == candidates.shape and 0 <= marks.min() <= marks.max() <= 1
 
 
 @pytest.mark.parametrize("shape", [(2**31, 2**31), (1, 2**31), (2**70, 1), (2**16, 2**15)], ids=str)

@@ -8,10 +8,10 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 from scipy.stats import wasserstein_distance
 from skimage import data
+from subbands import decompose
 from tolerances import HALVES, KEPT, MIXED_BANDS, PALETTE, PLAIN_TEXTURE, SEAM, SPREAD
 
 import simdtex
-from benchmarks.subbands import decompose
 from simdtex.experiments.quality import histogram_distance, seam
 from simdtex.ops.pyramids import noise
 

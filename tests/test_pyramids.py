@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyrtools.pyramids import SteerablePyramidSpace
 from pyrtools.pyramids.filters import parse_filter
+from subbands import decompose
 from tolerances import HALF, PYRTOOLS, RECONSTRUCTION, UNIT32
 
-from benchmarks.subbands import decompose
 from simdtex import random
 from simdtex.methods.pyramid.pyramids import most_levels
 from simdtex.ops import solid

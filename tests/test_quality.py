@@ -2,10 +2,10 @@
 
 import csv
 import functools
-import sys
+import re
 from dataclasses import asdict
-from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from cases import opencl, texture
@@ -276,20 +276,12 @@ def test_pictures_of_one_tone_and_small_ones_have_no_ends():
         quality_regular.cut_ends(flat, flat[:8])
 
 
-# -- The study of a folder of samples: one command gives pictures, sheets and a table, before and after.
-
-BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
-QUICK = "order=2"
+# -- The study of a folder of samples: one command gives a table and a sheet for each.
 
 
 @pytest.fixture
 def study(script):
     return script("study")
-
-
-@pytest.fixture
-def figures_study(script):
-    return script("figures")
 
 
 @pytest.fixture
@@ -302,98 +294,46 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run(folder, monkeypatch, *words):
-    """What the command says; it ends well."""
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import study
-
-    command = ["study.py", "--samples", folder / "in", "--after", QUICK, "--device", "reference", *words]
-    monkeypatch.setattr(sys, "argv", [str(word) for word in command])
-    study.main()
-
-
-def table(path):
-    with open(path, encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def names(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-
-
-def holds(sheet, picture):
-    """Whether a picture stands on a sheet at 1:1."""
-    rows, cols = picture.shape[:2]
-    colours = np.stack([picture] * 3, axis=-1) if picture.ndim == 2 else picture
-    corners = np.argwhere((sheet == colours[0, 0]).all(axis=-1))
-    return any(np.array_equal(sheet[i : i + rows, j : j + cols], colours) for i, j in corners)
-
-
-def test_one_command_studies_a_folder(folder, monkeypatch, capsys):
-    out = folder / "out"
-    run(folder, monkeypatch, "--out", out, "--seeds", 2, "--before", "order=1")
-    made = [
-        f"{at}{name}" for at in ("", "before/") for name in ("grey-seed2.png", "grey.png", "red-seed2.png", "red.png")
-    ]
-    sheets = ["sheets/grey.png", "sheets/red.png", "sheets.png", "figures.csv"]
-    assert names(out) == sorted([*made, *sheets])
-    rows = table(out / "figures.csv")
-    order = [(name, setting, seed) for name in ("grey", "red") for seed in "12" for setting in ("before", "after")]
-    assert [(row["sample"], row["setting"], row["seed"]) for row in rows] == order
-    last = read(out / "red-seed2.png").pixels
-    assert last.shape == (36, 32, 3) and last.dtype == np.uint16
-    found = measure(read(folder / "in" / "red.tif").pixels, last)
-    assert float(rows[-1]["coverage"]) == pytest.approx(found.coverage, abs=5e-5)
-    assert float(rows[-1]["effective_share"]) > 0 and rows[-1]["repeats"] == ""  # too small for repeats
-    sheet = read(out / "sheets" / "grey.png").pixels
-    for picture in (
-        "in/grey.png",
-        "out/grey.png",
-        "out/grey-seed2.png",
-        "out/before/grey.png",
-        "out/before/grey-seed2.png",
-    ):
-        assert holds(sheet, read(folder / picture).pixels), picture
-    every = read(out / "sheets.png").pixels
-    assert holds(every, read(out / "grey.png").pixels) and not holds(every, read(out / "grey-seed2.png").pixels)
+def test_one_command_studies_a_folder(study, folder, capsys):
+    tried = ["order=2", "order=1"]
+    words = ["--samples", folder / "in", "--out", folder / "out", "--seeds", 2, "--device", "reference"]
+    words += [word for setting in tried for word in ("--options", setting)]
+    study.main([str(word) for word in words], standalone_mode=False)
+    assert {path.name for path in (folder / "out").iterdir()} == {"mrf-grey.png", "mrf-red.png", "mrf.csv"}
+    with open(folder / "out" / "mrf.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["sample"], row["setting"]) for row in rows] == [(n, s) for n in ("grey", "red") for s in tried]
+    red = read(folder / "in" / "red.tif").pixels
+    options = {"channel_axis": -1, "order": 1, "device": "reference"}
+    found = [measure(red, simdtex.synthesize(red, (36, 32), rng=seed, **options)).coverage for seed in (1, 2)]
+    assert float(rows[-1]["coverage"]) == pytest.approx(np.mean(found), abs=5e-3)
+    assert rows[-1]["repeats"] == "", "it is too small for repeats"
     said = capsys.readouterr().out
     assert "left out: " in said and "notes.md" in said
-    after = [float(row["coverage"]) for row in rows if row["setting"] == "after"]
-    line = next(line for line in said.split("\nafter ")[-1].splitlines() if line.startswith("coverage "))
-    assert line.split()[1:3] == [f"{np.mean(after):.3f}", f"{max(after):.3f}"]
+    (line,) = (line for line in said.split("Mean and worst")[1].splitlines() if line.startswith("order=1  coverage"))
+    both = {row["sample"]: float(row["coverage"]) for row in rows if row["setting"] == "order=1"}
+    assert float(line.split()[2]) == pytest.approx(np.mean(list(both.values())), abs=6e-3)
+    assert line.split()[4] == max(both, key=both.get)
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--out", "in/out", "--before", "order"], "order is no option: give NAME=VALUE"),
-        (["--out", "in/out", "--before", "odor=1"], "unknown option 'odor'"),
-        (["--out", "a", "--only", "none"], "there is no picture"),
-        ([], "--samples needs --out"),
+        (["--options", "order"], "order is no option: give NAME=VALUE"),
+        (["--options", "odor=1"], "unknown option 'odor'"),
+        (["--only", "none"], "there is no picture"),
+        (["--method", "none"], "there is no none: choose of mrf"),
     ],
 )
-def test_bad_input_gets_one_sentence(folder, monkeypatch, capsys, words, says):
-    monkeypatch.chdir(folder)
-    with pytest.raises(SystemExit) as ended:
-        run(folder, monkeypatch, *words)
-    assert ended.value.code == 2
-    assert says in capsys.readouterr().err.splitlines()[-1]
+def test_bad_input_gets_one_sentence(study, folder, words, says):
+    words = ["--samples", str(folder / "in"), "--out", str(folder / "out"), "--device", "reference", *words]
+    with pytest.raises(click.UsageError, match=re.escape(says)):
+        study.main(words, standalone_mode=False)
 
 
 def test_the_worst_is_far_from_what_is_best(study):
-    def result(name, **figures):
-        return study.Result(name, "after", 1, None, figures)
-
-    found = study.summary(
-        [
-            result("a", salt=0.25, coverage=0.1, effective_share=0.3),
-            result("b", salt=3.0, coverage=0.4, effective_share=0.2),
-        ]
-    )
-    assert {figure: worst[2] for figure, worst in found.items()} == {
-        **{"salt": "a", "coverage": "b", "effective_share": "b"}
-    }
-    assert found["salt"][:2] == (1.625, 0.25)
+    assert study.worst("salt", {"a": 0.25, "b": 3.0}) == ("a", 0.25)
+    assert study.worst("coverage", {"a": 0.1, "b": 0.4}) == ("b", 0.4)
 
 
 def naive_repeats(picture, scale, step):
@@ -410,16 +350,16 @@ def naive_repeats(picture, scale, step):
 
 
 @pytest.mark.parametrize("channels", [(), (3,)])
-def test_repeats_against_loops(figures_study, channels):
+def test_repeats_against_loops(study, channels):
     sample, output = noise(20, (56, 60, *channels)), noise(21, (64, 80, *channels))
     output[26:64, :40] = output[:38, 40:]
     scale = deviation(half_size(sample))
     expected = naive_repeats(output, scale, 8), naive_repeats(sample, scale, 8)
     assert 0 < expected[0] < 1
-    assert figures_study.repeats(sample, output) == pytest.approx(expected)
+    assert study.repeats(sample, output) == pytest.approx(expected)
 
 
-def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch(figures_study):
+def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch(study):
     ground = noise(22, (24, 48), float).repeat(2, 0).repeat(2, 1)  # 48 x 96
     ground *= 10 / ground.std()
     sign = np.where(noise(23, (24, 48)) > 100, 1.0, -1.0).repeat(2, 0).repeat(2, 1)
@@ -428,34 +368,34 @@ def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch(figures_study):
         made = noise(24, (24, 48), float).repeat(2, 0).repeat(2, 1)
         made[:, apart : apart + 32] = (ground + off * 10 * sign)[:, :32]
         made[:, :32] = ground[:, :32]
-        return figures_study.repeats(ground, made)[0]
+        return study.repeats(ground, made)[0]
 
     assert share(0.3, 40) > 0 == share(0.4, 40)
     for period, expected in ((14, 0), (16, 2 / 3), (28, 0)):  # of three places each way the outer two are 16 apart
         columns = np.tile(noise(25, (48, period // 2), float).repeat(2, 1), (1, 4))[:, :48]
-        assert figures_study.repeats(columns, columns)[0] == pytest.approx(expected)
-        assert figures_study.repeats(columns, columns.T[:48])[0] == pytest.approx(expected)
+        assert study.repeats(columns, columns)[0] == pytest.approx(expected)
+        assert study.repeats(columns, columns.T[:48])[0] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("channels", [(), (3,)])
 @pytest.mark.parametrize("levels", [2, 200])
-def test_a_sample_has_its_own_salt(figures_study, channels, levels):
+def test_a_sample_has_its_own_salt(study, channels, levels):
     sample = np.random.default_rng(30).integers(0, levels, (40, 50, *channels)).astype(np.uint8)
-    assert figures_study.salt(sample, sample) == pytest.approx(1.0)
+    assert study.salt(sample, sample) == pytest.approx(1.0)
 
 
-def test_salt_counts_odd_pixels(figures_study):
+def test_salt_counts_odd_pixels(study):
     sample = np.zeros((40, 50), np.uint8)
     sample[5::10, 5::10] = np.arange(100, 120).reshape(4, 5)  # 20 of 2000 are odd: the 10 largest make 0.5 %
-    assert figures_study.salt(sample, np.zeros_like(sample)) == 0.0
+    assert study.salt(sample, np.zeros_like(sample)) == 0.0
     output = np.zeros_like(sample)
     output[3::6, 3::6] = 200  # 7 x 8
-    assert figures_study.salt(sample, output) == pytest.approx(56 / 2000 / 0.005)
+    assert study.salt(sample, output) == pytest.approx(56 / 2000 / 0.005)
     output[output > 0] = 105  # less than the threshold of 109
-    assert figures_study.salt(sample, output) == 0.0
+    assert study.salt(sample, output) == 0.0
     in_blue = np.stack([sample * 0, sample * 0, sample], axis=-1)
     made = np.stack([output * 0, (output > 0) * 200, output * 0], axis=-1)
-    assert figures_study.salt(in_blue, made) == pytest.approx(56 / 2000 / 0.005)  # of any channel
+    assert study.salt(in_blue, made) == pytest.approx(56 / 2000 / 0.005)  # of any channel
 
 
 # -- A floor under the figures of quality: what the method ``mrf`` made of three textures when they were last measured.

@@ -6,10 +6,10 @@ import pytest
 from cases import REFERENCE, assert_same_bits, opencl, texture
 from scipy.stats import wasserstein_distance
 from skimage import data
+from subbands import decompose
 from tolerances import SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
 
 import simdtex
-from benchmarks.subbands import decompose
 from simdtex.methods.pyramid.solid import FAMILIES
 
 SIDE = 32
