@@ -42,7 +42,7 @@ class Record(Observer):
         self.launches = run.machine.launches
         self._expected = expected_work(run)
         self._fraction = 0.0
-        self._began, self._first_left = time.perf_counter(), 0.0  # of the current level
+        self._first_left = 0.0  # of the current level
         self._slots, self._listed = 0, False  # candidates that a relaxation evaluates; whether they are listed
         self._done = 0  # relaxed sites of the current sweep
         self._ended = True  # the next part begins a sweep
@@ -143,21 +143,18 @@ class Record(Observer):
 
     def save(self) -> dict[str, Any]:
         """Return everything received so far, as plain arrays and numbers."""
-        return {
-            "stages": [(stage.level, stage.image) for stage in self.stages],
-            **{"reports": self.reports, "account": self.account and self.account.total, "fraction": self._fraction},
+        return super().save() | {
+            **{"account": self.account and self.account.total, "fraction": self._fraction},
             **{"slots": self._slots, "listed": self._listed, "first_left": self._first_left},
             **{"evaluations": self._evaluated(), "skipped": self._run.machine.spared - self._skipped},
-            "seconds": time.perf_counter() - self._began,
         }
 
     def load(self, saved: dict[str, Any]) -> None:
         """Continue from the tree that `save` returned."""
-        self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
-        self.reports, self._fraction, self._first_left = saved["reports"], saved["fraction"], saved["first_left"]
+        super().load(saved)
+        self._fraction, self._first_left = saved["fraction"], saved["first_left"]
         self._slots, self._listed = saved["slots"], saved["listed"]
         self._skipped, self._evaluations = self._run.machine.spared - saved["skipped"], saved["evaluations"]
-        self._began = time.perf_counter() - saved["seconds"]
         if self.account and self.reports:
             number = self.reports[-1]["level"]
             self.account.begin(self._run.grid(number), self._slots, self._run.choice(number))
