@@ -567,9 +567,9 @@ class Stored(Conditions):
 
     def at(self, number: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level's sites in a window; None if there are none."""
-        if not self._work.held or grid.origin is None:
+        if not self._work.held:
             return None
-        window = Tile(*grid.origin, *grid.shape)
+        window = Tile(*grid.first, *grid.shape)
         return self._store.held(self._work.layout.levels[number], window)
 
     def scattered(self, number: int) -> Data | None:

@@ -472,7 +472,8 @@ class Maps(NamedTuple):
         if off.any():
             at = np.argwhere(off)[0]
             told = ", ".join(f"{p:g}" for p in found[(slice(None), *at)])
-            raise ValueError(f"the probabilities of {_cell(at)} are {told}; give shares that add up to 1, or NaN")
+            remedy = "give shares of 0 or more that add up to 1, or NaN"
+            raise ValueError(f"the probabilities of {_cell(at)} are {told}; {remedy}")
         found[:, unknown] = np.nan
         return np.asarray(found / total)
 

@@ -138,7 +138,8 @@ class Lattices:
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
         self.conditions = conditions or Conditioning(plan)
-        self._last: Level | None = None
+        self._last: Level | None = None  # without the parts that depend on the window
+        self._whole: Level | None = None
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10)."""
@@ -151,9 +152,12 @@ class Lattices:
         hold only the sites of the window. None: the whole lattice.
         """
         if self._last is None or self._last.number != number:
-            self._last = None  # the arrays of one level are enough to keep
-            self._last = self._on(self._level(number), self.grid(number))
-        return self._last if window is None else self._on(self._last, self.grid(number).window(*window))
+            self._last = self._whole = None  # the arrays of one level are enough to keep
+            self._last = self._level(number)
+        if window is not None:
+            return self._on(self._last, self.grid(number).window(*window))
+        self._whole = self._whole or self._on(self._last, self.grid(number))
+        return self._whole
 
     def _level(self, number: int) -> Level:
         """Return a level without its parts that depend on the window."""
