@@ -47,12 +47,14 @@ class Record(Observer):
         self._done = 0  # relaxed sites of the current sweep
         self._ended = True  # the next part begins a sweep
         self._skipped = self._evaluations = 0  # the latter of the level before the run was resumed
+        self._level: Level | None = None  # whose parts are received
         self._twin: Lattices | None = None  # the plan on the reference, for explanations
 
     def part(self, level: Level, state: State, part: Part) -> None:
         """Count a part of a sweep, and report it to the callback."""
         if not self.reports or level.number != self.reports[-1]["level"]:
             self._begin(level)
+        self._level = level
         free, sites = not state.active, level.grid.size
         left = state.temperature_sum / (1024 * sites)
         self._done = part.sites + (0 if self._ended else self._done)
@@ -119,13 +121,13 @@ class Record(Observer):
                 report["fma"] += evaluations * (level.work // level.proposal.slots)
             report["skipped"] = machine.spared - self._skipped
             report["seconds"] = time.perf_counter() - self._began
+            self._level = None  # its arrays are free before the next level has its own
 
     def _evaluated(self) -> int:
         """Return the number of candidates that the sites of the level have evaluated, if the level lists candidates."""
-        if not self._listed:
-            return 0
-        level = self._run.level(self.reports[-1]["level"])
-        return self._evaluations + int(self._run.machine.get(level.evaluations).sum(dtype=np.int64))
+        if not self._listed or self._level is None:
+            return self._evaluations
+        return self._evaluations + int(self._run.machine.get(self._level.evaluations).sum(dtype=np.int64))
 
     def _begin(self, level: Level) -> None:
         """Start the report of a level."""
