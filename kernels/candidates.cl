@@ -41,7 +41,7 @@ typedef struct {
 
 // Equations (9) to (11) for the features of one level: no component differs by more than its threshold. Of four nodes
 // at a time, a bit for each, to the end: that is quicker than a branch for each feature.
-inline uint similar(const Parents *own, const int level, const int4 node)
+static inline uint similar(const Parents *own, const int level, const int4 node)
 {
     __global const int *a = own->features + node.x * FEATURES, *b = own->features + node.y * FEATURES;
     __global const int *c = own->features + node.z * FEATURES, *d = own->features + node.w * FEATURES;
@@ -55,7 +55,7 @@ inline uint similar(const Parents *own, const int level, const int4 node)
 }
 
 // Which of the siblings at a place pass, row by row.
-inline uint siblings(const Parents *own, const int level, const int row, const int col, int *compared)
+static inline uint siblings(const Parents *own, const int level, const int row, const int col, int *compared)
 {
     const int4 lattice = own->analysis[level];
     const int first = lattice.z + (row & ~1) * lattice.y + (col & ~1);
@@ -67,7 +67,7 @@ inline uint siblings(const Parents *own, const int level, const int row, const i
 
 // From a place on to the next node that passes where the scan stops, and false if there is none. The scan goes from the
 // top down. Parents are compared before their children, so one that fails rejects all that is below it.
-inline bool next(const Parents *own, Place *at, int *compared)
+static inline bool next(const Parents *own, Place *at, int *compared)
 {
     for (;;) {
         if (at->level == own->top) { // whose nodes are siblings
@@ -104,7 +104,7 @@ inline bool next(const Parents *own, Place *at, int *compared)
 }
 
 // To a node where the scan stops, as if it had come there from the beginning.
-inline void resume(const Parents *own, Place *at, const int2 node)
+static inline void resume(const Parents *own, Place *at, const int2 node)
 {
     int ignored;
     at->level = own->stop;
@@ -115,19 +115,19 @@ inline void resume(const Parents *own, Place *at, const int2 node)
 }
 
 // How many of a level's rows, or columns, are `down` levels below number k.
-inline int beneath(const int k, const int down, const int rows)
+static inline int beneath(const int k, const int down, const int rows)
 {
     return max(0, min(rows - (k << down), 1 << down));
 }
 
 // Candidates below a node so many levels above the leaves.
-inline int candidates_below(const Parents *own, const int row, const int col, const int down)
+static inline int candidates_below(const Parents *own, const int row, const int col, const int down)
 {
     return beneath(row, down, own->leaves.x) * beneath(col, down, own->leaves.y);
 }
 
 // What the scan needs to know of pixel (i, j); it is the same for its siblings.
-inline void find_parents(Parents *own, __global const int4 *synthesis, __global const int *source, const int match,
+static inline void find_parents(Parents *own, __global const int4 *synthesis, __global const int *source, const int match,
                          const int i, const int j)
 {
     const int level = own->level;

@@ -17,7 +17,7 @@
 // inside  (plane,)             whether a pixel of it is known and may be used
 // out     (C, count)           for the sites first .. first + count - 1, row by row
 // One work-item per site.
-inline int within(const int row, const int col, const int pitch, const int margin, const int rows, const int cols,
+static inline int within(const int row, const int col, const int pitch, const int margin, const int rows, const int cols,
                   __global const uchar *restrict inside)
 {
     if (row < margin || row >= margin + rows || col < margin || col >= margin + cols)

@@ -16,7 +16,7 @@ __kernel void fold(__global const int *restrict fine, const int planes, const in
 }
 
 // The row (or column) of `fold` that row i of n goes to; -1 for one that is left out.
-inline int folded(const int i, const int n)
+static inline int folded(const int i, const int n)
 {
     if (i % 2 == 0)
         return i / 2;

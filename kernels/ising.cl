@@ -11,7 +11,7 @@
 #include "common/philox.h"
 
 // What a site becomes.
-inline uchar heat_bath(__global const uchar *spins, const int site, __global const int *restrict offsets, const int N,
+static inline uchar heat_bath(__global const uchar *spins, const int site, __global const int *restrict offsets, const int N,
                        const Lattice g, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
 {
     const int i = site / g.cols, j = site % g.cols;

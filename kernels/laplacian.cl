@@ -24,7 +24,7 @@ __kernel void laplacian_reduce(__global const int *restrict fine, const int plan
 }
 
 // `within` for -1 .. n.
-inline int beside(const int i, const int n, const int torus)
+static inline int beside(const int i, const int n, const int torus)
 {
     if (torus)
         return i < 0 ? n - 1 : i == n ? 0 : i;
@@ -33,7 +33,7 @@ inline int beside(const int i, const int n, const int torus)
 
 // 2up(G_{i+1}) at pixel (i, j) of level i. In each direction the first child of a pixel takes (1, 6, 1) / 8 around it,
 // the second (4, 4) / 8. Level i is made of tiles of tile_rows x tile_cols pixels, `coarse` of tiles of half as many.
-inline int expanded(__global const int *restrict coarse, const int rows, const int cols, const int tile_rows,
+static inline int expanded(__global const int *restrict coarse, const int rows, const int cols, const int tile_rows,
                     const int tile_cols, const int torus, const int i, const int j)
 {
     const int weight[2][3] = {{1, 6, 1}, {0, 4, 4}};
@@ -64,7 +64,7 @@ __kernel void laplacian_band(__global const int *restrict fine, __global const i
 
 // Pixel (i, j) of L_i of the output where pieces of the sample that meet fade into each other: (1, 2, 1) / 4 in each
 // direction of what the neighbours, and the pixel itself, were copied from would go on with here.
-inline int joined(__global const int *restrict band, const int tile_rows, const int tile_cols, const int torus,
+static inline int joined(__global const int *restrict band, const int tile_rows, const int tile_cols, const int torus,
                   __global const int *restrict source, const int rows, const int cols, const int i, const int j)
 {
     int sum = 0;

@@ -56,7 +56,7 @@ __kernel void matching_span(__global const int2 *restrict ranges, const int segm
 }
 
 // The bin of a value; the greatest value stands at the end of the last. A constant segment has one bin only.
-inline int bin_of(const int value, const int2 span, const int bins)
+static inline int bin_of(const int value, const int2 span, const int bins)
 {
     const long width = max(1l, (long)span.y - span.x);
     return (int)min(((long)value - span.x) * bins / width, bins - 1l);

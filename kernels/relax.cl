@@ -58,7 +58,7 @@
 #define WIDTH(g) (((g).cols + (g).runs * LANES - 1) / ((g).runs * LANES))
 
 // -G of candidate p; of a density, more by the logarithm of the share of the kernel around it that is legal.
-inline float noise_of(const Level g, const uint turn, const ulong place, const int p, __global const float *y,
+static inline float noise_of(const Level g, const uint turn, const ulong place, const int p, __global const float *y,
                       __global const uint *noise)
 {
     const int row = p / g.cols, col = p % g.cols, run = row * g.runs + col % g.runs, n = col / g.runs;
@@ -69,7 +69,7 @@ inline float noise_of(const Level g, const uint turn, const ulong place, const i
 }
 
 // How often candidate p continues a neighbour, and AGAIN times how often it is one's source.
-inline float repeated(const int p, const __private int *next, const __private int *same, const int neighbours)
+static inline float repeated(const int p, const __private int *next, const __private int *same, const int neighbours)
 {
     int found = 0;
     for (int k = 0; k < neighbours; ++k)

@@ -9,13 +9,13 @@
 // Two directions are summed in 32 bits, the third in 64: right up to |fine| < 2^23 and |coarse| < 2^25.
 
 // Index i, most often one of 0 .. n-1 already: a comparison is cheaper than a division.
-inline int inside(const int i, const int n)
+static inline int inside(const int i, const int n)
 {
     return i >= 0 && i < n ? i : within(i, n, 1);
 }
 
 // How many slices, rows or columns the level above n of them has.
-inline int above(const int n)
+static inline int above(const int n)
 {
     return n % 2 ? n : n / 2;
 }
@@ -50,7 +50,7 @@ __kernel void solid_reduce(__global const int *restrict fine, const int first, c
 
 // 2up(G_{i+1}) at the eight children of voxel (slice, i, j) of G_{i+1}, child 4 a + 2 b + c at a slices, b rows and
 // c columns on. In each direction the first child takes (1, 6, 1) / 8 around its parent, the second (4, 4) / 8.
-inline void expanded(__global const int *restrict coarse, const int depth, const int rows, const int cols,
+static inline void expanded(__global const int *restrict coarse, const int depth, const int rows, const int cols,
                      const int slice, const int i, const int j, int *up)
 {
     int row[3], flat[3][4];
@@ -96,7 +96,7 @@ __kernel void solid_expanded(__global const int *restrict in, __global const int
 }
 
 // The voxels of the level above, and their weights in 2^-`bits`, that slice, row or column i of n takes on a torus.
-inline int taken(const int i, const int n, int *from, int *weight, int *bits)
+static inline int taken(const int i, const int n, int *from, int *weight, int *bits)
 {
     const int gauss[5] = {1, 4, 6, 4, 1}, child[2][3] = {{1, 6, 1}, {0, 4, 4}};
     const int odd = n % 2, count = odd ? 5 : 3, halved = max(1, n / 2); // some divide in a branch not taken

@@ -4,7 +4,7 @@
 #define SIMDTEX_COOL_H
 
 // `sum` is xi plus the temperatures of the `members` of N_s: neighbours on the lattice.
-inline ushort cooled_to(const int sum, const int members)
+static inline ushort cooled_to(const int sum, const int members)
 {
     return sum > 0 ? (ushort)(sum / max(members, 1)) : (ushort)0;
 }

@@ -58,7 +58,7 @@
 #define MISFIT(p, site) 0.0f
 #endif
 
-inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
+static inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
                             const float weight, const float tolerance)
 {
     float d = 0.0f;
@@ -69,7 +69,7 @@ inline float apart_in_phase(__global const float *y, const int listed, __global 
     return fmax(d - tolerance, 0.0f);
 }
 
-inline float of_kind(__global const ushort *kind, const int listed, __global const float *kind_cost, const int area)
+static inline float of_kind(__global const ushort *kind, const int listed, __global const float *kind_cost, const int area)
 {
     float d = 0.0f;
     for (int k = 0; k < KINDS; ++k)
@@ -77,7 +77,7 @@ inline float of_kind(__global const ushort *kind, const int listed, __global con
     return d;
 }
 
-inline float misfit(const int begin, const int end, __global const int *reach, __global const ushort *told,
+static inline float misfit(const int begin, const int end, __global const int *reach, __global const ushort *told,
                     const float hard, __global const float *y, const int plane)
 {
     float d = 0.0f;

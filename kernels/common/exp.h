@@ -4,7 +4,7 @@
 #ifndef SIMDTEX_EXP_H
 #define SIMDTEX_EXP_H
 
-inline float exp32(const float x)
+static inline float exp32(const float x)
 {
     const float k = rint(x * 1.44269502f);
     float r = fma(k, -0.693145752f, x);

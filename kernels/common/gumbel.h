@@ -13,7 +13,7 @@ typedef WIDE(uint) uvec;
 typedef WIDE(int) ivec;
 
 // -G = log(-log((bits + 1/2) 2^-32)). Near u = 1, log u is computed from 1 - u.
-inline vec minus_gumbel(const uvec bits)
+static inline vec minus_gumbel(const uvec bits)
 {
     const uvec rest = ~bits;
     const vec u = fma(WIDE(convert_float)(bits), (vec)0x1p-32f, (vec)0x1p-33f);
@@ -34,7 +34,7 @@ inline vec minus_gumbel(const uvec bits)
 __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
 // The words of the draws `first`, `first` + 1, ... side by side.
-inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
+static inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
                      __private uvec *word)
 {
     uvec a = (uvec)(uint)place, b = (uvec)turn, c = (uvec)WHAT_OF(level, place, PURPOSE_GUMBEL), d = LOAD(lanes_) + first;
@@ -45,7 +45,7 @@ inline void words_of(const ulong seed, const uint level, const uint turn, const 
     word[3] = d;
 }
 
-inline float minus_gumbel_of(const ulong seed, const uint level, const uint turn, const ulong place, const int unit,
+static inline float minus_gumbel_of(const ulong seed, const uint level, const uint turn, const ulong place, const int unit,
                              const int lane)
 {
     const uint4 bits = draw4(seed, level, turn, place, PURPOSE_GUMBEL, DRAW_OF(unit, lane));

@@ -26,7 +26,7 @@ typedef struct {
 #define DOWN(offset) (offset)[AXES - 2]
 #define RIGHT(offset) (offset)[AXES - 1]
 
-inline int wrap(const int i, const int n)
+static inline int wrap(const int i, const int n)
 {
     if (i >= 0 && i < n) // nearly always, and a division takes long
         return i;
@@ -35,7 +35,7 @@ inline int wrap(const int i, const int n)
 }
 
 // The pixel of the whole picture at site (i, j): what keys its random numbers.
-inline ulong place_of(const Lattice g, const int i, const int j)
+static inline ulong place_of(const Lattice g, const int i, const int j)
 {
     const ulong layer = AXES > 2 ? wrap(g.front + i / g.rows, g.whole_layers) : 0;
     const ulong row = wrap(g.top + (AXES > 2 ? i % g.rows : i), g.whole_rows), col = wrap(g.left + j, g.whole_cols);
@@ -44,7 +44,7 @@ inline ulong place_of(const Lattice g, const int i, const int j)
 
 // Number of the neighbour of site (i, j) at an offset, equation (3). -1 outside an open lattice or a window, and where a
 // small torus wraps the offset back onto the site itself.
-inline int neighbour(const Lattice g, const int i, const int j, __global const int *offset)
+static inline int neighbour(const Lattice g, const int i, const int j, __global const int *offset)
 {
     const int layer = AXES > 2 ? i / g.rows : 0, row = AXES > 2 ? i % g.rows : i;
     int n = layer + LAYERS(offset), k = row + DOWN(offset), l = j + RIGHT(offset);

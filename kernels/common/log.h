@@ -11,7 +11,7 @@
 #define LOG_SUM(T, e, r)                                                                                               \
     fma(e, (T)0.693145752f, fma(LOG_SERIES(T, r), (r) * (r), fma(e, (T)1.42860677e-6f, r)))
 
-inline float log32(const float x)
+static inline float log32(const float x)
 {
     const int bits = as_int(x), k = (bits - 0x3f3504f3) >> 23;
     const float r = as_float(bits - (k << 23)) - 1.0f, e = (float)k;

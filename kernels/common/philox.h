@@ -31,7 +31,7 @@
 #define PURPOSE_SEARCH 6u
 #define PURPOSE_GUMBEL 7u
 
-inline uint4 philox(const uint4 counter, const uint2 key)
+static inline uint4 philox(const uint4 counter, const uint2 key)
 {
     uint a = counter.x, b = counter.y, c = counter.z, d = counter.w;
     PHILOX(a, b, c, d, key, ulong, convert_ulong, convert_uint)
@@ -41,14 +41,14 @@ inline uint4 philox(const uint4 counter, const uint2 key)
 #define KEY_OF(seed) (uint2)((uint)(seed), (uint)((seed) >> 32))
 #define WHAT_OF(level, site, purpose) ((uint)((site) >> 32) << 16 | (level) << 8 | (purpose))
 
-inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ulong site, const uint purpose,
+static inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ulong site, const uint purpose,
                    const uint attempt)
 {
     return philox((uint4)((uint)site, turn, WHAT_OF(level, site, purpose), attempt), KEY_OF(seed));
 }
 
 // An integer 0 .. n-1 from 64 random bits; the bias is below n / 2^64.
-inline ulong below(const uint lo, const uint hi, const ulong n)
+static inline ulong below(const uint lo, const uint hi, const ulong n)
 {
     return mul_hi((ulong)hi << 32 | lo, n);
 }

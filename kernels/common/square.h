@@ -29,7 +29,7 @@
 #define CELLS (ROWS * CHUNKS)
 
 // Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a site's number; -1 beyond an end that does not wrap.
-inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
+static inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
 {
     for (int a = 0; a < SIDE; ++a) {
         int k = at + a - RADIUS;
@@ -42,7 +42,7 @@ inline void lines_around(const int at, const int count, const int wraps, const i
 }
 
 // The rows around row i of a lattice, likewise.
-inline void rows_around(const Lattice g, const int i, __private int *row)
+static inline void rows_around(const Lattice g, const int i, __private int *row)
 {
 #if AXES > 2
     int layer[SIDE], line[SIDE];
@@ -56,7 +56,7 @@ inline void rows_around(const Lattice g, const int i, __private int *row)
 }
 
 // Number of the neighbour in row a and column b of the square; -1 where there is none. -D TILES: see lattice.h.
-inline int in_square(const Lattice g, const int site, const int i, const int j, const __private int *row,
+static inline int in_square(const Lattice g, const int site, const int i, const int j, const __private int *row,
                      const __private int *col, const int a, const int b)
 {
     if (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site)
@@ -69,7 +69,7 @@ inline int in_square(const Lattice g, const int site, const int i, const int j, 
 }
 
 #if V == 1
-inline float folded(__private float *a)
+static inline float folded(__private float *a)
 {
     for (int half_ = 8; half_; half_ /= 2)
         for (int n = 0; n < half_; ++n)
@@ -81,7 +81,7 @@ inline float folded(__private float *a)
 #define XU(cell, c, lane) xu[((cell) * C + (c)) * 16 + (lane)]
 #define SQUARE_ARG(const) const __private float *u, const __private float *xu
 #else
-inline float folded(const float16 a)
+static inline float folded(const float16 a)
 {
     const float8 b = a.lo + a.hi;
     const float4 c = b.lo + b.hi;
@@ -94,7 +94,7 @@ inline float folded(const float16 a)
 #define SQUARE_ARG(const) const __private float16 *u, const __private float16 *xu
 
 // 1 in the lane of cell k of row a that is the site itself, 0 elsewhere.
-inline float16 middle(const int a, const int k)
+static inline float16 middle(const int a, const int k)
 {
     float16 lanes = 0.0f;
     if (a == MIDDLE && k == RADIUS / 16)
@@ -122,7 +122,7 @@ inline float16 middle(const int a, const int k)
 //
 // disc (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
 // Vectors also read what is no neighbour, which others may be writing, and multiply it by 0.
-inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
+static inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
                    const __private int *col, __global const ushort *values, __global const int *source,
                    __global const ushort *temperature, __global const int *restrict offsets,
                    __global const float *restrict disc, SQUARE_ARG())
@@ -189,7 +189,7 @@ inline int2 gather(const Level g, const int site, const int i, const int j, cons
 #endif
 
 // Equation (12): d of the candidate whose grey levels are at y, in a sample with these strides.
-inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane,
+static inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane,
                                const int row_stride, const int layer_stride)
 {
 #if V == 1

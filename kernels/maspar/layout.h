@@ -27,14 +27,14 @@ typedef struct {
 #define OF(x, k) x[(size_t)(k) * x##_size + x##_word]
 
 // Row and column of the pixel in a layer of a PE, in the picture padded to whole layers.
-inline int2 pixel_of(const Layout g, const int layer, const int pe)
+static inline int2 pixel_of(const Layout g, const int layer, const int pe)
 {
     const int2 at = (int2)(pe / g.cols, pe % g.cols), n = (int2)(layer / g.wide, layer % g.wide);
     return g.blocks ? at * (int2)(g.high, g.wide) + n : n * (int2)(g.rows, g.cols) + at;
 }
 
 // The address of a pixel among the values of a variable: layer * PEs + PE.
-inline int address_of(const Layout g, const int2 pixel)
+static inline int address_of(const Layout g, const int2 pixel)
 {
     const int2 by = g.blocks ? (int2)(g.high, g.wide) : (int2)(g.rows, g.cols), q = pixel / by, r = pixel % by;
     const int2 layer = g.blocks ? r : q, at = g.blocks ? q : r;
