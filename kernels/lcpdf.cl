@@ -45,8 +45,7 @@ static inline ulong weight_at(ulong w, __global const float *y, const int plane,
     if (s >= S)                                                                                                        \
         return;                                                                                                        \
     const int site = sites[s], i = site / g.lattice.cols, j = site % g.lattice.cols;                                   \
-    AROUND(g.lattice, i, j);                                                                                           \
-    gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu)
+    AROUND(g, site, i, j)
 
 // The density over grey levels and its mode, of several levels the lowest. From the pixel of the nearest candidate on,
 // each channel in turn, and once more, takes the mode given the others; the source gives most.

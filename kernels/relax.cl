@@ -15,8 +15,9 @@
 //
 // -D EXACT proposes every candidate of the level, and skips those that are proved to cost more than the best so far.
 //
-// What relaxes together are the sites first .. S - 1 of a list, one work-item each, and it does so in place, since no two
-// of them are neighbours. -D APART writes to new_values (C, S), new_source and new_temperature (S,) instead.
+// What relaxes together are the sites first .. S - 1 of a list, and it does so in place, since no two of them are
+// neighbours. -D APART writes to new_values (C, S), new_source and new_temperature (S,) instead. A site has one work-item,
+// or -D ITEMS of them: these share its neighbours, its candidates, and the lanes of a distance.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/costs.h"
 #include "common/cool.h"
@@ -37,6 +38,15 @@
 #define SLOTS 64 // candidates that a site may have
 #endif
 #define SUGGESTING 12 // nearest neighbours that suggest a candidate each
+#ifdef EXACT
+#define SUGGESTED(g) (g).neighbours // neighbours that suggest one here
+#define RAW (N + 1)                 // suggestions at most
+#define LISTED (RAW > ITEMS * STEP ? RAW : ITEMS * STEP)
+#else
+#define SUGGESTED(g) min(SUGGESTING, (g).neighbours)
+#define RAW SLOTS
+#define LISTED SLOTS
+#endif
 #define AGAIN 4       // what being a neighbour's source costs, over continuing it
 #ifndef N
 #define N 64 // most neighbours
@@ -69,7 +79,7 @@ static inline float noise_of(const Level g, const uint turn, const ulong place, 
 }
 
 // How often candidate p continues a neighbour, and AGAIN times how often it is one's source.
-static inline float repeated(const int p, const __private int *next, const __private int *same, const int neighbours)
+static inline float repeated(const int p, const SHARED int *next, const SHARED int *same, const int neighbours)
 {
     int found = 0;
     for (int k = 0; k < neighbours; ++k)
@@ -77,20 +87,58 @@ static inline float repeated(const int p, const __private int *next, const __pri
     return (float)found;
 }
 
-// Evaluate candidate p, and keep it if it is the best so far. Noise takes `most` away at most.
-#define CONSIDER(p, factor)                                                                                            \
+// Keep candidate p at a distance if it is the best so far. Noise takes `most` away at most.
+#define CONSIDER(distance, p, factor)                                                                                  \
     {                                                                                                                  \
-        float total_ = EVALUATED(p, factor, site);                                                                     \
+        float total_ = WITH_COSTS(distance, p, factor, site);                                                          \
         if (total_ - most <= best) {                                                                                   \
             total_ += REPEATED(p);                                                                                     \
             if (g.spread > 0.0f)                                                                                       \
                 total_ = fma(g.spread, noise_of(g, turn, place, p, levels + at[p], noise), total_);                    \
-            if (total_ < best || (total_ == best && (p) < best_at)) {                                                  \
-                best = total_;                                                                                         \
-                best_at = p;                                                                                           \
-            }                                                                                                          \
+            KEEP(total_, p)                                                                                            \
         }                                                                                                              \
     }
+#define KEEP(total, p)                                                                                                 \
+    if ((total) < best || ((total) == best && (p) < best_at)) {                                                        \
+        best = total;                                                                                                  \
+        best_at = p;                                                                                                   \
+    }
+
+// Evaluate the first m of the list, of which the first `coherent` continue a neighbour. In a group, 16 items sum the lanes
+// of a distance, and the first ITEMS / 16 of all consider a candidate each; in the end all know the best.
+#define FACTOR(k, coherent) ((k) < (coherent) ? g.discount : 1.0f)
+#if ITEMS == 1
+#define EVALUATE(m, coherent)                                                                                          \
+    for (int k_ = 0; k_ < (m); ++k_)                                                                                   \
+        CONSIDER(DISTANCE(list[k_]), list[k_], FACTOR(k_, coherent))
+#define DISTANCE(p) distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride)
+#else
+#define ABREAST (ITEMS / 16)
+#define EVALUATE(m, coherent)                                                                                          \
+    {                                                                                                                  \
+        for (int from_ = 0; from_ < (m); from_ += ABREAST) {                                                           \
+            const int k_ = from_ + ITEM / 16, n_ = from_ + ITEM;                                                       \
+            if (k_ < (m) && list[k_] >= 0)                                                                             \
+                lanes[ITEM / 16][ITEM % 16] = lane_of_distance(levels + at[list[k_]], u, xu, g.plane, g.row_stride,    \
+                                                               g.layer_stride, ITEM % 16);                             \
+            TOGETHER;                                                                                                  \
+            if (ITEM < ABREAST && n_ < (m) && list[n_] >= 0) {                                                         \
+                float d_[16];                                                                                          \
+                for (int lane_ = 0; lane_ < 16; ++lane_)                                                               \
+                    d_[lane_] = lanes[ITEM][lane_];                                                                    \
+                CONSIDER(folded(d_), list[n_], FACTOR(n_, coherent))                                                   \
+            }                                                                                                          \
+            TOGETHER;                                                                                                  \
+        }                                                                                                              \
+        if (ITEM < ABREAST) {                                                                                          \
+            bests[ITEM] = best;                                                                                        \
+            bests_at[ITEM] = best_at;                                                                                  \
+        }                                                                                                              \
+        TOGETHER;                                                                                                      \
+        for (int k_ = 0; k_ < ABREAST; ++k_)                                                                           \
+            KEEP(bests[k_], bests_at[k_])                                                                              \
+    }
+#endif
 
 // sites    (S,)         number of each site
 // values (C, area), source (area,), temperature (area,)   the field
@@ -102,7 +150,7 @@ static inline float repeated(const int p, const __private int *next, const __pri
 // looks    (N, 2)       lane of each neighbour in the square and its offset in `levels`, close ones far apart
 // noise                 cumulative kernel of equation (7) over grey levels: common/parzen.h
 // work                  in and out: candidates that each site has evaluated; EXACT: multiply-adds of site s
-__kernel void relax(__global const int *restrict sites, const int first, const int S, __global ushort *values,
+__kernel GROUP void relax(__global const int *restrict sites, const int first, const int S, __global ushort *values,
                     __global int *source, __global ushort *temperature, const Level g,
                     __global const int *restrict offsets, __global const int *restrict reach,
                     __global const int *restrict index_of, __global const int *restrict positions,
@@ -116,6 +164,13 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
                     __global ushort *restrict new_values, __global int *restrict new_source,
                     __global ushort *restrict new_temperature)
 {
+#if ITEMS > 1
+    const int s = first + (int)get_group_id(0);
+    __local float lanes[ABREAST][17], bests[ABREAST]; // 17: items that read a row each use different banks
+    __local int bests_at[ABREAST], kept;
+    if (ITEM == 0)
+        kept = 0;
+#else
     int s = first + (int)get_global_id(0);
 #ifdef APART
     s = min(s, S - 1); // an idle work-item would read at wild indices on Intel's runtime
@@ -123,94 +178,135 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
     if (s >= S)
         return;
 #endif
+#endif
     const Lattice h = g.lattice;
     const int site = sites[s], i = site / h.cols, j = site - i * h.cols;
     const ulong place = place_of(h, i, j);
 
     // 6.2.2.1: the neighbourhood.
-    AROUND(h, i, j);
-    const int2 heat = gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu);
+    AROUND(g, site, i, j);
+
+    // What neighbours suggest, the present source, and random candidates.
+    const int suggested = SUGGESTED(g);
+    SHARED int raw[RAW], list[LISTED];
+#ifdef EXACT
+    SHARED int same[N];
+#endif
+    EACH(k, suggested) {
+        const int r = NEIGHBOUR(h, k), from = r >= 0 && temperature[r] < UNTOUCHED ? source[r] : -1;
+        raw[k] = continuing(index_of, from, reach[k], g.pixels);
+#ifdef EXACT
+        same[k] = number_of(index_of, from);
+#endif
+    }
+    if (ITEM == 0)
+        raw[suggested] = number_of(index_of, source[site]);
+    int many = suggested + 1;
+#ifndef EXACT
+    EACH(n, (max(1, g.chance) + 3) / 4) {
+        const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_SEARCH, n);
+        const uint word[4] = {bits.x, bits.y, bits.z, bits.w};
+        for (int k = 4 * n; k < min(4 * n + 4, max(1, g.chance)); ++k)
+            raw[many + k] = (int)((ulong)word[k % 4] * (uint)g.candidates >> 32);
+    }
+    many += max(1, g.chance);
+#endif
+    TOGETHER;
+
+    // Each of them once.
+#if ITEMS > 1
+    const int coherent = suggested;
+    EACH(k, many) {
+        bool first_of_them = raw[k] >= 0;
+        for (int n = 0; n < k; ++n)
+            first_of_them &= raw[n] != raw[k] && (raw[n] < 0 || k <= suggested || g.chance > 0);
+        list[k] = first_of_them ? raw[k] : -1;
+        if (first_of_them)
+            atomic_inc(&kept);
+    }
+    TOGETHER;
+#else
+    int kept = 0, coherent = 0;
+    ulong seen = 0;
+    for (int k = 0; k < many && !(kept && k > suggested && g.chance == 0); ++k) {
+        kept = proposed(raw[k], list, kept, &seen);
+        coherent = k < suggested ? kept : coherent;
+    }
+    many = kept;
+#endif
 
     const float most = MOST_GUMBEL * g.spread;
     float best = INFINITY;
     int best_at = 0x7fffffff;
-    ulong seen = 0;
 #ifndef EXACT
 #define REPEATED(p) 0.0f
-    int list[SLOTS], m = 0;
-    for (int k = 0; k < min(SUGGESTING, g.neighbours); ++k) {
-        const int r = NEIGHBOUR(h, k);
-        if (r >= 0 && temperature[r] < UNTOUCHED)
-            m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
-    }
-    const int suggested = m;
-    m = proposed(number_of(index_of, source[site]), list, m, &seen);
-    const int draws = max(g.chance, m == 0 ? 1 : 0);
-    for (int k = 0; k < draws; k += 4) {
-        const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_SEARCH, k / 4);
-        const uint word[4] = {bits.x, bits.y, bits.z, bits.w};
-        for (int n = 0; n < 4 && k + n < draws; ++n)
-            m = proposed((int)((ulong)word[n] * (uint)g.candidates >> 32), list, m, &seen);
-    }
-    for (int k = 0; k < m; ++k)
-        CONSIDER(list[k], k < suggested ? g.discount : 1.0f)
+    EVALUATE(many, coherent)
 #else
-    // Candidates that continue or are a neighbour's source.
-    int next[N + 1], same[N];
-    for (int k = 0; k < g.neighbours; ++k) {
-        const int r = NEIGHBOUR(h, k), from = r >= 0 && temperature[r] < UNTOUCHED ? source[r] : -1;
-        next[k] = continuing(index_of, from, reach[k], g.pixels);
-        same[k] = number_of(index_of, from);
-    }
-    next[g.neighbours] = number_of(index_of, source[site]);
-#define REPEATED(p) (g.novelty > 0.0f ? g.novelty * repeated(p, next, same, g.neighbours) : 0.0f)
-    int list[N + 1], known = 0;
-    for (int k = 0; k <= g.neighbours; ++k) {
-        const int before = known;
-        known = proposed(next[k], list, known, &seen);
-        if (known > before)
-            CONSIDER(next[k], k < g.neighbours ? g.discount : 1.0f)
-    }
+#define REPEATED(p) (g.novelty > 0.0f ? g.novelty * repeated(p, raw, same, g.neighbours) : 0.0f)
+    EVALUATE(many, coherent)
 
     // The terms of a sum, the most certain first.
-    int m = 0, to[N + 1 + CHECK];
-    float tu[(N + 1 + CHECK) * CONFIDENCES], txu[(N + 1 + CHECK) * C];
-    for (int b = BUCKETS - 1; b >= 0; --b)
-        for (int k = 0; k < g.neighbours + (G > 0); ++k) {
-            const int cell = looks[k].x / 16, lane = looks[k].x % 16;
-            float most = 0.0f;
-            for (int c = 0; c < C; ++c)
-                most = fmax(most, U(cell, c, lane));
-            if (most == 0.0f || clamp((int)ceil(most * BUCKETS) - 1, 0, BUCKETS - 1) != b)
-                continue;
-            to[m] = looks[k].y;
-            for (int c = 0; c < CONFIDENCES; ++c)
-                tu[m * CONFIDENCES + c] = U(cell, c, lane);
-            for (int c = 0; c < C; ++c)
-                txu[m * C + c] = XU(cell, c, lane);
-            ++m;
-        }
-    const int terms = m;
-    const float slack = SLACK(terms * C + WAVES);
-    for (; m % CHECK; ++m) {
-        to[m] = 0;
-        for (int c = 0; c < CONFIDENCES; ++c)
-            tu[m * CONFIDENCES + c] = 0.0f;
+    SHARED int bucket[N + 1], to[N + 1 + CHECK];
+    SHARED float tu[(N + 1 + CHECK) * CONFIDENCES], txu[(N + 1 + CHECK) * C];
+    const int around = g.neighbours + (G > 0);
+    EACH(k, around) {
+        float certain = 0.0f;
         for (int c = 0; c < C; ++c)
-            txu[m * C + c] = 0.0f;
+            certain = fmax(certain, U(looks[k].x / 16, c, looks[k].x % 16));
+        bucket[k] = certain == 0.0f ? -1 : clamp((int)ceil(certain * BUCKETS) - 1, 0, BUCKETS - 1);
     }
+    TOGETHER;
+    int terms = 0;
+    for (int k = 0; k < around; ++k)
+        terms += bucket[k] >= 0;
+    EACH(b, BUCKETS) {
+        int n = 0;
+        for (int k = 0; k < around; ++k)
+            n += bucket[k] > b;
+        for (int k = 0; k < around; ++k) {
+            if (bucket[k] != b)
+                continue;
+            const int cell = looks[k].x / 16, lane = looks[k].x % 16;
+            to[n] = looks[k].y;
+            for (int c = 0; c < CONFIDENCES; ++c)
+                tu[n * CONFIDENCES + c] = U(cell, c, lane);
+            for (int c = 0; c < C; ++c)
+                txu[n * C + c] = XU(cell, c, lane);
+            ++n;
+        }
+    }
+    const int m = (terms + CHECK - 1) / CHECK * CHECK;
+    EACH(n, m - terms) {
+        to[terms + n] = 0;
+        for (int c = 0; c < CONFIDENCES; ++c)
+            tu[(terms + n) * CONFIDENCES + c] = 0.0f;
+        for (int c = 0; c < C; ++c)
+            txu[(terms + n) * C + c] = 0.0f;
+    }
+#if ITEMS > 1
+    TOGETHER;
+    if (ITEM == 0)
+        kept = 0;
+    TOGETHER;
+#define SLOT(q) (b + (ITEM / LANES * STEP + (q)) * LANES + ITEM % LANES)
+#define SURVIVES(p) list[atomic_inc(&kept)] = p;
+#else
+#define SLOT(q) (b + (q))
+#define SURVIVES(p) CONSIDER(DISTANCE(p), p, 1.0f)
+#endif
+    const float slack = SLACK(terms * C + WAVES);
 
     // All candidates against the bound, V x STEP side by side. Three facts make that exact: partial sums never fall, no
     // cost is below 0, and a sum in another order differs by less than the slack. What survives is evaluated.
-    const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs;
-    const int blocks = (runs * wide + STEP - 1) / STEP;
+    const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs, slots = runs * wide;
+    const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
-    for (int b = 0; b < runs * wide; b += STEP) {
+    for (int b = 0; b < slots; b += ITEMS * STEP) {
         __global const float *y[STEP];
         vec d[STEP];
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
-            const int n = min(b + q, runs * wide - 1), run = n / wide;
+            const int n = min(SLOT(q), slots - 1), run = n / wide;
             y[q] = levels + at[min(run / g.runs * g.cols + run % g.runs, g.candidates - 1)] + n % wide * V;
             d[q] = 0.0f; // and what costs nothing to look up
             if (g.runs == 1) {
@@ -224,19 +320,20 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
         }
         const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;
         const int limit = as_int(allowed) + (b / wide / g.runs * g.cols < best_at); // of equals the first
+#define ALONE (V < LANES && ITEMS == 1) // four slots of an item share no draw
 #define LESS_NOISE(k_)                                                                                                 \
     if (g.spread > 0.0f && k_)                                                                                         \
     {                                                                                                                  \
         uvec word[4];                                                                                                  \
         _Pragma("unroll") for (int q = 0; q < STEP; ++q)                                                               \
         {                                                                                                              \
-            const int unit = (b + q) / (LANES / V);                                                                    \
-            if (V < LANES || q % 4 == 0)                                                                               \
-                words_of(g.seed, g.level, turn, place, DRAW_OF(unit, (b + q) % (LANES / V) * V), word);                \
-            d[q] += g.spread * (MOST_GUMBEL + minus_gumbel(word[V < LANES || STEP < 4 ? unit % 4 : q % 4]));           \
+            const int unit = SLOT(q) / (LANES / V);                                                                    \
+            if (ALONE || q % 4 == 0)                                                                                   \
+                words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V), word);                \
+            d[q] += g.spread * (MOST_GUMBEL + minus_gumbel(word[ALONE || STEP < 4 ? unit % 4 : q % 4]));               \
         }                                                                                                              \
     }
-        int k = 0, alive = 1;
+        int k = 0, alive = SLOT(0) < slots;
         LESS_NOISE(m <= NOISY)
         while (alive && k < m) {
             LESS_NOISE(k == NOISY)
@@ -264,20 +361,39 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
         for (int q = 0; alive && q < STEP; ++q) {
             if (!ANY(BITS(d[q]) < limit))
                 continue;
-            const int n = min(b + q, runs * wide - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
+            const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
             int bits[V];
             STORE(BITS(d[q]), bits);
             for (int v = 0; v < V; ++v) {
                 const int p = end - g.cols + run % g.runs + (n % wide * V + v) * g.runs;
                 if (bits[v] < limit && p < end)
-                    CONSIDER(p, 1.0f)
+                    SURVIVES(p)
             }
         }
+#if ITEMS > 1
+        TOGETHER;
+        many = kept;
+        TOGETHER;
+        if (many) {
+            EVALUATE(many, 0)
+            if (ITEM == 0)
+                kept = 0;
+            TOGETHER;
+        }
+#endif
     }
 #endif
 
     // 6.2.2.2
-#ifdef APART
+#if ITEMS > 1
+#ifdef EXACT
+    atomic_add(&kept, (int)looked);
+    TOGETHER;
+    looked = kept;
+#endif
+    if (ITEM > 0)
+        return;
+#elif defined(APART)
     if (first + (int)get_global_id(0) >= S)
         return;
 #endif
@@ -293,6 +409,6 @@ __kernel void relax(__global const int *restrict sites, const int first, const i
 #ifdef EXACT
     work[s] += looked * (2 * C) * g.candidates / blocks;
 #else
-    work[site] += m;
+    work[site] += kept;
 #endif
 }

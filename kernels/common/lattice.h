@@ -44,10 +44,10 @@ static inline ulong place_of(const Lattice g, const int i, const int j)
 
 // Number of the neighbour of site (i, j) at an offset, equation (3). -1 outside an open lattice or a window, and where a
 // small torus wraps the offset back onto the site itself.
-static inline int neighbour(const Lattice g, const int i, const int j, __global const int *offset)
+static inline int neighbour_at(const Lattice g, const int i, const int j, const int layers, const int down, const int right)
 {
     const int layer = AXES > 2 ? i / g.rows : 0, row = AXES > 2 ? i % g.rows : i;
-    int n = layer + LAYERS(offset), k = row + DOWN(offset), l = j + RIGHT(offset);
+    int n = layer + layers, k = row + down, l = j + right;
     n = g.around_layers ? wrap(n, g.layers) : n;
     k = g.around_rows ? wrap(k, g.rows) : k;
     l = g.around_cols ? wrap(l, g.cols) : l;
@@ -55,6 +55,11 @@ static inline int neighbour(const Lattice g, const int i, const int j, __global 
         return -1;
     const bool apart = g.tile_rows > 0 && (row / g.tile_rows != k / g.tile_rows || j / g.tile_cols != l / g.tile_cols);
     return (n * g.rows + k) * g.cols + l + (apart ? g.elsewhere : 0);
+}
+
+static inline int neighbour(const Lattice g, const int i, const int j, __global const int *offset)
+{
+    return neighbour_at(g, i, j, LAYERS(offset), DOWN(offset), RIGHT(offset));
 }
 
 #endif

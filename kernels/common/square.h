@@ -9,6 +9,7 @@
 #include "common/coherence.h"
 #include "common/confidence.h"
 #include "common/distance.h"
+#include "common/group.h"
 #include "common/level.h"
 #include "common/vector.h"
 
@@ -28,6 +29,7 @@
 #endif
 #define CELLS (ROWS * CHUNKS)
 
+#if ITEMS == 1
 // Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a site's number; -1 beyond an end that does not wrap.
 static inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
 {
@@ -67,6 +69,7 @@ static inline int in_square(const Lattice g, const int site, const int i, const 
 #endif
     return row[a] + col[b];
 }
+#endif
 
 #if V == 1
 static inline float folded(__private float *a)
@@ -76,10 +79,10 @@ static inline float folded(__private float *a)
             a[n] += a[n + half_];
     return a[0];
 }
-#define SQUARE float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16]
+#define SQUARE SHARED float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16]
 #define U(cell, c, lane) u[((cell) * CONFIDENCES + CONFIDENT(c)) * 16 + (lane)]
 #define XU(cell, c, lane) xu[((cell) * C + (c)) * 16 + (lane)]
-#define SQUARE_ARG(const) const __private float *u, const __private float *xu
+#define SQUARE_ARG(const) const SHARED float *u, const SHARED float *xu
 #else
 static inline float folded(const float16 a)
 {
@@ -109,23 +112,82 @@ static inline float16 middle(const int a, const int k)
 #endif
 #endif
 
-// The rows and columns of the square around site (i, j), and the lanes of u and x u; and neighbour k of `offsets` there.
-#define AROUND(g, i, j)                                                                                                \
-    int row[ROWS], col[SIDE];                                                                                          \
-    rows_around(g, i, row);                                                                                            \
-    lines_around(j, g.cols, g.around_cols, 1, col);                                                                    \
-    SQUARE
-#define NEIGHBOUR(g, k) in_square(g, site, i, j, row, col, ROW(offsets + AXES * (k)), RIGHT(offsets + AXES * (k)) + RADIUS)
-
 // The neighbourhood of a site: u = 1 - t_r and x_r u in the lane of each neighbour r, 0 in all others, and of guides in
-// that of the site too. Returns the sum of the temperatures of the neighbours on the lattice, and their number.
+// that of the site too; `heat`, the sum of the temperatures of the neighbours on the lattice, and their number. Neighbour
+// k of `offsets`.
 //
 // disc (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
+#if ITEMS == 1
+#define AROUND(g, site, i, j)                                                                                          \
+    int row[ROWS], col[SIDE];                                                                                          \
+    rows_around((g).lattice, i, row);                                                                                  \
+    lines_around(j, (g).lattice.cols, (g).lattice.around_cols, 1, col);                                                \
+    SQUARE;                                                                                                            \
+    const int2 heat = gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu)
+#define NEIGHBOUR(g, k) in_square(g, site, i, j, row, col, ROW(offsets + AXES * (k)), RIGHT(offsets + AXES * (k)) + RADIUS)
+#else
+#define AROUND(g, site, i, j)                                                                                          \
+    SQUARE;                                                                                                            \
+    __local int warmth[2];                                                                                             \
+    const int2 heat = gather(g, site, i, j, values, source, temperature, disc, u, xu, warmth)
+#define NEIGHBOUR(g, k) neighbour(g, i, j, offsets + AXES * (k))
+#endif
+
+// Site r, a neighbour or the site itself, in a lane of a cell. Returns its temperature and 1, of the site itself 0.
+static inline int2 put_in_lane(const Level g, const int r, const bool self, const int cell, const int lane,
+                               __global const ushort *values, __global const int *source,
+                               __global const ushort *temperature, SQUARE_ARG())
+{
+    const int t = self ? UNTOUCHED : temperature[r];
+    const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
+    for (int c = 0; c < C; ++c) {
+        const ushort x = values[c * g.area + r];
+        const float uc = CONFIDENCE_OF(c < MADE, x, certain, self ? g.centre : 1.0f);
+        U(cell, c, lane) = uc;
+        XU(cell, c, lane) = (float)x * uc;
+    }
+    return self ? (int2)0 : (int2)(t, 1);
+}
+
+static inline void empty_lane(const int cell, const int lane, SQUARE_ARG())
+{
+    for (int c = 0; c < CONFIDENCES; ++c)
+        U(cell, c, lane) = 0.0f;
+    for (int c = 0; c < C; ++c)
+        XU(cell, c, lane) = 0.0f;
+}
+
+#if ITEMS > 1
+static inline int2 gather(const Level g, const int site, const int i, const int j, __global const ushort *values,
+                          __global const int *source, __global const ushort *temperature,
+                          __global const float *restrict disc, SQUARE_ARG(), __local int *warmth)
+{
+    if (ITEM < 2)
+        warmth[ITEM] = 0;
+    TOGETHER;
+    EACH(n, CELLS * 16) {
+        const int cell = n / 16, a = cell / CHUNKS, b = cell % CHUNKS * 16 + n % 16 - RADIUS;
+        const bool self = G > 0 && a == MIDDLE && b == 0;
+        int r = self ? site : -1;
+        if (disc[n] > 0.0f)
+            r = neighbour_at(g.lattice, i, j, AXES > 2 ? a / SIDE - RADIUS : 0, a % SIDE - RADIUS, b);
+        if (r < 0) {
+            empty_lane(cell, n % 16, u, xu);
+            continue;
+        }
+        const int2 found = put_in_lane(g, r, self, cell, n % 16, values, source, temperature, u, xu);
+        atomic_add(warmth, found.x);
+        atomic_add(warmth + 1, found.y);
+    }
+    TOGETHER;
+    return (int2)(warmth[0], warmth[1]);
+}
+#else
 // Vectors also read what is no neighbour, which others may be writing, and multiply it by 0.
 static inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
-                   const __private int *col, __global const ushort *values, __global const int *source,
-                   __global const ushort *temperature, __global const int *restrict offsets,
-                   __global const float *restrict disc, SQUARE_ARG())
+                          const __private int *col, __global const ushort *values, __global const int *source,
+                          __global const ushort *temperature, __global const int *restrict offsets,
+                          __global const float *restrict disc, SQUARE_ARG())
 {
     const Lattice h = g.lattice;
 #if V > 1
@@ -154,31 +216,19 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
     }
 #endif
     for (int cell = 0; cell < CELLS; ++cell)
-        for (int n = 0; n < 16; ++n) {
-            for (int c = 0; c < CONFIDENCES; ++c)
-                U(cell, c, n) = 0.0f;
-            for (int c = 0; c < C; ++c)
-                XU(cell, c, n) = 0.0f;
-        }
+        for (int n = 0; n < 16; ++n)
+            empty_lane(cell, n, u, xu);
     int2 found = 0;
     for (int k = 0; k < g.neighbours + (G > 0); ++k) {
-        const int self = k == g.neighbours, a = self ? MIDDLE : ROW(offsets + AXES * k);
-        const int b = (self ? 0 : RIGHT(offsets + AXES * k)) + RADIUS;
-        const int r = self ? site : in_square(h, site, i, j, row, col, a, b), cell = a * CHUNKS + b / 16;
-        if (r < 0)
-            continue;
-        const int t = self ? UNTOUCHED : temperature[r];
-        found += self ? (int2)0 : (int2)(t, 1);
-        const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
-        for (int c = 0; c < C; ++c) {
-            const ushort x = values[c * g.area + r];
-            const float uc = CONFIDENCE_OF(c < MADE, x, certain, self ? g.centre : 1.0f);
-            U(cell, c, b % 16) = uc;
-            XU(cell, c, b % 16) = (float)x * uc;
-        }
+        const bool self = k == g.neighbours;
+        const int a = self ? MIDDLE : ROW(offsets + AXES * k), b = (self ? 0 : RIGHT(offsets + AXES * k)) + RADIUS;
+        const int r = self ? site : in_square(h, site, i, j, row, col, a, b);
+        if (r >= 0)
+            found += put_in_lane(g, r, self, a * CHUNKS + b / 16, b % 16, values, source, temperature, u, xu);
     }
     return found;
 }
+#endif
 
 // Where row a of the square around a candidate begins in `levels`, from the candidate.
 #if AXES > 2
@@ -189,23 +239,29 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
 #endif
 
 // Equation (12): d of the candidate whose grey levels are at y, in a sample with these strides.
+#if V == 1
+static inline float lane_of_distance(__global const float *restrict y, SQUARE_ARG(const), const int plane,
+                                     const int row_stride, const int layer_stride, const int lane)
+{
+    float d = 0.0f;
+    for (int cell = 0; cell < CELLS; ++cell)
+        for (int c = 0; c < C; ++c) {
+            const int at = c * plane + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16 + lane;
+            const float e = GAP(y[at], U(cell, c, lane), XU(cell, c, lane));
+            d = fma(e, e, d);
+        }
+    return d;
+}
+#endif
+
+#if ITEMS == 1
 static inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane,
-                               const int row_stride, const int layer_stride)
+                                      const int row_stride, const int layer_stride)
 {
 #if V == 1
     float d[16];
     for (int n = 0; n < 16; ++n)
-        d[n] = 0.0f;
-    for (int cell = 0; cell < CELLS; ++cell)
-        for (int c = 0; c < C; ++c)
-            for (int n = 0; n < 16; ++n) {
-                const float un = U(cell, c, n);
-                if (un == 0.0f) // would add 0
-                    continue;
-                const float yn = y[c * plane + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16 + n];
-                const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
-                d[n] = fma(e, e, d[n]);
-            }
+        d[n] = lane_of_distance(y, u, xu, plane, row_stride, layer_stride, n);
 #else
     float16 d = 0.0f;
 #pragma unroll
@@ -219,5 +275,6 @@ static inline float distance_in_lanes(__global const float *restrict y, SQUARE_A
 #endif
     return folded(d);
 }
+#endif
 
 #endif

@@ -40,6 +40,9 @@ ONE_PROGRAM = ("active", "start")
 """Kernel files without -D constants that every run of ``mrf`` needs, compiled as one program: each takes about 50 ms to
 load on PoCL."""
 
+ITEMS = 128
+"""Work-items that relax one site together on a GPU."""
+
 LONGEST = 2**17
 """Work-items of one launch of `OpenCL.launch_groups`: a multiple of every work-group size, and no long launch."""
 
@@ -106,6 +109,8 @@ class OpenCL:
         Sites or candidates in a vector: 1, 4, 8 or 16.
     step : int, optional
         Vectors kept in registers at a time: 1, 2, 4 or 8.
+    items : int, optional
+        Work-items that relax one site together: 1, or a multiple of 16 with ``vector=1``.
     profile : bool
         Whether to measure the time of every kernel.
     """
@@ -118,6 +123,7 @@ class OpenCL:
         scratch: int | None = None,
         vector: int | None = None,
         step: int | None = None,
+        items: int | None = None,
         profile: bool = False,
     ) -> None:
         devices.check_fork()
@@ -129,11 +135,14 @@ class OpenCL:
         self.log = Log(profile)
         on_gpu = info.kind == "gpu"
         # PoCL compiles once for each work-group size, so there is only one.
-        self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None
+        self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None and (items or 1) == 1
         self.vector = vector or (1 if on_gpu else 16)
         self.step = step or 4
         if self.step not in (1, 2, 4, 8):
             raise ValueError(f"step is {self.step}; give 1, 2, 4 or 8")
+        self.items = items or (ITEMS if on_gpu and vector is None else 1)
+        if self.items > 1 and (self.items % 16 or self.vector > 1):
+            raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1")
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
@@ -294,9 +303,13 @@ class OpenCL:
     ) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
 
-        ``function`` and ``defines`` are as in `kernel`; ``args`` are arrays of the device, scalars and structs of
+        ``function`` and ``defines`` are as in `kernel`; with ITEMS, so many work-items form a group that does what one
+        work-item of the range does; ``args`` are arrays of the device, scalars and structs of
         NumPy, and integers of Python, which become 32 bits.
         """
+        items = int(defines.get("ITEMS", 1))
+        if items > 1:
+            size, local = (size[0] * items,), (items,)
         self.enqueue(self.kernel(function, defines), size, *args, local=local)
 
     def enqueue(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
@@ -316,12 +329,13 @@ class OpenCL:
         """
         kernel = self.kernel(function, defines)
         kernel.set_args(*map(_argument, args))
-        group = self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
+        items = int(defines.get("ITEMS", 1))
+        group = items if items > 1 else self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
         for begin, end in groups.tolist():
             kernel.set_arg(2, np.int32(end))
             for first in range(begin, end, LONGEST):
                 kernel.set_arg(1, np.int32(first))
-                size = -(-min(end - first, LONGEST) // group) * group
+                size = -(-min(end - first, LONGEST) * items // group) * group
                 self.log.add(cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,)), kernel)
 
 

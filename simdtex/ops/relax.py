@@ -290,4 +290,6 @@ def _kernel(
         work = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)
     else:
         defines["SLOTS"] = -(-proposal.slots // 64) * 64
+    if machine.items > 1:
+        defines["ITEMS"] = machine.items
     return defines, [*arguments, machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
