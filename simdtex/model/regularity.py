@@ -314,12 +314,13 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
 class Correlation(NamedTuple):
     """The autocorrelation of a picture.
 
-    ``values`` (2 m + 1, 2 n + 1), with the lag (0, 0) in the middle; ``around``, the greatest of 3x3 lags; ``pixels``,
-    the number of known pixels.
+    ``values`` (2 m + 1, 2 n + 1), with the lag (0, 0) in the middle; ``around``, the greatest of 3x3 lags; ``length``,
+    the squared length of each lag; ``pixels``, the number of known pixels.
     """
 
     values: NDArray[np.float64]
     around: NDArray[np.float64]
+    length: NDArray[np.int64]
     pixels: int
 
     @property
@@ -348,7 +349,8 @@ def autocorrelation(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Cor
     products, overlap = sums(centred), sums(known)
     variance = products[reach] / overlap[reach]
     values = np.where(overlap > 0.2 * pixels, products / np.maximum(overlap, 1) / (variance or 1), 0.0)
-    return Correlation(values, _greatest(values, 1), pixels)
+    y, x = (np.arange(-n, n + 1) for n in reach)
+    return Correlation(values, _greatest(values, 1), y[:, None] ** 2 + x**2, pixels)
 
 
 def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
@@ -438,8 +440,7 @@ def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, 
     at = np.rint(lags).astype(int) + reach
     strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
     half = (basis**2).sum(1).min() / 4
-    near = (np.indices(correlation.values.shape) - reach[:, None, None]).astype(np.float64)
-    core = correlation.values[(near**2).sum(0) <= half]
+    core = correlation.values[correlation.length <= half]
     error = sqrt(float((core**2).sum()) / correlation.pixels)
     return strength, _lattice(np.rint(basis * FINE) / FINE), error
 
@@ -449,8 +450,9 @@ def _nodes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the nodes (n, 2) of a lattice within ``away`` steps, without the origin, and their lags (n, 2)."""
     limit = np.minimum(away, np.ceil(np.abs(_inverse(basis)).T @ reach)).astype(int)  # of the window's corners
-    i, j = np.mgrid[-limit[0] : limit[0] + 1, -limit[1] : limit[1] + 1].reshape(2, -1)
-    nodes = np.stack([i, j], 1)[(i != 0) | (j != 0)].astype(np.float64)
+    i, j = (np.arange(-n, n + 1, dtype=np.float64) for n in limit)
+    nodes = np.stack([np.repeat(i, j.size), np.tile(j, i.size)], 1)
+    nodes = np.concatenate([nodes[: len(nodes) // 2], nodes[len(nodes) // 2 + 1 :]])
     lags = nodes @ basis
     inside = (np.abs(lags) <= reach - 2).all(1)
     return nodes[inside], lags[inside]
@@ -458,18 +460,21 @@ def _nodes(
 
 def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the peak nearest to each lag (n, 2), within two pixels, with subpixel accuracy, (n, 2)."""
-    m, n = values.shape[0] // 2, values.shape[1] // 2
-    at = np.rint(lags).astype(int) + np.array([m, n])
+    rows, cols = values.shape
+    flat, (y, x) = values.ravel(), np.rint(lags).astype(np.int64).T
+    y, x = y + rows // 2, x + cols // 2
+    square = np.add.outer(np.arange(-1, 2) * cols, np.arange(-1, 2)).reshape(-1, 1)
     for _ in range(2):
-        around = np.stack([values[at[:, 0] + i, at[:, 1] + j] for i, j in product((-1, 0, 1), repeat=2)])
-        best = around.argmax(0)
-        at = np.clip(at + np.stack([best // 3 - 1, best % 3 - 1], 1), 1, (2 * m - 1, 2 * n - 1))
-    y, x = at.T
-    middle, found = values[y, x], at.astype(np.float64)
-    for axis, (low, high) in enumerate(((values[y - 1, x], values[y + 1, x]), (values[y, x - 1], values[y, x + 1]))):
+        best = flat.take(y * cols + x + square).argmax(0)
+        y, x = np.maximum(1, y + best // 3 - 1), np.maximum(1, x + best % 3 - 1)
+        y, x = np.minimum(y, rows - 2), np.minimum(x, cols - 2)  # np.clip takes several times as long
+    at = y * cols + x
+    middle, found = flat.take(at), np.stack([y, x], 1).astype(np.float64)
+    for axis, step in enumerate((cols, 1)):
+        low, high = flat.take(at - step), flat.take(at + step)
         bend = low - 2 * middle + high
         found[:, axis] += np.where(bend < 0, np.clip((low - high) / np.where(bend < 0, 2 * bend, 1), -0.5, 0.5), 0)
-    shifted: NDArray[np.float64] = found - np.array([m, n])
+    shifted: NDArray[np.float64] = found - np.array([rows // 2, cols // 2])
     return shifted
 
 
