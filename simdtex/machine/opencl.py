@@ -136,11 +136,11 @@ class OpenCL:
         on_gpu = info.kind == "gpu"
         # PoCL compiles once for each work-group size, so there is only one.
         self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None and (items or 1) == 1
-        self.vector = vector or (1 if on_gpu else 16)
+        self.items = items or (ITEMS if on_gpu and vector is None else 1)
+        self.vector = vector or (1 if on_gpu or self.items > 1 else 16)
         self.step = step or 4
         if self.step not in (1, 2, 4, 8):
             raise ValueError(f"step is {self.step}; give 1, 2, 4 or 8")
-        self.items = items or (ITEMS if on_gpu and vector is None else 1)
         if self.items > 1 and (self.items % 16 or self.vector > 1):
             raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1")
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
