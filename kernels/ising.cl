@@ -11,8 +11,8 @@
 #include "common/philox.h"
 
 // What a site becomes.
-static inline uchar heat_bath(__global const uchar *spins, const int site, __global const int *restrict offsets, const int N,
-                       const Lattice g, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
+static inline uchar heat_bath(__global const uchar *spins, const int site, __global const int *offsets, const int N,
+                       const Lattice g, __global const uint *chances, const ulong seed, const uint turn, const uint chain)
 {
     const int i = site / g.cols, j = site % g.cols;
     int members = 0, up = 0;

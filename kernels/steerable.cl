@@ -26,7 +26,7 @@ typedef JOIN(int, V) ivec;
 #endif
 
 // V adjacent integers of a row, or as many as it has left.
-static inline void store_row(const vec sum, const int left, __global int *restrict to)
+static inline void store_row(const vec sum, const int left, __global int *to)
 {
     const ivec whole = TO_INT(sum);
     if (left >= V) {

@@ -9,14 +9,14 @@
 
 // Number of the candidate that continues pixel `source` of the sample, `reach` pixels before it; -1 where there is none.
 // A site whose value is given may be from nowhere in the sample: its source is -1.
-static inline int continuing(__global const int *restrict index_of, const int source, const int reach, const int pixels)
+static inline int continuing(__global const int *index_of, const int source, const int reach, const int pixels)
 {
     const int p = source - reach;
     return source < 0 || p < 0 || p >= pixels ? -1 : index_of[p];
 }
 
 // Number of the candidate that pixel `source` is; -1 where it is none, or from nowhere.
-static inline int number_of(__global const int *restrict index_of, const int source)
+static inline int number_of(__global const int *index_of, const int source)
 {
     return source < 0 ? -1 : index_of[source];
 }

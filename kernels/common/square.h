@@ -160,7 +160,7 @@ static inline void empty_lane(const int cell, const int lane, SQUARE_ARG())
 #if ITEMS > 1
 static inline int2 gather(const Level g, const int site, const int i, const int j, __global const ushort *values,
                           __global const int *source, __global const ushort *temperature,
-                          __global const float *restrict disc, SQUARE_ARG(), __local int *warmth)
+                          __global const float *disc, SQUARE_ARG(), __local int *warmth)
 {
     if (ITEM < 2)
         warmth[ITEM] = 0;
@@ -186,8 +186,8 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
 // Vectors also read what is no neighbour, which others may be writing, and multiply it by 0.
 static inline int2 gather(const Level g, const int site, const int i, const int j, const __private int *row,
                           const __private int *col, __global const ushort *values, __global const int *source,
-                          __global const ushort *temperature, __global const int *restrict offsets,
-                          __global const float *restrict disc, SQUARE_ARG())
+                          __global const ushort *temperature, __global const int *offsets,
+                          __global const float *disc, SQUARE_ARG())
 {
     const Lattice h = g.lattice;
 #if V > 1
@@ -240,7 +240,7 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
 
 // Equation (12): d of the candidate whose grey levels are at y, in a sample with these strides.
 #if V == 1
-static inline float lane_of_distance(__global const float *restrict y, SQUARE_ARG(const), const int plane,
+static inline float lane_of_distance(__global const float *y, SQUARE_ARG(const), const int plane,
                                      const int row_stride, const int layer_stride, const int lane)
 {
     float d = 0.0f;
@@ -255,7 +255,7 @@ static inline float lane_of_distance(__global const float *restrict y, SQUARE_AR
 #endif
 
 #if ITEMS == 1
-static inline float distance_in_lanes(__global const float *restrict y, SQUARE_ARG(const), const int plane,
+static inline float distance_in_lanes(__global const float *y, SQUARE_ARG(const), const int plane,
                                       const int row_stride, const int layer_stride)
 {
 #if V == 1
