@@ -143,6 +143,7 @@ class OpenCL:
             raise ValueError(f"step is {self.step}; give 1, 2, 4 or 8")
         if self.items > 1 and (self.items % 16 or self.vector > 1):
             raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1")
+        self.local_memory = int(info.handle.local_mem_size)  # type: ignore[union-attr]
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))

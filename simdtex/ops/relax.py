@@ -290,6 +290,17 @@ def _kernel(
         work = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)
     else:
         defines["SLOTS"] = -(-proposal.slots // 64) * 64
-    if machine.items > 1:
+    if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
     return defines, [*arguments, machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
+
+
+def _shared(defines: dict[str, int], items: int) -> int:
+    """Return the most bytes of local memory that a group of work-items takes in kernels/relax.cl."""
+    channels, most, side = int(defines["C"]), int(defines["N"]), 2 * int(defines["RADIUS"]) + 1
+    each = channels + (channels if "OWN" in defines else 1)  # confidences and values
+    rows, columns = side ** (2 if defines.get("AXES") == 3 else 1), -(-side // LANES) * LANES
+    lists = 2 * int(defines.get("SLOTS", 0))
+    if "EXACT" in defines:
+        lists = (most + 8) * (5 + each) + max(most + 1, items * int(defines["STEP"]))
+    return 4 * (rows * columns * each + 2 * items + lists)
