@@ -230,12 +230,21 @@ def test_a_device_that_cannot_build_has_a_reason(any_device, monkeypatch):
         devices.failure.cache_clear()
 
 
-def test_a_wrong_answer_is_not_usable(any_device, monkeypatch):
-    unfused = devices._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -")
-    monkeypatch.setattr(devices, "_SOURCE", unfused)
+@pytest.mark.parametrize(
+    ("right", "wrong", "reason"),
+    [
+        ("fma(x, x, -(1.0f + 0x1p-11f))", "0.0f", "fma rounds twice"),
+        ("x * x - (1.0f + 0x1p-11f)", "fma(x, x, -(1.0f + 0x1p-11f))", "a product and a sum are contracted to an fma"),
+        ("y * y", "0.0f", "denormal numbers become 0"),
+        ("mul_hi(b[i], b[i])", "(ulong)mul_hi((uint)b[i], (uint)b[i])", "mul_hi of 64-bit integers is wrong"),
+    ],
+)
+def test_a_device_with_wrong_bits_is_not_usable(any_device, monkeypatch, right, wrong, reason):
+    assert right in devices._SOURCE
+    monkeypatch.setattr(devices, "_SOURCE", devices._SOURCE.replace(right, wrong))
     devices.failure.cache_clear()
     try:
-        assert "wrong answer" in device.probe(any_device).reason
+        assert device.probe(any_device).reason == f"a tiny program gave wrong bits: {reason}"
     finally:
         devices.failure.cache_clear()
 

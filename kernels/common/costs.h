@@ -43,7 +43,7 @@
         __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
         __global const ushort *restrict kinds_of, __global const float *restrict kind_cost
 #define EVALUATED(p, factor, site)                                                                                     \
-    (distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride) * (factor) + penalty[p] +         \
+    (PRODUCT(distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride), factor) + penalty[p] +   \
      PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
 #define PHASE(p, site) apart_in_phase(waves + (p), listed, phases + (site), area_, phase_weight, tolerance)
 #if KINDS

@@ -40,14 +40,26 @@ _MARK = "simdtex-probe:"
 _SECONDS = 60.0  # a first build takes a second or two, on a busy computer several times that
 _SAID = "The user was warned.\n"  # the end of each report
 
-# a*a - (1 + 2^-11) is 2^-24 for a = 1 + 2^-12 if fma rounds once, and 0 if it rounds twice.
+# The numbers come from the host, so that the device computes, and not its compiler.
 _SOURCE = """
-__kernel void probe(__global const float *a, __global float *b)
+#pragma OPENCL FP_CONTRACT OFF
+__kernel void probe(__global const float2 *a, __global const ulong *b, __global ulong4 *bits)
 {
     const size_t i = get_global_id(0);
-    b[i] = fma(a[i], a[i], -(1.0f + 0x1p-11f));
+    const float x = a[i].x, y = a[i].y;
+    bits[i] = (ulong4)(as_uint(fma(x, x, -(1.0f + 0x1p-11f))), as_uint(x * x - (1.0f + 0x1p-11f)), as_uint(y * y),
+                       mul_hi(b[i], b[i]));
 }
 """
+_NUMBERS = (1 + 2.0**-12, 2.0**-70)  # the square of the first is rounded to 1 + 2^-11, that of the second is denormal
+_WHOLE = 0xFEDCBA9876543211
+_BITS = {
+    "fma rounds twice": 0x33800000,  # 2^-24; 0 if it rounds twice
+    "a product and a sum are contracted to an fma": 0,  # 2^-24 if they are
+    "denormal numbers become 0": 1 << 9,  # 2^-140
+    "mul_hi of 64-bit integers is wrong": _WHOLE**2 >> 64,
+}
+"""What is wrong with a device on which a number of the tiny program has other bits than these."""
 
 FORKED = (
     "OpenCL was in use before this process was forked, and its threads are not in the child; start processes with "
@@ -255,12 +267,12 @@ def failure(handle: cl.Device) -> str:
         context = pyopencl.Context([handle])
         kernels = build(context, _SOURCE, [])
         queue = pyopencl.CommandQueue(context)
-        host = np.full(64, 1 + 2.0**-12, np.float32)
+        given = np.full((64, 2), _NUMBERS, np.float32), np.full(64, _WHOLE, np.uint64)
+        result = np.zeros((64, len(_BITS)), np.uint64)
         flags = pyopencl.mem_flags
-        source = pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=host)
-        target = pyopencl.Buffer(context, flags.WRITE_ONLY, host.nbytes)
-        kernels["probe"](queue, host.shape, None, source, target)
-        result = np.zeros_like(host)
+        sources = (pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=one) for one in given)
+        target = pyopencl.Buffer(context, flags.WRITE_ONLY, result.nbytes)
+        kernels["probe"](queue, (64,), None, *sources, target)
         pyopencl.enqueue_copy(queue, result, target)
     except Exception as error:  # the device is not usable, whatever the reason
         if " " in str(intel_library() or "") and "Intel" in handle.platform.name:
@@ -268,7 +280,8 @@ def failure(handle: cl.Device) -> str:
                 "Intel's runtime does not work in a folder with a space in its path; move the environment, or use PoCL"
             )
         return one_line(error)
-    return "" if np.all(result == 2.0**-24) else "a tiny program ran, but gave a wrong answer"
+    wrong = [what for what, column in zip(_BITS, result.T, strict=True) if np.any(column != _BITS[what])]
+    return f"a tiny program gave wrong bits: {'; '.join(wrong)}" if wrong else ""
 
 
 def failures(indices: Sequence[int]) -> list[str]:
