@@ -126,6 +126,24 @@ def test_simulators_and_single_threads_come_last():
     assert names == ["Turbo", "pthread-epyc", "basic-epyc", "board", "Oclgrind Simulator", "llvmpipe (LLVM 15)", ""]
 
 
+def handle(name, bits, units, unified):
+    """A device of a runtime; 2 is a CPU, 4 a GPU."""
+    texts = {"name": name, "version": "OpenCL 3.0", "driver_version": "1"}
+    sizes = {"type": bits, "max_compute_units": units, "global_mem_size": 2**30, "max_mem_alloc_size": 2**28}
+    return SimpleNamespace(**texts, **sizes, host_unified_memory=unified)
+
+
+def test_a_gpu_with_its_own_memory_and_more_units_comes_first(platforms):
+    one = [handle("cores", 2, 256, True), handle("on the board", 4, 96, True), handle("half", 4, 40, False)]
+    two = [handle("whole", 4, 80, False), handle("other cores", 2, 300, True)]
+    platforms(*(SimpleNamespace(name=name, get_devices=lambda of=of: of) for name, of in (("A", one), ("B", two))))
+    listing = device.devices(probe=False)
+    names = ["whole", "half", "on the board", "cores", "other cores", "reference"]
+    assert [info.name for info in listing] == names
+    assert [info.integrated for info in listing] == [False, False, True, False, False, False]
+    assert listing[0].largest == 2**28
+
+
 # find
 
 

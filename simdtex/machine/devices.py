@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """List, check and choose OpenCL devices.
 
-The listing is sorted by preference: GPUs, CPUs, other accelerators, simulators, and last the NumPy reference. The
-default is its first usable device. A device is usable only if a tiny program has built and run on it and has given the
+The listing is sorted by preference: GPUs (those with their own memory first, then those with more compute units), CPUs,
+other accelerators, simulators, and last the NumPy reference. The default is its first usable device. A device is usable only if a tiny program has built and run on it and has given the
 right bits: runtimes that list a device, but cannot build for it, are common.
 """
 
@@ -354,6 +354,10 @@ class DeviceInfo:
         Number of compute units, 0 if unknown.
     memory : int
         Global memory in bytes, 0 if unknown.
+    largest : int
+        Most bytes of one array, 0 if unknown.
+    integrated : bool
+        Whether it is a GPU that shares the memory of the host.
     usable : bool
         Whether a tiny program built and ran here with the right answer.
     reason : str
@@ -370,6 +374,8 @@ class DeviceInfo:
     driver: str = ""
     compute_units: int = 0
     memory: int = 0
+    largest: int = 0
+    integrated: bool = False
     usable: bool = False
     reason: str = _NOT_PROBED
     handle: cl.Device | None = field(default=None, repr=False)
@@ -540,15 +546,18 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
 def _describe(title: str, handle: cl.Device) -> DeviceInfo:
     """Return the line of a device with its properties."""
     bits = int(handle.type)  # a mask: 2 CPU, 4 GPU, 8 accelerator
+    kind = "gpu" if bits & 4 else "cpu" if bits & 2 else "accelerator" if bits & 8 else "other"
     return DeviceInfo(
         index=0,
         platform=title,
         name=clean(handle.name) or "unnamed device",
-        kind="gpu" if bits & 4 else "cpu" if bits & 2 else "accelerator" if bits & 8 else "other",
+        kind=kind,
         version=clean(handle.version),
         driver=clean(handle.driver_version),
         compute_units=int(handle.max_compute_units),
         memory=int(handle.global_mem_size),
+        largest=int(handle.max_mem_alloc_size),
+        integrated=kind == "gpu" and bool(handle.host_unified_memory),
         handle=handle,
     )
 
@@ -560,10 +569,12 @@ def _reference(index: int) -> DeviceInfo:
     )
 
 
-def _preference(info: DeviceInfo) -> tuple[bool, bool, int, bool, str]:
+def _preference(info: DeviceInfo) -> tuple[bool, bool, int, bool, bool, int, str]:
     """Return the sort key of a line; devices that tie keep the order in which their platform gives them."""
     one_thread = info.name.lower().startswith(_ONE_THREAD)
-    return not info.name, info.simulated, _KIND_ORDER[info.kind], one_thread, info.platform
+    units = info.compute_units if info.kind == "gpu" else 0  # runtimes of one CPU may count its cores differently
+    kind = _KIND_ORDER[info.kind]
+    return not info.name, info.simulated, kind, one_thread, info.integrated, -units, info.platform
 
 
 def main() -> int:

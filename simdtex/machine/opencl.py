@@ -25,10 +25,11 @@ SMALL_COPY = 2**16
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
-    cl.status_code.OUT_OF_RESOURCES,
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+REMEDY = "give a smaller size or sample, or another --device"
 
 NONE: Mapping[str, int | str] = {}
 """No -D constants."""
@@ -158,6 +159,7 @@ class OpenCL:
         large = array.nbytes > SMALL_COPY  # without the pool, which would round the size up and keep the memory
         with self._plain_errors():
             if large:
+                self._check_size(array.nbytes)
                 data = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
                 result = DeviceArray(data, array.shape, array.dtype)
             else:
@@ -188,8 +190,10 @@ class OpenCL:
         """Return an uninitialised array, from a pool."""
         wanted = tuple(shape) if isinstance(shape, tuple | list) else (int(shape),)
         kind = np.dtype(dtype)
+        size = prod(wanted) * kind.itemsize
+        self._check_size(size)
         with self._lock:
-            return DeviceArray(self._pool.allocate(max(1, prod(wanted) * kind.itemsize)), wanted, kind)
+            return DeviceArray(self._pool.allocate(max(1, size)), wanted, kind)
 
     def constant(self, array: Any) -> DeviceArray:
         """Return a small table as a device array, uploaded once."""
@@ -251,16 +255,28 @@ class OpenCL:
 
     @contextmanager
     def _plain_errors(self) -> Iterator[None]:
-        """Raise DeviceError if the process was forked, or if the device runs out of memory."""
+        """Raise DeviceError if the process was forked, if the device runs out of memory, or if it gives up a launch."""
         devices.check_fork()
         try:
             yield
         except cl.Error as error:
+            if error.code == cl.status_code.OUT_OF_RESOURCES:
+                raise DeviceError(
+                    f"{self.name} gave up (CL_OUT_OF_RESOURCES), since a kernel took more registers or memory than there "
+                    "are, ran longer than a watchdog allows, or accessed memory of no array; give a smaller size or "
+                    "another --device, and report it"
+                ) from error
             if error.code not in OUT_OF_MEMORY:
                 raise
+            raise DeviceError(f"{self.name} ran out of memory; {REMEDY}") from error
+
+    def _check_size(self, size: int) -> None:
+        """Raise DeviceError if an array of ``size`` bytes is larger than the device allows a single one to be."""
+        if 0 < self.info.largest < size:
             raise DeviceError(
-                f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
-            ) from error
+                f"one array needs {size / 2**20:.0f} MiB and {self.name} allows {self.info.largest / 2**20:.0f} MiB in "
+                f"each; {REMEDY}"
+            )
 
     def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
         """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
@@ -302,8 +318,14 @@ class OpenCL:
     def enqueue(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
         """Enqueue a compiled kernel, as `launch` does."""
         local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
+        local = (min(local[0], self.most_together(kernel)), *local[1:])
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self.log.add(kernel(self.queue, size, local, *map(_argument, args)), kernel)
+
+    def most_together(self, kernel: Any) -> int:
+        """Return the most work-items in a work-group of a kernel: fewer than elsewhere if it takes many registers."""
+        limit = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.info.handle)  # kept by pyopencl
+        return int(limit)
 
     def launch_groups(
         self, function: str, groups: NDArray[np.int64], *args: Any, defines: Mapping[str, int | str]
