@@ -41,7 +41,7 @@ TARGETS = {
 SMALL, COLOUR = ((20, 19), (16, 15)), {"channels": 3, "levels": 2}
 NAMED = (
     *("defaults", "paper", "mode-colour", "known", "known-lattice", "partly", "categories", "several", "soft-all"),
-    *("volume", "volume-data", "tiles-synchronous", "array", "fill-colour", "extend", "multires", "pyramid"),
+    *("volume", "volume-data", "known-blocks", "array", "fill-colour", "extend", "multires", "pyramid"),
     *("pyramid-laplacian", "solid", "solid-average", "mix", "maspar", "maspar-mode", "classify", "estimate"),
 )
 JOBS = {
@@ -140,11 +140,11 @@ def unsafe(code: str) -> Iterator[tuple[str, int, str]]:
         products = set()
         for result, operation, rest in re.findall(r"^ *(%\S+) = (?:tail )?(\w+) (.*)$", body, re.MULTILINE):
             product = not products.isdisjoint(re.findall(r"%[\w.]+", rest))
-            if operation == "fmul" and not exact(rest) or operation == "fneg" and product:
+            if (operation == "fmul" and not exact(rest)) or (operation == "fneg" and product):
                 products.add(result)
             called = re.search(r"@(?:llvm\.|_Z\d+)(\w+)", rest) if operation == "call" else None
             inexact = called and INEXACT.match(called[1])
-            if operation in ("fdiv", "frem") or operation in ("fadd", "fsub") and product or inexact:
+            if operation in ("fdiv", "frem") or (operation in ("fadd", "fsub") and product) or inexact:
                 yield *place(re.search(r"!dbg (!\d+)", rest)[1]), f"{operation} {rest.partition(', !')[0]}"
 
 

@@ -379,9 +379,10 @@ def test_a_launch_that_a_device_gives_up_is_not_called_a_lack_of_memory(any_devi
     import pyopencl
 
     machine = OpenCL(any_device)
-    with pytest.raises(DeviceError, match=r"^\S.* gave up \(CL_OUT_OF_RESOURCES\), .* watchdog .*, and report it$"):
-        with machine.running():
-            raise pyopencl.RuntimeError(SimpleNamespace(code=lambda: pyopencl.status_code.OUT_OF_RESOURCES))
+    error = pyopencl.RuntimeError(SimpleNamespace(code=lambda: pyopencl.status_code.OUT_OF_RESOURCES))
+    words = r"^\S.* gave up \(CL_OUT_OF_RESOURCES\), .* watchdog .*, and report it$"
+    with pytest.raises(DeviceError, match=words), machine.running():
+        raise error
 
 
 def test_an_array_that_is_larger_than_a_device_allows_is_refused(any_device):
@@ -389,7 +390,9 @@ def test_an_array_that_is_larger_than_a_device_allows_is_refused(any_device):
     machine.empty((2**20,), np.uint8)
     machine.put(np.zeros(2**20, np.uint8))
     for make in (lambda n: machine.empty((n,), np.uint8), lambda n: machine.put(np.zeros(n, np.uint8))):
-        with pytest.raises(DeviceError, match=r"^one array needs 2 MiB and .* allows 1 MiB in each; give a smaller size"):
+        with pytest.raises(
+            DeviceError, match=r"^one array needs 2 MiB and .* allows 1 MiB in each; give a smaller size"
+        ):
             make(2**21)
 
 

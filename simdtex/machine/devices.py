@@ -2,8 +2,9 @@
 """List, check and choose OpenCL devices.
 
 The listing is sorted by preference: GPUs (those with their own memory first, then those with more compute units), CPUs,
-other accelerators, simulators, and last the NumPy reference. The default is its first usable device. A device is usable only if a tiny program has built and run on it and has given the
-right bits: runtimes that list a device, but cannot build for it, are common.
+other accelerators, simulators, and last the NumPy reference. The default is its first usable device. A device is usable
+only if a tiny program has built and run on it and has given the right bits: runtimes that list a device, but cannot
+build for it, are common.
 """
 
 from __future__ import annotations

@@ -262,9 +262,9 @@ class OpenCL:
         except cl.Error as error:
             if error.code == cl.status_code.OUT_OF_RESOURCES:
                 raise DeviceError(
-                    f"{self.name} gave up (CL_OUT_OF_RESOURCES), since a kernel took more registers or memory than there "
-                    "are, ran longer than a watchdog allows, or accessed memory of no array; give a smaller size or "
-                    "another --device, and report it"
+                    f"{self.name} gave up (CL_OUT_OF_RESOURCES), since a kernel took more registers or memory than "
+                    "there are, ran longer than a watchdog allows, or accessed memory of no array; give a smaller size "
+                    "or another --device, and report it"
                 ) from error
             if error.code not in OUT_OF_MEMORY:
                 raise
@@ -324,8 +324,8 @@ class OpenCL:
 
     def most_together(self, kernel: Any) -> int:
         """Return the most work-items in a work-group of a kernel: fewer than elsewhere if it takes many registers."""
-        limit = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.info.handle)  # kept by pyopencl
-        return int(limit)
+        # pyopencl keeps the answer
+        return int(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.info.handle))
 
     def launch_groups(
         self, function: str, groups: NDArray[np.int64], *args: Any, defines: Mapping[str, int | str]
