@@ -6,13 +6,14 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test quick slow browser lint docs prose links mutants fuzz cpu clean
+.PHONY: help demo test quick slow portable browser lint docs prose links mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
 	@echo "make test    the tests"
 	@echo "make quick   the tests of the NumPy reference that mutation testing runs; no device is needed"
 	@echo "make slow    the tests that take long or need the package index"
+	@echo "make portable the kernels compiled for GPUs by clang 15: registers and scratch, into docs/devices"
 	@echo "make browser what tests in a browser need of npm; Chromium and its driver are the system's"
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documentation, into docs/_build/html; checks its prose, links and pages"
@@ -71,6 +72,11 @@ slow:
 	$(call install,slow,[slow])
 	$(device)
 	@$(PY) -m pytest -m slow
+
+portable:
+	$(call install,test,[test])
+	$(device)
+	@$(PY) tests/portable.py
 
 browser:
 	npm ci --prefix tests/browser --no-audit --no-fund --silent

@@ -29,16 +29,16 @@ __kernel void features_raw(__global const ushort *restrict levels, const int ban
 }
 
 // z g(|z|) / |z| with z the values minus their mean, each band minus its own, and g(n) = 40 log(1 + n / 5): what is left
-// when brightness is taken away, and contrast compressed.
+// when brightness is taken away, and contrast compressed. `unit` is 1 / (16 N) from the host, since devices may divide
+// with an error of 2.5 ulp; z is a whole number of these.
 __kernel void features_contrast(__global const ushort *restrict levels, const int bands, const int rows, const int cols,
                                 __global const int *restrict sites, const int S, __global const int2 *restrict offsets,
-                                const int N, __global float *restrict features)
+                                const int N, const float unit, __global float *restrict features)
 {
     const int s = get_global_id(0);
     if (s >= S)
         return;
     const int i = sites[s] / cols, j = sites[s] % cols;
-    const float unit = 1.0f / (float)(16 * N); // z is a whole number of these
     long squares = 0;
     for (int b = 0; b < bands; ++b) {
         int sum = 0;

@@ -126,6 +126,24 @@ def test_simulators_and_single_threads_come_last():
     assert names == ["Turbo", "pthread-epyc", "basic-epyc", "board", "Oclgrind Simulator", "llvmpipe (LLVM 15)", ""]
 
 
+def handle(name, bits, units, unified):
+    """A device of a runtime; 2 is a CPU, 4 a GPU."""
+    texts = {"name": name, "version": "OpenCL 3.0", "driver_version": "1"}
+    sizes = {"type": bits, "max_compute_units": units, "global_mem_size": 2**30, "max_mem_alloc_size": 2**28}
+    return SimpleNamespace(**texts, **sizes, host_unified_memory=unified)
+
+
+def test_a_gpu_with_its_own_memory_and_more_units_comes_first(platforms):
+    one = [handle("cores", 2, 256, True), handle("on the board", 4, 96, True), handle("half", 4, 40, False)]
+    two = [handle("whole", 4, 80, False), handle("other cores", 2, 300, True)]
+    platforms(*(SimpleNamespace(name=name, get_devices=lambda of=of: of) for name, of in (("A", one), ("B", two))))
+    listing = device.devices(probe=False)
+    names = ["whole", "half", "on the board", "cores", "other cores", "reference"]
+    assert [info.name for info in listing] == names
+    assert [info.integrated for info in listing] == [False, False, True, False, False, False]
+    assert listing[0].largest == 2**28
+
+
 # find
 
 
@@ -230,12 +248,21 @@ def test_a_device_that_cannot_build_has_a_reason(any_device, monkeypatch):
         devices.failure.cache_clear()
 
 
-def test_a_wrong_answer_is_not_usable(any_device, monkeypatch):
-    unfused = devices._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -")
-    monkeypatch.setattr(devices, "_SOURCE", unfused)
+@pytest.mark.parametrize(
+    ("right", "wrong", "reason"),
+    [
+        ("fma(x, x, -(1.0f + 0x1p-11f))", "0.0f", "fma rounds twice"),
+        ("x * x - (1.0f + 0x1p-11f)", "fma(x, x, -(1.0f + 0x1p-11f))", "a product and a sum are contracted to an fma"),
+        ("y * y", "0.0f", "denormal numbers become 0"),
+        ("mul_hi(b[i], b[i])", "(ulong)mul_hi((uint)b[i], (uint)b[i])", "mul_hi of 64-bit integers is wrong"),
+    ],
+)
+def test_a_device_with_wrong_bits_is_not_usable(any_device, monkeypatch, right, wrong, reason):
+    assert right in devices._SOURCE
+    monkeypatch.setattr(devices, "_SOURCE", devices._SOURCE.replace(right, wrong))
     devices.failure.cache_clear()
     try:
-        assert "wrong answer" in device.probe(any_device).reason
+        assert device.probe(any_device).reason == f"a tiny program gave wrong bits: {reason}"
     finally:
         devices.failure.cache_clear()
 

@@ -369,10 +369,48 @@ def test_a_run_that_does_not_fit_the_device_is_refused(any_device):
 
 
 def test_running_out_of_device_memory_is_a_device_error(any_device):
-    machine = OpenCL(any_device)
+    machine = OpenCL(dataclasses.replace(any_device, largest=0))  # as if it had told no limit
     greedy = Operation(lambda machine: machine.empty((2**46,), np.uint8))
     with pytest.raises(DeviceError, match="ran out of memory; give a smaller size"):
         greedy(machine)
+
+
+def test_a_launch_that_a_device_gives_up_is_not_called_a_lack_of_memory(any_device):
+    import pyopencl
+
+    machine = OpenCL(any_device)
+    error = pyopencl.RuntimeError(SimpleNamespace(code=lambda: pyopencl.status_code.OUT_OF_RESOURCES))
+    words = r"^\S.* gave up \(CL_OUT_OF_RESOURCES\), .* watchdog .*, and report it$"
+    with pytest.raises(DeviceError, match=words), machine.running():
+        raise error
+
+
+def test_an_array_that_is_larger_than_a_device_allows_is_refused(any_device):
+    machine = OpenCL(dataclasses.replace(any_device, largest=2**20))
+    machine.empty((2**20,), np.uint8)
+    machine.put(np.zeros(2**20, np.uint8))
+    for make in (lambda n: machine.empty((n,), np.uint8), lambda n: machine.put(np.zeros(n, np.uint8))):
+        with pytest.raises(
+            DeviceError, match=r"^one array needs 2 MiB and .* allows 1 MiB in each; give a smaller size"
+        ):
+            make(2**21)
+
+
+def test_a_work_group_is_no_larger_than_a_kernel_allows(any_device):
+    """Some GPUs allow a kernel with many registers only 64 work-items, and fail if it is launched with more."""
+    machine, groups = OpenCL(any_device), []
+
+    class Kernel:
+        def get_work_group_info(self, what, device):
+            return 8
+
+        def __call__(self, queue, size, local, *args):
+            groups.append((size, local))
+
+    machine.log = SimpleNamespace(add=lambda event, kernel: None)
+    machine.enqueue(Kernel(), (17, 3), local=(64, 1))
+    machine.enqueue(Kernel(), (17, 3), local=(4, 1))
+    assert groups == [((24, 3), (8, 1)), ((20, 3), (4, 1))]
 
 
 OPEN = """

@@ -45,7 +45,7 @@
 #define EVALUATED(p, factor, site)                                                                                     \
     WITH_COSTS(distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride), p, factor, site)
 #define WITH_COSTS(distance, p, factor, site)                                                                          \
-    ((distance) * (factor) + penalty[p] + PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
+    (PRODUCT(distance, factor) + penalty[p] + PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
 #define PHASE(p, site) apart_in_phase(waves + (p), listed, phases + (site), area_, phase_weight, tolerance)
 #if KINDS
 #define OF_KIND(p, site) of_kind(kinds_of + (p), listed, kind_cost + (site), area_)

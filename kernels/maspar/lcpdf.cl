@@ -77,7 +77,7 @@ __kernel void maspar_lcpdf_choose(ARRAY, BROADCAST, const float spread, PLURAL(c
             for (int n = 0; n < TOGETHER && first + n < own_size; ++n) {
                 const int p = first + n, q = number[p];
                 float total = d[n];
-                if (spread > 0.0f && total - MOST_GUMBEL * spread <= best) {
+                if (spread > 0.0f && total - PRODUCT(MOST_GUMBEL, spread) <= best) {
                     float noise = minus_gumbel_of(seed, level, turn, (ulong)OF(place, k), q / LANES, q % LANES);
                     for (int c = 0; c < C; ++c)
                         noise -= share[c * share_size + p];

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """List, check and choose OpenCL devices.
 
-The listing is sorted by preference: GPUs, CPUs, other accelerators, simulators, and last the NumPy reference. The
-default is its first usable device. A device is usable only if a tiny program has built and run on it and has given the
-right bits: runtimes that list a device, but cannot build for it, are common.
+The listing is sorted by preference: GPUs (those with their own memory first, then those with more compute units), CPUs,
+other accelerators, simulators, and last the NumPy reference. The default is its first usable device. A device is usable
+only if a tiny program has built and run on it and has given the right bits: runtimes that list a device, but cannot
+build for it, are common.
 """
 
 from __future__ import annotations
@@ -40,14 +41,26 @@ _MARK = "simdtex-probe:"
 _SECONDS = 60.0  # a first build takes a second or two, on a busy computer several times that
 _SAID = "The user was warned.\n"  # the end of each report
 
-# a*a - (1 + 2^-11) is 2^-24 for a = 1 + 2^-12 if fma rounds once, and 0 if it rounds twice.
+# The numbers come from the host, so that the device computes, and not its compiler.
 _SOURCE = """
-__kernel void probe(__global const float *a, __global float *b)
+#pragma OPENCL FP_CONTRACT OFF
+__kernel void probe(__global const float2 *a, __global const ulong *b, __global ulong4 *bits)
 {
     const size_t i = get_global_id(0);
-    b[i] = fma(a[i], a[i], -(1.0f + 0x1p-11f));
+    const float x = a[i].x, y = a[i].y;
+    bits[i] = (ulong4)(as_uint(fma(x, x, -(1.0f + 0x1p-11f))), as_uint(x * x - (1.0f + 0x1p-11f)), as_uint(y * y),
+                       mul_hi(b[i], b[i]));
 }
 """
+_NUMBERS = (1 + 2.0**-12, 2.0**-70)  # the square of the first is rounded to 1 + 2^-11, that of the second is denormal
+_WHOLE = 0xFEDCBA9876543211
+_BITS = {
+    "fma rounds twice": 0x33800000,  # 2^-24; 0 if it rounds twice
+    "a product and a sum are contracted to an fma": 0,  # 2^-24 if they are
+    "denormal numbers become 0": 1 << 9,  # 2^-140
+    "mul_hi of 64-bit integers is wrong": _WHOLE**2 >> 64,
+}
+"""What is wrong with a device on which a number of the tiny program has other bits than these."""
 
 FORKED = (
     "OpenCL was in use before this process was forked, and its threads are not in the child; start processes with "
@@ -255,12 +268,12 @@ def failure(handle: cl.Device) -> str:
         context = pyopencl.Context([handle])
         kernels = build(context, _SOURCE, [])
         queue = pyopencl.CommandQueue(context)
-        host = np.full(64, 1 + 2.0**-12, np.float32)
+        given = np.full((64, 2), _NUMBERS, np.float32), np.full(64, _WHOLE, np.uint64)
+        result = np.zeros((64, len(_BITS)), np.uint64)
         flags = pyopencl.mem_flags
-        source = pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=host)
-        target = pyopencl.Buffer(context, flags.WRITE_ONLY, host.nbytes)
-        kernels["probe"](queue, host.shape, None, source, target)
-        result = np.zeros_like(host)
+        sources = (pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=one) for one in given)
+        target = pyopencl.Buffer(context, flags.WRITE_ONLY, result.nbytes)
+        kernels["probe"](queue, (64,), None, *sources, target)
         pyopencl.enqueue_copy(queue, result, target)
     except Exception as error:  # the device is not usable, whatever the reason
         if " " in str(intel_library() or "") and "Intel" in handle.platform.name:
@@ -268,7 +281,8 @@ def failure(handle: cl.Device) -> str:
                 "Intel's runtime does not work in a folder with a space in its path; move the environment, or use PoCL"
             )
         return one_line(error)
-    return "" if np.all(result == 2.0**-24) else "a tiny program ran, but gave a wrong answer"
+    wrong = [what for what, column in zip(_BITS, result.T, strict=True) if np.any(column != _BITS[what])]
+    return f"a tiny program gave wrong bits: {'; '.join(wrong)}" if wrong else ""
 
 
 def failures(indices: Sequence[int]) -> list[str]:
@@ -341,6 +355,10 @@ class DeviceInfo:
         Number of compute units, 0 if unknown.
     memory : int
         Global memory in bytes, 0 if unknown.
+    largest : int
+        Most bytes of one array, 0 if unknown.
+    integrated : bool
+        Whether it is a GPU that shares the memory of the host.
     usable : bool
         Whether a tiny program built and ran here with the right answer.
     reason : str
@@ -357,6 +375,8 @@ class DeviceInfo:
     driver: str = ""
     compute_units: int = 0
     memory: int = 0
+    largest: int = 0
+    integrated: bool = False
     usable: bool = False
     reason: str = _NOT_PROBED
     handle: cl.Device | None = field(default=None, repr=False)
@@ -527,15 +547,18 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
 def _describe(title: str, handle: cl.Device) -> DeviceInfo:
     """Return the line of a device with its properties."""
     bits = int(handle.type)  # a mask: 2 CPU, 4 GPU, 8 accelerator
+    kind = "gpu" if bits & 4 else "cpu" if bits & 2 else "accelerator" if bits & 8 else "other"
     return DeviceInfo(
         index=0,
         platform=title,
         name=clean(handle.name) or "unnamed device",
-        kind="gpu" if bits & 4 else "cpu" if bits & 2 else "accelerator" if bits & 8 else "other",
+        kind=kind,
         version=clean(handle.version),
         driver=clean(handle.driver_version),
         compute_units=int(handle.max_compute_units),
         memory=int(handle.global_mem_size),
+        largest=int(handle.max_mem_alloc_size),
+        integrated=kind == "gpu" and bool(handle.host_unified_memory),
         handle=handle,
     )
 
@@ -547,10 +570,12 @@ def _reference(index: int) -> DeviceInfo:
     )
 
 
-def _preference(info: DeviceInfo) -> tuple[bool, bool, int, bool, str]:
+def _preference(info: DeviceInfo) -> tuple[bool, bool, int, bool, bool, int, str]:
     """Return the sort key of a line; devices that tie keep the order in which their platform gives them."""
     one_thread = info.name.lower().startswith(_ONE_THREAD)
-    return not info.name, info.simulated, _KIND_ORDER[info.kind], one_thread, info.platform
+    units = info.compute_units if info.kind == "gpu" else 0  # runtimes of one CPU may count its cores differently
+    kind = _KIND_ORDER[info.kind]
+    return not info.name, info.simulated, kind, one_thread, info.integrated, -units, info.platform
 
 
 def main() -> int:

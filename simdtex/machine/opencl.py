@@ -25,10 +25,11 @@ SMALL_COPY = 2**16
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
-    cl.status_code.OUT_OF_RESOURCES,
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+REMEDY = "give a smaller size or sample, or another --device"
 
 NONE: Mapping[str, int | str] = {}
 """No -D constants."""
@@ -135,15 +136,16 @@ class OpenCL:
         self.log = Log(profile)
         on_gpu = info.kind == "gpu"
         # PoCL compiles once for each work-group size, so there is only one.
-        self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None and (items or 1) == 1
-        self.items = items or (ITEMS if on_gpu and vector is None else 1)
+        self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None
+        device, grouped = self.context.devices[0], on_gpu and not work_group and vector in (None, 1)
+        self.items = items or (min(ITEMS, int(device.max_work_group_size)) if grouped else 1)
         self.vector = vector or (1 if on_gpu or self.items > 1 else 16)
         self.step = step or 4
         if self.step not in (1, 2, 4, 8):
             raise ValueError(f"step is {self.step}; give 1, 2, 4 or 8")
-        if self.items > 1 and (self.items % 16 or self.vector > 1):
-            raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1")
-        self.local_memory = int(info.handle.local_mem_size)  # type: ignore[union-attr]
+        if self.items > 1 and (self.items % 16 or self.vector > 1 or self._forced):
+            raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1 and no work_group")
+        self.local_memory = int(device.local_mem_size)
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
@@ -168,6 +170,7 @@ class OpenCL:
         large = array.nbytes > SMALL_COPY  # without the pool, which would round the size up and keep the memory
         with self._plain_errors():
             if large:
+                self._check_size(array.nbytes)
                 data = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
                 result = DeviceArray(data, array.shape, array.dtype)
             else:
@@ -198,8 +201,10 @@ class OpenCL:
         """Return an uninitialised array, from a pool."""
         wanted = tuple(shape) if isinstance(shape, tuple | list) else (int(shape),)
         kind = np.dtype(dtype)
+        size = prod(wanted) * kind.itemsize
+        self._check_size(size)
         with self._lock:
-            return DeviceArray(self._pool.allocate(max(1, prod(wanted) * kind.itemsize)), wanted, kind)
+            return DeviceArray(self._pool.allocate(max(1, size)), wanted, kind)
 
     def constant(self, array: Any) -> DeviceArray:
         """Return a small table as a device array, uploaded once."""
@@ -261,16 +266,28 @@ class OpenCL:
 
     @contextmanager
     def _plain_errors(self) -> Iterator[None]:
-        """Raise DeviceError if the process was forked, or if the device runs out of memory."""
+        """Raise DeviceError if the process was forked, if the device runs out of memory, or if it gives up a launch."""
         devices.check_fork()
         try:
             yield
         except cl.Error as error:
+            if error.code == cl.status_code.OUT_OF_RESOURCES:
+                raise DeviceError(
+                    f"{self.name} gave up (CL_OUT_OF_RESOURCES), since a kernel took more registers or memory than "
+                    "there are, ran longer than a watchdog allows, or accessed memory of no array; give a smaller size "
+                    "or another --device, and report it"
+                ) from error
             if error.code not in OUT_OF_MEMORY:
                 raise
+            raise DeviceError(f"{self.name} ran out of memory; {REMEDY}") from error
+
+    def _check_size(self, size: int) -> None:
+        """Raise DeviceError if an array of ``size`` bytes is larger than the device allows a single one to be."""
+        if 0 < self.info.largest < size:
             raise DeviceError(
-                f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
-            ) from error
+                f"one array needs {size / 2**20:.0f} MiB and {self.name} allows {self.info.largest / 2**20:.0f} MiB in "
+                f"each; {REMEDY}"
+            )
 
     def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
         """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
@@ -305,8 +322,8 @@ class OpenCL:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
 
         ``function`` and ``defines`` are as in `kernel`; with ITEMS, so many work-items form a group that does what one
-        work-item of the range does; ``args`` are arrays of the device, scalars and structs of
-        NumPy, and integers of Python, which become 32 bits.
+        work-item of the range does otherwise. ``args`` are arrays of the device, scalars and structs of NumPy, and
+        integers of Python, which become 32 bits.
         """
         items = int(defines.get("ITEMS", 1))
         if items > 1:
@@ -316,8 +333,14 @@ class OpenCL:
     def enqueue(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
         """Enqueue a compiled kernel, as `launch` does."""
         local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
+        local = (min(local[0], self.most_together(kernel)), *local[1:])
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self.log.add(kernel(self.queue, size, local, *map(_argument, args)), kernel)
+
+    def most_together(self, kernel: Any) -> int:
+        """Return the most work-items in a work-group of a kernel: fewer than elsewhere if it takes many registers."""
+        # pyopencl keeps the answer
+        return int(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.info.handle))
 
     def launch_groups(
         self, function: str, groups: NDArray[np.int64], *args: Any, defines: Mapping[str, int | str]

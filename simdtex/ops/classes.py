@@ -27,13 +27,13 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
     """
     bands, rows, cols = levels.shape
     count = offsets.shape[0]
+    unit = np.float32(1) / np.float32(SIXTEENTHS * count)
     if machine is None:
         row, col = (within(axis[:, None] + near, n, False) for axis, near, n in _axes(sites, offsets, rows, cols))
         values = np.moveaxis(levels[:, row, col], 1, 2).astype(np.int64)  # (B, N, S)
         if not contrast:
             return ((values + 8) >> 4).astype(np.float32).reshape(bands * count, -1)
         z = values * count - values.sum(1, keepdims=True)
-        unit = np.float32(1) / np.float32(SIXTEENTHS * count)
         square = (z * z).sum((0, 1)).astype(np.float32) * (unit * unit)
         inverse = exp32(np.float32(-0.5) * log32(np.maximum(square, np.float32(1))))
         gain = np.float32(40) * log32(fma32(square * inverse, np.float32(0.2), np.float32(1))) * inverse * unit
@@ -42,7 +42,8 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
     machine.launch(
         "features_contrast" if contrast else "features_raw",
         (sites.size,),
-        *(levels, bands, rows, cols, sites, sites.size, offsets, count, found),
+        *(levels, bands, rows, cols, sites, sites.size, offsets, count),
+        *((unit, found) if contrast else (found,)),
     )
     return found
 
