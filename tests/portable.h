@@ -32,9 +32,20 @@ int INLINE mul_hi(int a, int b) { return (int)((long)a * b >> 32); }
 uint INLINE mul_hi(uint a, uint b) { return (uint)((ulong)a * b >> 32); }
 ulong INLINE mul_hi(ulong a, ulong b) { return (ulong)((unsigned __int128)a * b >> 64); }
 int INLINE atomic_inc(volatile __global int *p) { return __atomic_fetch_add(p, 1, __ATOMIC_RELAXED); }
+int INLINE atomic_inc(volatile __local int *p) { return __atomic_fetch_add(p, 1, __ATOMIC_RELAXED); }
+int INLINE atomic_add(volatile __local int *p, int n) { return __atomic_fetch_add(p, n, __ATOMIC_RELAXED); }
 #ifdef __AMDGCN__
-#define ID(axis) __builtin_amdgcn_workgroup_id_##axis() * 64 + __builtin_amdgcn_workitem_id_##axis()
+#define GROUP_ID(axis) __builtin_amdgcn_workgroup_id_##axis()
+#define LOCAL_ID(axis) __builtin_amdgcn_workitem_id_##axis()
+#define BARRIER __builtin_amdgcn_s_barrier()
 #else
-#define ID(axis) __nvvm_read_ptx_sreg_ctaid_##axis() * 64 + __nvvm_read_ptx_sreg_tid_##axis()
+#define GROUP_ID(axis) __nvvm_read_ptx_sreg_ctaid_##axis()
+#define LOCAL_ID(axis) __nvvm_read_ptx_sreg_tid_##axis()
+#define BARRIER __syncthreads()
 #endif
+#define ID(axis) GROUP_ID(axis) * 64 + LOCAL_ID(axis)
 size_t INLINE get_global_id(uint axis) { return axis == 0 ? ID(x) : axis == 1 ? ID(y) : ID(z); }
+size_t INLINE get_local_id(uint axis) { return axis == 0 ? LOCAL_ID(x) : axis == 1 ? LOCAL_ID(y) : LOCAL_ID(z); }
+size_t INLINE get_group_id(uint axis) { return axis == 0 ? GROUP_ID(x) : axis == 1 ? GROUP_ID(y) : GROUP_ID(z); }
+void INLINE barrier(cl_mem_fence_flags flags) { BARRIER; }
+#undef EACH
