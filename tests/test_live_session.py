@@ -522,7 +522,7 @@ FIELDS += ("options", "part", "guide", "hole", "of", "open", "beside", "level", 
 
 
 def test_a_page_without_a_picture_gets_a_small_run_to_play(page, monkeypatch):
-    monkeypatch.setattr(sessions, "DEMO_SIDE", 20)
+    monkeypatch.setattr(sessions, "DEMO_SIDE", 14)
     message, pictures = page.ask("demo", kind="demo")
     assert len(pictures) > 15 and len(set(pictures)) > 15
     assert {len(one) for one in pictures} == {4 * message["width"] * message["height"]}
@@ -543,7 +543,7 @@ KINDS += ["inside", "seek", "explain"]
     st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=4),
     st.lists(st.binary(max_size=30), max_size=2),
 )
-@settings(max_examples=200)
+@settings(max_examples=60)
 def test_no_message_does_harm(kind, message, buffers):
     HARDY.say(*buffers, **message | {"kind": kind})
     HARDY.ask("hello", kind="hello")
