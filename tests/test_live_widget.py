@@ -243,7 +243,7 @@ def test_an_estimate_has_a_map_of_each_category_and_of_the_entropy():
     assert [axes.get_title() for axes in simdtex.show(made).axes[:2]] == ["mean, m", "variance, (m)²"]
 
 
-@pytest.mark.parametrize("ground", [False, True])
+@pytest.mark.parametrize("ground", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_maps_have_north_up_in_plots_and_reports_and_pictures_their_first_row(tmp_path, monkeypatch, ground):
     monkeypatch.chdir(tmp_path)
     write("t.png", HALVES)
