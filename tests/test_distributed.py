@@ -33,6 +33,7 @@ SAMPLE = texture((22, 25), seed=2)
 COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
 
 
+@pytest.mark.slow
 def test_channels_stay_where_they_are(tmp_path):
     sample = np.ascontiguousarray(np.moveaxis(COLOUR, -1, 0))
     options = {"order": 1, "xi": -8.0, "rng": 11, "device": REFERENCE, "channel_axis": 0}

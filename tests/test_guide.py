@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import plain_sample
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, assert_same_bits, slow_but, texture
 
 import simdtex
 from simdtex.model.guide import Guide, Surroundings, smooth
@@ -91,7 +91,7 @@ def shares(pixels=TRAINING):
     return np.unique(pixels, return_counts=True)[1] / pixels.size
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("search", slow_but(["coherent"], ["exact", "coherent"]))
 def test_what_is_as_probable_as_it_is_frequent_changes_no_bit(search):
     same = simulate(probabilities=of(shares()), search=search, soft_weight=7.0)
     assert_same_bits(same.values, simulate(search=search).values)

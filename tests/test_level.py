@@ -178,7 +178,7 @@ def test_every_step_of_algorithm_1_stands_on_a_line_that_a_default_run_executes(
     before = sys.gettrace()
     sys.settrace(look)
     try:
-        simdtex.synthesize(texture((14, 15)), (7, 8), rng=1, device=REFERENCE)
+        simdtex.synthesize(texture((10, 11)), (4, 5), rng=1, device=REFERENCE)
     finally:
         sys.settrace(before)
     lines = marked()

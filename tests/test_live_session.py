@@ -702,6 +702,7 @@ def test_parts_of_a_large_window_are_the_same(monkeypatch):
     assert render(layer, window) == whole
 
 
+@pytest.mark.slow
 def test_a_coarse_window_of_a_tiled_layer_takes_little_memory():
     window = parse_window({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
     layer = Layer((512, 2**14), np.zeros((512, 2**14, 3), np.uint8), np.asarray)

@@ -192,6 +192,7 @@ def test_what_cannot_be_shown_is_refused(pictures, titles, words):
         simdtex.show(*pictures, titles=titles)
 
 
+@pytest.mark.slow
 def test_a_script_keeps_no_figure_and_is_not_warned():
     code = (
         "import simdtex, numpy\nfor _ in range(25): simdtex.show(numpy.eye(9)).canvas.draw()\nimport matplotlib.pyplot"

@@ -331,6 +331,7 @@ def test_grey_mixtures_have_the_pixels_of_one_and_the_bands_of_the_other():
     assert np.mean(like) < 0.6 * np.mean(unlike)
 
 
+@pytest.mark.slow
 def test_one_sample_for_all_is_the_texture_itself():
     for sample, axis in ((GREYS[0], None), (WARM, -1)):
         plain = synthesize_mixtures(sample, (40, 48), channel_axis=axis)

@@ -448,12 +448,8 @@ def below_the_floor(name, search, found):
     return worse
 
 
-QUICK_FLOOR = ("brick", "default")
-
-
-@pytest.mark.parametrize(
-    ("name", "search"), [pytest.param(*key, marks=[pytest.mark.slow] * (key != QUICK_FLOOR)) for key in MEASURED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "search"), MEASURED)
 def test_quality_stays_above_the_floor(any_device, name, search):
     found = figures_floor(name, search, opencl(any_device))
     assert not below_the_floor(name, search, found), found

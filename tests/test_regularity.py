@@ -230,6 +230,7 @@ def in_phase(source, site, lattice, fitted, within):
     return (np.abs(apart - np.rint(apart)) <= within).all(0).mean()
 
 
+@pytest.mark.slow
 def test_a_regular_sample_is_repeated_without_a_fault():
     shape, lattice = (32, 36), found_in(BRICK)
     share, sites = {}, np.indices(shape).reshape(2, -1)
@@ -268,6 +269,7 @@ def test_a_run_says_how_much_its_lattice_is_deformed_and_what_fits():
     ]
 
 
+@pytest.mark.slow
 def test_a_hole_is_filled_in_phase():
     hole = np.zeros(BRICK.shape[:2], bool)
     hole[16:32, 12:30] = True
@@ -286,6 +288,7 @@ def test_categories_and_densities_have_none():
         assert chosen.resolved(chosen.of(pictures)).lattice == "none"
 
 
+@pytest.mark.slow
 def test_seeds_do_not_make_one_picture():
     """Of all candidates in phase some are nearer to the phase than others, which is no reason to take only them."""
     rng, sample = np.random.default_rng(3), spots(BASES["square"], (96, 96))[..., 0].astype(int)
