@@ -96,13 +96,14 @@ def plain(value):
 )
 def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, search):
     machine = opencl(cl_device)
+    others = [REFERENCE] + [opencl(cl_device, work_group=16, vector=4)] * (schedule == "coloring")
     run = prepared(machine, schedule=schedule, search=search)
     whole = [run.save(state) for _, state, _ in sweeps(run)]
     assert len({(state["level"], state["cooling"], state["free"]) for state in whole}) == len(whole) > 10
     for number in (3, len(whole) - 2):
         assert plain(whole[number])
         kept = pickle.loads(pickle.dumps(whole[number]))
-        for other in (opencl(cl_device, work_group=16, vector=4), REFERENCE):
+        for other in others:
             again = prepared(other, schedule=schedule, search=search)
             after = [again.save(state) for _, state, _ in sweeps(again, again.load(kept))]
             for mine, theirs in zip(after, whole[number + 1 :], strict=True):
