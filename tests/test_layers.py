@@ -251,24 +251,24 @@ def test_what_only_pictures_have_is_refused(options, words):
 def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, suffix):
     """The same bytes as in Python, with coordinates; the report has the training image's own figures."""
     monkeypatch.chdir(tmp_path)
-    training = facies((6, 10, 11))
+    training = facies((9, 14, 15))
     if suffix == ".sgems":
         simdtex.write_grid("ti.sgems", {"facies": training}, origin=(5, 7, -9), cell=(10, 10, 1))
     elif suffix == ".nc":
-        coords = {"z": np.arange(6) - 9.0, "y": np.arange(10) * 10.0 + 7, "x": np.arange(11) * 10.0 + 5}
+        coords = {"z": np.arange(9) - 9.0, "y": np.arange(14) * 10.0 + 7, "x": np.arange(15) * 10.0 + 5}
         xarray.DataArray(training, coords, ("z", "y", "x"), name="facies").to_netcdf("ti.nc", engine="h5netcdf")
     else:
         fields = {"space dimension": 3, "space origin": [5, 7, -9], "space directions": np.diag([10, 10, 1])}
         nrrd.write("ti.nrrd", training, fields, index_order="C")
     Path("wells.csv").write_text("x,y,z,facies\n15,27,-8,1\n")
-    words = [f"ti{suffix}", "-o", "out.nc", "-n", "2", "--categorical", "--known", "wells.csv", "--size", "7x8x5"]
+    words = [f"ti{suffix}", "-o", "out.nc", "-n", "2", "--categorical", "--known", "wells.csv", "--size", "12x13x8"]
     result = CliRunner().invoke(
         main, ["simulate", *words, "--order", "3", "--seed", "7", "--device", "reference", "--report", "page"]
     )
     assert result.exit_code == 0, result.output
     found = xarray.open_dataarray("out.nc")
     place = {"origin": (5, 7, -9), "cell": (10, 10, 1)}
-    given = {"known": "wells.csv", "shape": (5, 8, 7), "order": 3, "rng": 7, "device": "reference", **place}
+    given = {"known": "wells.csv", "shape": (8, 13, 12), "order": 3, "rng": 7, "device": "reference", **place}
     assert_same_bits(found.values, simdtex.simulate(training, 2, categorical=True, **given).values)
     assert (found.values[:, 1, 2, 1] == 1).all()
     assert found.y.values[0] == 7

@@ -522,7 +522,7 @@ FIELDS += ("options", "part", "guide", "hole", "of", "open", "beside", "level", 
 
 
 def test_a_page_without_a_picture_gets_a_small_run_to_play(page, monkeypatch):
-    monkeypatch.setattr(sessions, "DEMO_SIDE", 14)
+    monkeypatch.setattr(sessions, "DEMO_SIDE", 20)
     message, pictures = page.ask("demo", kind="demo")
     assert len(pictures) > 15 and len(set(pictures)) > 15
     assert {len(one) for one in pictures} == {4 * message["width"] * message["height"]}

@@ -64,6 +64,7 @@ def test_a_widget_takes_messages_and_gives_results(monkeypatch):
     live.close()
 
 
+@pytest.mark.slow
 def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
     monkeypatch.setattr(widget.Live, "send", lambda self, message, buffers=None: None)
     live = simdtex.Live(texture(10, 12), channel_axis=-1, device="reference")
