@@ -4,6 +4,7 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 from scipy.stats import chisquare
 from tolerances import SIGNIFICANCE
@@ -32,6 +33,11 @@ def opencl(info, **options):
     from simdtex.machine.opencl import OpenCL
 
     return OpenCL(info, **options)
+
+
+def slow_but(quick, every):
+    """Parameters of a test, of which all but the quick ones are slow."""
+    return [pytest.param(one, marks=[pytest.mark.slow] * (one not in quick)) for one in every]
 
 
 def texture(shape, channels=None, dtype=np.uint8, seed=0):

@@ -171,6 +171,11 @@ def textures(options=None, tiles=0, **given):
     return Run(simdtex.synthesize, case.textures, functools.partial(case.plainly, False), tiles)
 
 
+def tiled(options, **given):
+    """A run in tiles of 18 pixels; it is too large for the plain loops."""
+    return Run(simdtex.synthesize, Given(options, **given).textures, tiles=18)
+
+
 def realisations(options=None, **given):
     """The same with maps, which `simdtex.simulate` takes."""
     case = Given(options or {}, **given)
@@ -253,17 +258,17 @@ F4 = {"dtype": np.float32}
 
 RUNS = {
     # levels, orders, types, borders
-    "defaults": textures(samples=((9, 10),), shape=(3, 4)),
+    "defaults": textures(samples=((9, 10),), shape=(2, 3)),
     "overview": textures({"order": 2, "overview": 20}, samples=((20, 19),), shape=(9, 10)),
     "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
     "overview-whole": textures({"order": 1, "edges": "whole", "phases": "all"}, samples=((20, 19),), shape=(9, 8)),
-    "paper": textures({"preset": "paper", "order": 2}),
+    "paper": textures({"preset": "paper", "order": 2}, shape=(6, 7)),
     "exact": textures(EXACT),
     "exact-order-8": textures(EXACT | {"order": 8, "xi": -4.0}, samples=((14, 12),)),
     "exact-three-levels": textures(EXACT | {"levels": 3, "phases": "all"}, samples=((13, 14),), shape=(11, 10)),
     "exact-colour": textures(EXACT | OPEN, channels=3),
-    "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16),
-    "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(6, 5)),
+    "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16, shape=(6, 7)),
+    "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(3, 4)),
     "gibbs": textures(EXACT | {"relaxation": "gibbs", "bandwidth": 0.6, "xi": -4.0}, dtype=np.uint16, tiles=5),
     "density": textures(DENSITY | {"levels": 2, "bandwidth": 0.3}, samples=((9, 10),), shape=(6, 7), tiles=4),
     "density-colour": textures(DENSITY | OPEN, channels=3, samples=((9, 8),), shape=(1, 17), dtype=np.float64),
@@ -285,7 +290,7 @@ RUNS = {
     "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
     "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),
     "few-whole": textures(FEW | {"order": 5, "edges": "whole", "phases": "all", "xi": -2.5}, masked=0.2, **F4),
-    "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(5, 6), **F4),
+    "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(2, 3), **F4),
     # schedules
     **{
         name: textures(FEW | {"schedule": name, "xi": -2.0}, samples=((9, 10),))
@@ -298,24 +303,28 @@ RUNS = {
     "array": textures(FEW | {"array": "4x4", "schedule": "luby"}),
     # penalties, structure, finish, a lattice
     "balance": textures(FEW | {"balance": 0.1, "order": 1}, samples=((12, 13),), shape=(11, 10), tiles=6),
-    "balance-order-9": textures(FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}, samples=((13, 14),)),
+    "balance-order-9": textures(
+        FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}, samples=((13, 14),), shape=(6, 7)
+    ),
     "structure-colour": textures(FEW | OPEN | {"structure": 0.7}, channels=3, shape=(8, 7)),
     "structure-beyond": textures(FEW | {"structure": 50.0}, **F4),
-    "novelty-exact": textures(EXACT | OPEN | {"novelty": 0.05, "levels": 1}, channels=3),
+    "novelty-exact": textures(EXACT | OPEN | {"novelty": 0.05, "levels": 1}, channels=3, shape=(5, 6)),
     "finish-colour": textures(EXACT | OPEN | {"finish": 0.8}, channels=3, shape=(8, 7), tiles=5),
     "finish-16-bit": textures(FEW | {"finish": 2.2}, channels=2, dtype=np.uint16, shape=(8, 7)),
     "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10)),
     "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
     "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
     "more-whole": textures(MORE | {"edges": "whole", "phases": "all", "balance": 2.0}, samples=((16, 15),)),
-    "more-gibbs": textures(MORE_FEW | {"relaxation": "gibbs"}, channels=2, **F4),
+    "more-gibbs": textures(MORE_FEW | {"relaxation": "gibbs"}, channels=2, shape=(6, 7), **F4),
     "more-density": textures(MORE | DRAWN | {"novelty": 0.4, "finish": 1.5}, channels=2, samples=((10, 9),)),
     # what is given besides
     "known": textures(MORE_FEW | {"levels": 3, "schedule": "luby"}, known=0.06, shape=(11, 13)),
     "known-open": textures(
         MORE_EXACT | OPEN | {"levels": 3, "data_weight": 4.0, "xi": -4.0}, known=0.08, tiles=5, **F4
     ),
-    "known-gibbs": textures(MORE_EXACT | GIBBS | {"order": 4, "data_weight": 1.7}, known=0.1, dtype=np.uint16),
+    "known-gibbs": textures(
+        MORE_EXACT | GIBBS | {"order": 4, "data_weight": 1.7}, known=0.1, dtype=np.uint16, shape=(6, 7)
+    ),
     "known-blocks": textures(MORE_FEW | {"schedule": "block:3x4", "structure": 0.0}, known=0.9, channels=2),
     "known-lattice": textures(
         MORE | {"lattice": "4.8,0.3,-0.2,5.8", "xi": -4.0}, known=0.2, channels=3, shape=(10, 12), tiles=6
@@ -349,7 +358,7 @@ RUNS = {
     ),
     # windows that are smaller than the whole
     **{
-        f"tiles-{name}": textures(given | {"order": 1, "xi": -8.0}, 18, samples=((22, 25),), shape=(37, 30), **more)
+        f"tiles-{name}": tiled(given | {"order": 1, "xi": -8.0}, samples=((22, 25),), shape=(37, 30), **more)
         for name, given, more in (
             ("known", {"levels": 3}, {"known": 0.02}),
             ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),
@@ -357,19 +366,22 @@ RUNS = {
         )
     },
     # simulations
-    "region": realisations(MORE_EXACT | {"finish": 1.0}, outside=0.3, known=0.2, **F4),
-    "soft": realisations(MORE_EXACT | {"categorical": True, "soft_weight": 0.5}, kinds=3, soft=("categories",)),
+    "region": realisations(MORE_EXACT | {"finish": 1.0}, outside=0.3, known=0.2, shape=(6, 7), **F4),
+    "soft": realisations(
+        MORE_EXACT | {"categorical": True, "soft_weight": 0.5}, kinds=3, soft=("categories",), shape=(6, 7)
+    ),
     "soft-gibbs": realisations(
         MORE_FEW | GIBBS | {"categorical": True, "proportions": (2.0, 1.0)},
-        **{"kinds": 2, "known": 0.1, "soft": ("categories",), "masked": 0.2},
+        **{"kinds": 2, "known": 0.1, "soft": ("categories",), "masked": 0.2, "shape": (6, 7)},
     ),
     "soft-all": realisations(
         MORE_FEW | {"categorical": (0,), "levels": 3},
         **TWO | {"kinds": 3, "soft": ("categories", "images"), "channels": 2, "outside": 0.2, "labels": 2},
+        shape=(6, 7),
     ),
     "volume": volume((6, 12, 13), order=3, levels=2),
     "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
-    "volume-exact": volume((4, 7, 8), search="exact", relaxation="gibbs", edges="whole", order=1),
+    "volume-exact": volume((3, 5, 6), search="exact", relaxation="gibbs", edges="whole", order=1),
     "volume-grey": volume(
         (4, 8, 9), training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=3, phases="all"
     ),

@@ -44,9 +44,8 @@ def missing(what):
     (pytest.fail if REQUIRED else pytest.skip)(f"{what} is not here")
 
 
-@pytest.mark.parametrize(
-    ("threads", "driver"), [(2, None), *(pytest.param(1, name, marks=pytest.mark.slow) for name in (None, "basic"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("threads", "driver"), [(2, None), (1, None), (1, "basic")])
 def test_any_number_of_threads_has_the_references_bits(reference, threads, driver):
     """And the driver ``basic``, which has no thread of its own."""
     pocl = [info for info in usable_devices() if info.platform.startswith("Portable Computing")]

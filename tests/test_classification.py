@@ -202,7 +202,8 @@ numpy.save(labels, joblib.load(file).predict(numpy.load(picture)))
 """
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, pytest.param(np.float32, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(machine, tmp_path, dtype):
     picture = PICTURE.astype(dtype)
     found = simdtex.TextureClassifier(**QUICK | {"device": machine, "levels": 1}).fit(picture, STROKES)
@@ -348,6 +349,7 @@ def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
     assert (image.read("labels.tif").pixels == labels).all()
 
 
+@pytest.mark.slow
 def test_labels_are_a_training_image(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
     labels, common = read_labels("labels.png"), ["--categorical", "--order", 2, "--device", "reference"]

@@ -314,6 +314,7 @@ def test_helps_need_no_docstrings(small):
     assert COMMANDS["synth"] in " ".join(shell(small, ["synth", "--help"], ["-OO"]).stdout.decode().split())
 
 
+@pytest.mark.slow
 @POSIX
 def test_names_that_are_no_text_are_written_and_reported(small):
     """In a locale other than C, in which Python prints no such name."""

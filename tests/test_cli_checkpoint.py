@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import texture
+from cases import slow_but, texture
 from commands import refused, run
 
 from simdtex import checkpoint as checkpoints
@@ -97,7 +97,7 @@ def clear(folder, inputs):
             path.unlink()
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", slow_but(("synth-mrf", "fill", "simulate"), RUNS))
 def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tmp_path, monkeypatch):
     inputs = set(made(place))
     result = given(*RUNS[name])

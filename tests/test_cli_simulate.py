@@ -145,6 +145,7 @@ def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatc
     refused(*BAD[case])
 
 
+@pytest.mark.slow
 def test_a_report_of_data_on_the_ground(folder):
     args = ("--known", "wells.eas", "--several", "most", "--size", "14x12", "--categorical", "--report", "report")
     assert (made("ti.gslib", *args).values[0, 4, 3] == 3).all()
@@ -235,6 +236,7 @@ def maps(folder):
     return {"region": region, "probabilities": np.moveaxis(p, -1, 0)}
 
 
+@pytest.mark.slow
 def test_maps_are_those_of_the_function(folder, maps):
     facies = pixels("facies.png")
     expected = simdtex.simulate(facies, 1, **maps, categorical=True, **OPTIONS)

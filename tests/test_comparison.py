@@ -260,6 +260,7 @@ def test_options_reach_the_runs(folder):
     assert (accounting["array"], accounting["mapping"]) == ("8x8", "hierarchical")
 
 
+@pytest.mark.slow
 def test_without_a_sample_it_is_brick(any_device, tmp_path):
     args = ["--order", 2, "--size", "9x9", "--seeds", 1, "--schedule", "coloring", "--device", any_device.index, "-q"]
     result = run("schedules", "-o", tmp_path / "report", *args)

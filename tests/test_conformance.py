@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import plain_mrf
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl
+from cases import REFERENCE, assert_same_bits, opencl, slow_but
 from kept import HERE, PACKAGE, Kept, key, sources
 from runs import LARGE, PINNED, RUNS, SEED, digest, large, outcome
 
@@ -32,7 +32,14 @@ def test_a_run_is_that_of_the_plain_loops(reference, results, name):
     assert_same_bits(reference(name)[0][: len(expected)], expected)
 
 
-@pytest.mark.parametrize("name", RUNS)
+ON_DEVICES = ("density-colour", "mode-colour", "few", "block", "synchronous", "array", "known-lattice", "known-blocks")
+ON_DEVICES += ("everything", "soft-all", "volume-three", "volume-data", "fill", "mix-bands", "multires-luminance")
+ON_DEVICES += ("multires-open", "pyramid", "pyramid-laplacian", "solid-average", "maspar-mode", "maspar", "classify")
+ON_DEVICES += ("estimate",)
+"""Runs that launch every kernel, and with every constant of the others; what takes long is compiling."""
+
+
+@pytest.mark.parametrize("name", slow_but(ON_DEVICES, RUNS))
 def test_a_device_has_the_references_bits(machine, reference, name):
     check(name, machine, reference)
 
@@ -48,11 +55,7 @@ def test_the_bytes_are_those_pinned(reference, name):
     assert digest(reference(name)[0]) == pinned()[name]
 
 
-QUICK = ("large brick", "large coffee", "large grass-16-bit", "large multires-coffee", "large pyramid-coffee")
-"""Those whose kernels other tests compile too."""
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in LARGE])
+@pytest.mark.parametrize("name", slow_but(("large grass-16-bit", "large pyramid-coffee"), LARGE))
 def test_the_bytes_of_larger_runs_are_those_pinned(any_device, name):
     assert digest(large(name, opencl(any_device))) == pinned()[name]
 
@@ -88,7 +91,10 @@ def stopped_and_resumed(name, path, device):
             stops += 1
 
 
-@pytest.mark.parametrize("name", KEPT)
+RESUMED = ("array", "known", "soft-all", "volume", "fill", "extend", "multires", "pyramid", "solid", "mix", "classify")
+
+
+@pytest.mark.parametrize("name", slow_but(RESUMED, KEPT))
 def test_a_run_that_is_stopped_has_the_same_end(reference, tmp_path, name):
     expected = reference(name)
     found, stops = stopped_and_resumed(name, tmp_path / "run", REFERENCE)
@@ -97,14 +103,19 @@ def test_a_run_that_is_stopped_has_the_same_end(reference, tmp_path, name):
     assert json.loads(found[1]) == json.loads(expected[1])
 
 
-@pytest.mark.parametrize("name", ["more", "array", "multires", "pyramid-colour", "classify"])
+@pytest.mark.parametrize(
+    "name", slow_but(("array", "multires"), ["array", "multires", "more", "pyramid-colour", "classify"])
+)
 def test_a_run_that_is_stopped_on_a_device_has_the_same_end(machine, reference, tmp_path, name):
     found, stops = stopped_and_resumed(name, tmp_path / "run", machine)
     assert stops
     assert_same_bits(found[0], reference(name)[0])
 
 
-@pytest.mark.parametrize("name", [name for name, run in RUNS.items() if run.tiles])
+@pytest.mark.parametrize(
+    "name",
+    slow_but(("density", "finish-colour", "several", "categories"), [name for name, run in RUNS.items() if run.tiles]),
+)
 def test_tiles_have_the_bytes_of_the_whole(reference, tmp_path, name):
     zarr = pytest.importorskip("zarr")
     from simdtex import distributed
@@ -129,7 +140,7 @@ FORMS = [
 FORMED = ("exact-of-many", "density-colour", "more", "multires-luminance", "pyramid-colour")
 
 
-@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("form", slow_but(FORMS[:1], FORMS), ids=str)
 def test_the_form_of_a_launch_changes_no_bit(cl_device, reference, form):
     """Runs one after another on one machine, whose memory pool keeps nothing of the run before."""
     machine = opencl(cl_device, **form)
@@ -196,7 +207,8 @@ def test_the_plain_loops_have_the_engines_defaults_and_presets():
 def test_every_option_changes_a_run_of_the_plain_loops(reference, option):
     """Else their equality would show nothing of it; a new option wants a run in the table."""
     default, tried = plain_mrf.DEFAULTS[option], 0
-    for name in (name for name, run in RUNS.items() if run.plain):
+    plain = [name for name, run in RUNS.items() if run.plain]
+    for name in sorted(plain, key=lambda name: (option not in name, reference(name)[0][0].size)):
         if RUNS[name].inputs()[1].get(option, default) == default:
             continue
         tried += 1

@@ -305,6 +305,7 @@ print(device.find("reference").kind)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the loader reads .icd files on Linux only")
 def test_an_icd_that_names_no_library(tmp_path):
     (tmp_path / "broken.icd").write_text("/nonexistent/libbroken.so\n")

@@ -33,6 +33,7 @@ SAMPLE = texture((22, 25), seed=2)
 COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
 
 
+@pytest.mark.slow
 def test_channels_stay_where_they_are(tmp_path):
     sample = np.ascontiguousarray(np.moveaxis(COLOUR, -1, 0))
     options = {"order": 1, "xi": -8.0, "rng": 11, "device": REFERENCE, "channel_axis": 0}
@@ -81,9 +82,8 @@ def test_the_tiles_of_a_turn_are_done_in_any_order(tmp_path, whole):
     assert_same_bits(store.root["image"][...], whole)
 
 
-@pytest.mark.parametrize(
-    ("moment", "after"), [("replace", False), pytest.param("replace", True, marks=pytest.mark.slow), ("rmtree", True)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("moment", "after"), [("replace", False), ("replace", True), ("rmtree", True)])
 def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, after, whole):
     """Stopped before or after any file is in its place, or before a folder is removed or when half of it is."""
     _, where = created(tmp_path)

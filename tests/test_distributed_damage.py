@@ -16,6 +16,7 @@ from simdtex.io import files
 from simdtex.methods.mrf.tiles import Tally
 
 zarr = pytest.importorskip("zarr")
+pytestmark = pytest.mark.slow
 
 SAMPLE = texture((22, 25), seed=2)
 SHAPE = 14, 15
@@ -119,19 +120,8 @@ PARTS = [
 ]
 
 
-QUICK = {(part, tuple(DAMAGES)[n % 4]) for n, (_, part, _) in enumerate(PARTS[::2])}
-"""Every second part, and each damage in turn; all of them are slow."""
-
-
-@pytest.mark.parametrize(
-    ("phase", "part", "words", "damage"),
-    [
-        pytest.param(*one, damage, marks=[pytest.mark.slow] * ((one[1], damage) not in QUICK))
-        for one in PARTS
-        for damage in DAMAGES
-    ],
-    ids=lambda one: one and one.replace("/", "."),
-)
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(("phase", "part", "words"), PARTS, ids=lambda one: one and one.replace("/", "."))
 def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, damage):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
@@ -152,8 +142,6 @@ PLACES = [
     ("sweep", "work/level0/READ/values/c/0/0/0", "work/level0/READ/values/c/0/0/1", "level 0 begins again with"),
     ("sweep", "work/turn", "work/run", "and nothing makes it again"),
     ("show", "image/c/0/0", "image/c/0/1", None),
-]
-SLOW_PLACES = [
     ("sweep", "work/level0/WRITE/values/c/0/0/0", "work/level0/READ/values/c/0/0/0", "level 0 begins again with"),
     ("sweep", "work/level0/READ/source/c/0/0", "work/level0/WRITE/source/c/0/0", None),  # the present turn writes it
     ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
@@ -164,11 +152,7 @@ SLOW_PLACES = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("phase", "part", "other", "words"),
-    [*PLACES, *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW_PLACES)],
-    ids=lambda one: one and one.replace("/", "."),
-)
+@pytest.mark.parametrize(("phase", "part", "other", "words"), PLACES, ids=lambda one: one and one.replace("/", "."))
 def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finished, whole, phase, part, other, words):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
@@ -215,14 +199,8 @@ def mixed(path, one, other, chosen):
             shutil.copyfile(source, path / name)
 
 
-@pytest.mark.parametrize(
-    ("how", "seed"),
-    [
-        pytest.param(how, seed, marks=[pytest.mark.slow] * (seed > 0 or how not in ("older first", "finished")))
-        for how in ("older first", "newer first", "at random", "again", "other", "finished")
-        for seed in range(6)
-    ],
-)
+@pytest.mark.parametrize("how", ["older first", "newer first", "at random", "again", "other", "finished"])
+@pytest.mark.parametrize("seed", range(6))
 def test_a_copy_of_several_moments_gives_the_same_picture_or_a_sentence(tmp_path, moments, how, seed):
     """As of a backup that was made while the run went on, or a restored part; never another picture."""
     rng = np.random.default_rng(seed)

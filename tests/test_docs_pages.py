@@ -250,6 +250,7 @@ def recording():
     return recorded.unpack(recorded.FILE.read_text(encoding="ascii"))
 
 
+@pytest.mark.slow
 def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
     found, data = recording
     shape = (recorded.SIDE, recorded.SIDE)

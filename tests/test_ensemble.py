@@ -203,6 +203,7 @@ def make_channels(script):
     return script("channels").channels
 
 
+@pytest.mark.slow
 def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_channels):
     for image, seed in zip(ensemble.channels(), (1, 7), strict=True):
         np.testing.assert_array_equal(image, make_channels((256, 256), seed))

@@ -45,7 +45,7 @@ def weights(training, known, cell, nearest, reach, bandwidth, differs, variance,
 
 
 @pytest.mark.parametrize(
-    ("kinds", "how"), [(3, {}), (2, {"nearest": 3}), (3, {"nearest": 0}), (2, {"reach": 5, "bandwidth": 0.6})], ids=str
+    ("kinds", "how"), [(3, {}), (3, {"nearest": 0}), (2, {"nearest": 3, "reach": 5, "bandwidth": 0.6})], ids=str
 )
 def test_probabilities_are_those_of_plain_loops(kinds, how):
     training = TRAINING if kinds == 3 else (TRAINING > 3).astype(np.uint8)

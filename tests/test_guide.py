@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import plain_sample
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, assert_same_bits, slow_but, texture
 
 import simdtex
 from simdtex.model.guide import Guide, Surroundings, smooth
@@ -91,7 +91,7 @@ def shares(pixels=TRAINING):
     return np.unique(pixels, return_counts=True)[1] / pixels.size
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("search", slow_but(["coherent"], ["exact", "coherent"]))
 def test_what_is_as_probable_as_it_is_frequent_changes_no_bit(search):
     same = simulate(probabilities=of(shares()), search=search, soft_weight=7.0)
     assert_same_bits(same.values, simulate(search=search).values)
@@ -123,7 +123,7 @@ def test_each_cell_is_from_the_training_image_of_its_number():
     assert (both[:, number == 0] == 0).all() and (both[:, number == 1] == 0).any()
     few = [
         (simdtex.simulate(images, 2, **options, image_map=of([1 - p, p]), source=True).source_image == 1).mean().item()
-        for p in (0.05, 0.4, 0.95)
+        for p in (0.05, 0.95)
     ]
     assert few == sorted(few) and few[0] < few[-1]
 
@@ -232,15 +232,15 @@ def test_too_many_copies_are_refused():
 
 
 def test_sources_lead_back_to_the_training_image():
-    training = np.arange(400, dtype=np.int32).reshape(20, 20)
-    row, col = np.indices((12, 13))
-    maps = {"rotation": col * 30.0, "scale": np.where(row < 6, 0.6, 1.4)}
+    training = np.arange(256, dtype=np.int32).reshape(16, 16)
+    row, col = np.indices((8, 9))
+    maps = {"rotation": col * 40.0, "scale": np.where(row < 4, 0.6, 1.4)}
     options = {"order": 2, "levels": 2, "device": "reference", "rng": 1, "finish": 0.0, "source": True}
-    found = simdtex.simulate(training, 2, **maps, **options)
+    found = simdtex.simulate(training, 1, **maps, **options)
     assert (training[found.source_row.values, found.source_column.values] == found.simulation.values).all()
-    usable = training % 20 < 13
+    usable = training % 16 < 11
     half = simdtex.simulate([training, -training], 1, **maps, **options, mask=[usable, usable])
-    assert (half.source_column < 13).all()
+    assert (half.source_column < 11).all()
     signs = np.where(half.source_image.values == 1, -1, 1)
     assert (signs * training[half.source_row.values, half.source_column.values] == half.simulation.values).all()
 

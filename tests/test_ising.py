@@ -258,35 +258,21 @@ def test_a_deviation_counts_by_students_t_over_all_comparisons(runs):
         assert [found.differs for found in findings([chains(energy)] * runs)] == [differs] * runs
 
 
-@pytest.fixture(scope="module")
-def found(any_device):
-    """Findings of all schedules on a small lattice: below, near and above T_c."""
+def test_schedules_that_keep_equation_14_have_the_exact_energy_and_others_differ(any_device):
+    """On a small lattice, below, near and above T_c."""
     names = [*EXACT, "synchronous", "random-subset", "block:4x4"]
     options = {"seeds": 32, "sweeps": 200, "burn_in": 100, "seed": 5}
-    runs = [ising(opencl(any_device), (8, 8), [1.8, CRITICAL, 2.8], name, **options) for name in names]
-    return {(one.schedule, one.temperature): one for one in findings(runs)}
-
-
-@pytest.mark.parametrize("schedule", EXACT)
-def test_schedules_that_keep_equation_14_have_the_exact_energy(found, schedule):
-    for (name, _), one in found.items():
-        if name == schedule:
+    found = findings([ising(opencl(any_device), (8, 8), [1.8, CRITICAL, 2.8], name, **options) for name in names])
+    for one in found:
+        if one.schedule in EXACT:
             assert one.independent and not one.differs, one
             assert one.error < 0.025  # not for want of precision
-
-
-def test_the_synchronous_schedule_has_another_energy_and_two_lattices(found):
-    for (name, _), one in found.items():
-        if name == "synchronous":
+            assert one.neighbours > 0.008, one
+        elif one.schedule == "synchronous":
             assert not one.independent and one.differs and one.sigmas > 4.5, one
             assert abs(one.neighbours) < 0.004  # neighbours know nothing of one another
-        elif name in EXACT:
-            assert one.neighbours > 0.008, one
-
-
-def test_random_subsets_and_blocks_differ_too(found):
     for schedule in ("random-subset", "block:4x4"):
-        ones = [one for (name, _), one in found.items() if name == schedule]
+        ones = [one for one in found if one.schedule == schedule]
         assert any(one.differs for one in ones) and not any(one.independent for one in ones)
 
 

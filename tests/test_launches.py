@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from cases import texture
+from cases import slow_but, texture
 
 import simdtex
 from simdtex.machine.opencl import OpenCL
@@ -47,7 +47,7 @@ RUNS = {
 }
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", slow_but(("mode", "luby"), RUNS))
 def test_a_run_launches_what_the_page_says(cl_device, name):
     options, expected = RUNS[name]
     options = {"order": 8, "levels": 2, "finish": 0.0} | options

@@ -13,7 +13,7 @@ import nrrd
 import numpy as np
 import pytest
 import xarray
-from cases import assert_same_bits
+from cases import assert_same_bits, slow_but
 from click.testing import CliRunner
 from scipy.ndimage import gaussian_filter
 
@@ -195,10 +195,11 @@ def test_soft_data_and_a_region_have_layers():
     assert (facies()[tuple(place)] == maps.simulation.values[0][inside]).all()
 
 
+@pytest.mark.slow
 def test_the_shares_are_those_of_the_training_image():
     training = facies((10, 40, 40), kinds=3)
     wanted = np.bincount(training.ravel()) / training.size
-    for seed in range(3):
+    for seed in range(2):
         made = simulated(training, order=8, rng=seed, device=None)
         assert np.abs(np.bincount(made.ravel(), minlength=3) / made.size - wanted).max() < 0.04
 
@@ -246,7 +247,7 @@ def test_what_only_pictures_have_is_refused(options, words):
         simulated(**options)
 
 
-@pytest.mark.parametrize("suffix", [".sgems", ".nc", ".nrrd"])
+@pytest.mark.parametrize("suffix", slow_but([".sgems"], [".sgems", ".nc", ".nrrd"]))
 def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, suffix):
     """The same bytes as in Python, with coordinates; the report has the training image's own figures."""
     monkeypatch.chdir(tmp_path)
@@ -278,6 +279,7 @@ def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, s
     assert {"slices.png", "variograms.png", "connectivity.png", "index.html"} <= set(results["files"])
 
 
+@pytest.mark.slow
 def test_what_solid_writes_is_a_training_image(tmp_path, monkeypatch):
     """A block of three axes is a volume in each format, the same to the bit; --channels makes it a picture."""
     monkeypatch.chdir(tmp_path)

@@ -27,6 +27,7 @@ LACKS = missing() or ("" if AXE.exists() else "axe-core is not installed (make b
 if LACKS and os.environ.get(REQUIRE):
     raise RuntimeError(f"{REQUIRE} is set, and {LACKS}")
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(bool(LACKS), reason=f"no test in a browser: {LACKS}"),
     pytest.mark.xdist_group("browser"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),  # Selenium's own connections
@@ -200,7 +201,6 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     assert page.sees(np.array(PIL.Image.open(wall.parent / "texture.png"))), "the pixels are seen as they are"
 
 
-@pytest.mark.slow
 def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -247,7 +247,6 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
     assert (before[hole > 0] != after[hole > 0]).any()
 
 
-@pytest.mark.slow
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
     (tmp_path / "ground.png").write_bytes(png(striped()))
@@ -277,7 +276,6 @@ def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     assert page.one(".classes").text.split("\n") == [f"{name}: {100 * n / labels.size:.1f} %" for name, n in wanted]
 
 
-@pytest.mark.slow
 def test_everything_is_done_by_the_keyboard_alone(page):
     def keys(*what):
         ActionChains(page.driver).send_keys(*what).perform()
@@ -321,7 +319,6 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     until(lambda: list(page.folder.glob("texture*.png"))).pop().unlink()
 
 
-@pytest.mark.slow
 def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
@@ -340,7 +337,6 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     chromium.switch_to.window(chromium.window_handles[0])
 
 
-@pytest.mark.slow
 def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_path):
     (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
@@ -368,7 +364,6 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
     chromium.switch_to.window(chromium.window_handles[0])
 
 
-@pytest.mark.slow
 def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -386,7 +381,6 @@ def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, 
 FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
 
 
-@pytest.mark.slow
 def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -394,7 +388,6 @@ def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
     assert not bad and len(page.all(FOCUS)) > 30
 
 
-@pytest.mark.slow
 def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
     shown(page.driver, width=390, height=700)
     page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
@@ -452,7 +445,6 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         assert tops == sorted(tops) and page.one("canvas.view").rect["y"] < 350
 
 
-@pytest.mark.slow
 def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
     shown(page.driver, width=1280, height=720)
     drop(page.driver, wall)
@@ -469,7 +461,6 @@ def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wal
     assert len(page.script("return [...heights]")) == 1
 
 
-@pytest.mark.slow
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.script("page.auto.checked = false")
     file = tmp_path / "moving.gif"
@@ -496,7 +487,6 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     assert "Result 1 is no longer kept" in page.status
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_nothing_keeps_people_out(page, wall, dark):
     shown(page.driver, width=1400, dark=dark)
@@ -507,7 +497,6 @@ def test_nothing_keeps_people_out(page, wall, dark):
     assert page.faults() == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("window", "cell"), [(320, None), (390, None), (820, None), (1400, 300), (1400, 850)])
 def test_it_fits_a_phone_and_a_cell_of_a_notebook(page, wall, window, cell):
     shown(page.driver, width=window)
@@ -521,7 +510,6 @@ def test_it_fits_a_phone_and_a_cell_of_a_notebook(page, wall, window, cell):
     assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(cell or window, 800)
 
 
-@pytest.mark.slow
 def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wall, served):
     page.driver.get_log("browser")
     drop(page.driver, wall)
@@ -584,7 +572,6 @@ def test_a_click_explains_a_pixel(inside):
     assert inside.faults() == []
 
 
-@pytest.mark.slow
 def test_the_time_line_steps_and_plays(inside):
     assert at(inside) is None
     sweeps = inside.script("return page.inside.sweeps")
@@ -610,7 +597,6 @@ def test_the_time_line_steps_and_plays(inside):
     assert 3 < seen[0] < len(sweeps)
 
 
-@pytest.mark.slow
 def test_a_saved_view_brings_all_of_it_back(inside, served):
     inside.choose("Beside it", "Result 2")
     until(lambda: inside.script("return page.inside.panes.length") == 2)
@@ -639,7 +625,6 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
         other.driver.switch_to.window(inside.handle)
 
 
-@pytest.mark.slow
 def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
     inside.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
     inside.result(4)
@@ -652,7 +637,6 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     until(lambda: inside.script("return !page.inside.open"))
 
 
-@pytest.mark.slow
 def test_the_tour_has_five_steps_and_needs_nothing(page):
     page.button("Tour in five steps").click()
     until(lambda: page.one(".tour").is_displayed())
@@ -665,7 +649,6 @@ def test_the_tour_has_five_steps_and_needs_nothing(page):
     assert explained(page)["candidates"], "the tour has explained a pixel"
 
 
-@pytest.mark.slow
 def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
     page.button("brick").click()
     page.result(1)
@@ -685,7 +668,6 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
     until(lambda: page.script("return page.seen") == "faults")
 
 
-@pytest.mark.slow
 def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     sys.path.insert(0, str(ROOT / "docs"))
     import recorded

@@ -230,7 +230,9 @@ def test_a_message_that_is_too_large_ends_the_connection(monkeypatch):
         assert closed.value.rcvd is None or closed.value.rcvd.code == 1009  # None: it was still being sent
 
 
-@pytest.mark.parametrize(("number", "token"), [(signal.SIGINT, ""), (signal.SIGTERM, SECRET)])
+@pytest.mark.parametrize(
+    ("number", "token"), [pytest.param(signal.SIGINT, "", marks=pytest.mark.slow), (signal.SIGTERM, SECRET)]
+)
 def test_the_command_prints_an_address_serves_it_and_ends(number, token, tmp_path):
     (tmp_path / "wall.png").write_bytes(png(texture()))
     process = subprocess.Popen(
@@ -301,6 +303,7 @@ def closed_in_a_run(port, pages):
     return page, session
 
 
+@pytest.mark.slow
 def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
     monkeypatch.setattr(serving, "RUN_KEPT", 0.0)
     with running() as (port, pages):
@@ -313,6 +316,7 @@ def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
         assert not session._thread.is_alive()
 
 
+@pytest.mark.slow
 def test_a_page_that_comes_back_in_time_keeps_its_run(monkeypatch):
     monkeypatch.setattr(serving, "RUN_KEPT", 0.5)
     with running() as (port, pages):

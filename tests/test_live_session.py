@@ -543,7 +543,7 @@ KINDS += ["inside", "seek", "explain"]
     st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=4),
     st.lists(st.binary(max_size=30), max_size=2),
 )
-@settings(max_examples=200)
+@settings(max_examples=60)
 def test_no_message_does_harm(kind, message, buffers):
     HARDY.say(*buffers, **message | {"kind": kind})
     HARDY.ask("hello", kind="hello")
@@ -702,6 +702,7 @@ def test_parts_of_a_large_window_are_the_same(monkeypatch):
     assert render(layer, window) == whole
 
 
+@pytest.mark.slow
 def test_a_coarse_window_of_a_tiled_layer_takes_little_memory():
     window = parse_window({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
     layer = Layer((512, 2**14), np.zeros((512, 2**14, 3), np.uint8), np.asarray)

@@ -64,6 +64,7 @@ def test_a_widget_takes_messages_and_gives_results(monkeypatch):
     live.close()
 
 
+@pytest.mark.slow
 def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
     monkeypatch.setattr(widget.Live, "send", lambda self, message, buffers=None: None)
     live = simdtex.Live(texture(10, 12), channel_axis=-1, device="reference")
@@ -74,7 +75,7 @@ def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
     live._handle_custom_msg(asked(options={"finish": 99}), [])
     with pytest.raises(ValueError, match="finish is 99"):
         live.wait()
-    live._handle_custom_msg(asked(width=600, height=600), [])
+    live._handle_custom_msg(asked(width=150, height=150), [])
     with pytest.raises(TimeoutError, match=r"within 0\.2 s"):
         live.wait(timeout=0.2)
     live._handle_custom_msg({"kind": "cancel"}, [])
@@ -192,6 +193,7 @@ def test_what_cannot_be_shown_is_refused(pictures, titles, words):
         simdtex.show(*pictures, titles=titles)
 
 
+@pytest.mark.slow
 def test_a_script_keeps_no_figure_and_is_not_warned():
     code = (
         "import simdtex, numpy\nfor _ in range(25): simdtex.show(numpy.eye(9)).canvas.draw()\nimport matplotlib.pyplot"
@@ -243,7 +245,7 @@ def test_an_estimate_has_a_map_of_each_category_and_of_the_entropy():
     assert [axes.get_title() for axes in simdtex.show(made).axes[:2]] == ["mean, m", "variance, (m)²"]
 
 
-@pytest.mark.parametrize("ground", [False, True])
+@pytest.mark.parametrize("ground", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_maps_have_north_up_in_plots_and_reports_and_pictures_their_first_row(tmp_path, monkeypatch, ground):
     monkeypatch.chdir(tmp_path)
     write("t.png", HALVES)

@@ -421,10 +421,11 @@ print(simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=sys
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
 @pytest.mark.parametrize(
     "environment",
-    [pytest.param({"HOME": "FILE", "XDG_CACHE_HOME": ""}, marks=pytest.mark.slow), {"XDG_CACHE_HOME": "/proc/nowhere"}],
+    [{"HOME": "FILE", "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}],
 )
 def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environment):
     (tmp_path / "FILE").touch()
@@ -442,10 +443,9 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
     assert os.environ["XDG_CACHE_HOME"] != str(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize(
-    "damaged", ["info", *(pytest.param(one, marks=pytest.mark.slow) for one in ("*.so", "*.bc", "binary", "*.sqlite"))]
-)
+@pytest.mark.parametrize("damaged", ["info", "*.so", "*.bc", "binary", "*.sqlite"])
 def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
     """The first process may crash; the next one warns of the folder, and has the device."""
 

@@ -148,8 +148,9 @@ def test_a_flat_channel_stays_flat(color, dtype):
     assert np.ptp(made[..., 0]) > 0
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3, 5])
-@pytest.mark.parametrize("color", ["decorrelate", "channels"])
+@pytest.mark.parametrize(
+    ("channels", "color"), [(1, "decorrelate"), (3, "decorrelate"), (2, "channels"), (5, "channels")]
+)
 def test_any_number_of_channels_keeps_means_and_covariance(channels, color):
     sample = texture((32, 32), channels, np.float64)
     made = synthesize(sample, (32, 32), channel_axis=-1, color=color)
@@ -330,6 +331,7 @@ def test_grey_mixtures_have_the_pixels_of_one_and_the_bands_of_the_other():
     assert np.mean(like) < 0.6 * np.mean(unlike)
 
 
+@pytest.mark.slow
 def test_one_sample_for_all_is_the_texture_itself():
     for sample, axis in ((GREYS[0], None), (WARM, -1)):
         plain = synthesize_mixtures(sample, (40, 48), channel_axis=axis)

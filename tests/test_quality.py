@@ -57,8 +57,7 @@ def half_size(picture):
     return (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) / 4
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
-@pytest.mark.parametrize("channels", [(), (3,)])
+@pytest.mark.parametrize(("dtype", "channels"), [("uint8", ()), ("uint16", (3,)), ("float32", (3,))])
 def test_nearest_patches_against_loops(dtype, channels):
     sample, output = noise(1, (15, 17, *channels), dtype), noise(2, (16, 18, *channels), dtype)
     output[:9, :10] = sample[3:12, 2:12]
@@ -449,18 +448,15 @@ def below_the_floor(name, search, found):
     return worse
 
 
-QUICK_FLOOR = ("brick", "default")
-
-
-@pytest.mark.parametrize(
-    ("name", "search"), [pytest.param(*key, marks=[pytest.mark.slow] * (key != QUICK_FLOOR)) for key in MEASURED]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "search"), MEASURED)
 def test_quality_stays_above_the_floor(any_device, name, search):
     found = figures_floor(name, search, opencl(any_device))
     assert not below_the_floor(name, search, found), found
 
 
-@pytest.mark.parametrize("name", ["brick", *(pytest.param(one, marks=pytest.mark.slow) for one in SAMPLES[1:])])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SAMPLES)
 def test_a_hasty_relaxation_falls_below_the_floor(any_device, name):
     """One sweep for each site, and no finish that melts what is torn: the floor is high enough to tell."""
     found = figures_floor(name, "default", opencl(any_device), xi=-1000.0, free_sweeps=0, finish=0.0)

@@ -80,7 +80,7 @@ FORMS = st.fixed_dictionaries(
 
 
 @given(p=reflecting(), form=FORMS)
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_a_device_has_the_references_bits(machine, p, form):
     form["density"] &= form["gibbs"] or (form["exact"] and not form["novelty"])
     form["novelty"] *= form["exact"]  # a list knows no novelty
@@ -98,8 +98,15 @@ GIVEN = [
 """Hard data, guides, and a sample that may be used in part."""
 
 
-@pytest.mark.parametrize("form", HOWS, ids=str)
-@pytest.mark.parametrize("how", GIVEN, ids=str)
+@pytest.mark.parametrize(
+    ("how", "form"),
+    [
+        pytest.param(how, form, marks=[pytest.mark.slow] * (n % 4 != m))
+        for n, how in enumerate(GIVEN)
+        for m, form in enumerate(HOWS)
+    ],
+    ids=str,
+)
 def test_a_device_has_the_references_bits_of_what_is_given(machine, how, form):
     p = problem(9, order=8, sample_shape=(11, 12), shape=(13, 17), edges="reflect", count=90, **how)
     assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
@@ -211,21 +218,27 @@ FORMS_OF_LAUNCH = [{}, {"vector": 1, "step": 1}, {"vector": 4, "step": 2}, {"ste
 """The device's own form first; the second is a GPU's."""
 
 
-@pytest.mark.parametrize("options", FORMS_OF_LAUNCH, ids=str)
-@pytest.mark.parametrize("gibbs", [False, True], ids=["icm", "gibbs"])
+SKIPPING = {
+    "runs": {"order": 5, "spacing": 2, "edges": "whole", "phases": "all", "sample_shape": (23, 22)},
+    "short runs": {"order": 5, "spacing": 4, "edges": "reflect", "phases": "all", "sample_shape": (23, 3)},
+    "decimated": {"order": 5, "spacing": 2, "edges": "reflect", "phases": "decimated", "sample_shape": (41, 82)},
+    "large": {"order": 50, "channels": 3, "sample_shape": (33, 31), "regular": True, "between": True, "soft": 2},
+    "masked": {"order": 8, "channels": 2, "sample_shape": (26, 31), "edges": "reflect", "masked": 0.9},
+}
+
+
 @pytest.mark.parametrize(
-    "how",
+    ("how", "gibbs", "options"),
     [
-        {"order": 5, "spacing": 2, "edges": "whole", "phases": "all", "sample_shape": (23, 22)},
-        {"order": 5, "spacing": 4, "edges": "reflect", "phases": "all", "sample_shape": (23, 3)},
-        {"order": 5, "spacing": 2, "edges": "reflect", "phases": "decimated", "sample_shape": (41, 82)},
-        {"order": 50, "channels": 3, "sample_shape": (33, 31), "regular": True, "between": True, "soft": 2},
-        {"order": 8, "channels": 2, "sample_shape": (26, 31), "edges": "reflect", "masked": 0.9},
+        pytest.param(how, gibbs, options, marks=[pytest.mark.slow] * ((n + m + gibbs) % 4 > 0))
+        for n, how in enumerate(SKIPPING)
+        for m, options in enumerate(FORMS_OF_LAUNCH)
+        for gibbs in (False, True)
     ],
-    ids=["runs", "short runs", "decimated", "large", "masked"],
+    ids=str,
 )
 def test_the_exact_search_skips_nothing_that_the_reference_takes(cl_device, how, gibbs, options):
-    p = problem(2, shape=(12, 13), count=24, **how)
+    p = problem(2, shape=(12, 13), count=24, **SKIPPING[how])
     how = {"exact": True, "dear": 0.1, "gibbs": gibbs}
     assert_same_bits(apart(opencl(cl_device, **options), p, **how), apart(REFERENCE, p, **how))
 
@@ -307,9 +320,9 @@ def alike(p):
     return p._replace(grid=grid, field=field, sites=np.arange(grid.size, dtype=np.int32))
 
 
-@pytest.mark.parametrize("coherence", [0.0, 1.0])
-@pytest.mark.parametrize("bandwidth", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize("density", [False, True], ids=["source", "density"])
+@pytest.mark.parametrize(
+    ("density", "bandwidth", "coherence"), [(False, 0.5, 1.0), (False, 2.0, 0.0), (True, 0.5, 0.0), (True, 1.0, 1.0)]
+)
 def test_a_million_draws_follow_the_lcpdf(any_device, bandwidth, coherence, density):
     """Chi-square against equation (7) in float64; the draws are the reference's where a part is compared."""
     machine, p = opencl(any_device), alike(problem(3, order=2, temperatures="zero", sample_shape=(8, 9)))

@@ -167,6 +167,7 @@ def test_ctrl_c_during_imports_ends_with_one_line(tmp_path, way, module):
     assert not (tmp_path / "out.png").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
 def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
     result = interrupted(tmp_path, "module", "click", "4", lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))

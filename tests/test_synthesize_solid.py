@@ -95,8 +95,9 @@ def of_subbands(sample, slices, boundary):
     return [np.mean([moved(a, b) for a, b in zip(*pair, strict=True)]) for pair in pairs]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", ["gravel", pytest.param("grass", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["gravel", "grass"])
 def test_slices_have_the_samples_statistics(blocks, name, way):
     sample, block = sample_of(name), blocks(name, way)
     for family in FAMILIES:
