@@ -130,14 +130,15 @@ def test_tiles_have_the_bytes_of_the_whole(reference, tmp_path, name):
     context.cache_clear()
 
 
-# Work-group size, vector width, candidates in registers, bytes of scratch memory.
+# Work-items that relax a site together, work-group size, vector width, candidates in registers, scratch memory.
 FORMS = [
+    {"items": 32},
     {"vector": 1, "work_group": 16, "step": 8},
     {"vector": 8, "work_group": 1, "step": 1, "scratch": 500},
     {"vector": 4, "work_group": 3, "step": 2, "scratch": 5_000},
     {"vector": 16},
 ]
-FORMED = ("exact-of-many", "density-colour", "more", "multires-luminance", "pyramid-colour")
+FORMED = ("exact-of-many", "density-colour", "more", "synchronous", "multires-luminance", "pyramid-colour")
 
 
 @pytest.mark.parametrize("form", slow_but(FORMS[:1], FORMS), ids=str)

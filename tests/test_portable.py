@@ -10,8 +10,8 @@ from simdtex.machine.opencl import kernel_folder
 
 pytestmark = pytest.mark.skipif(not portable.CLANG, reason=portable.NO_CLANG)
 
-MOST_SCRATCH = 10_240
-"""Bytes of scratch that a kernel may take on a gfx1100, more than the largest in the table."""
+MOST_SCRATCH = {"relax": 640, "lcpdf": 2048}
+"""Bytes of scratch that kernels of a file may take on a gfx1100, of others 640: more than the largest in the table."""
 
 HARMLESS = {
     "CONSIDER(": "total - most only skips noise that cannot matter: most exceeds all noise, and rounding is monotonic",
@@ -80,4 +80,4 @@ def test_the_table_has_what_default_runs_build_and_a_limit_on_scratch(any_device
         if portable.CLANG.endswith("-15"):
             assert found == kernels, "make portable writes the table"
         for kernel, (_, scratch, _) in found.items():
-            assert scratch <= MOST_SCRATCH, f"{kernel} with {build.defines}"
+            assert scratch <= MOST_SCRATCH.get(build.file, 640), f"{kernel} with {build.defines}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import plain
+import pyopencl as cl
 import pytest
 from cases import REFERENCE, assert_same_bits, check_chi_square, host, opencl, problem, texture
 from hypothesis import given, settings
@@ -112,6 +113,30 @@ def test_a_device_has_the_references_bits_of_what_is_given(machine, how, form):
     assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
 
 
+@pytest.mark.parametrize("case", range(6))
+def test_a_group_has_the_references_bits_of_what_is_given(cl_device, case):
+    how, form = [{}, *GIVEN][case], [{"chance": 0}, *HOWS, {"chance": 0}][case]
+    p = problem(9, order=8, sample_shape=(11, 12), shape=(13, 17), edges="reflect", count=90, **how)
+    assert_same_bits(apart(opencl(cl_device, items=48), p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
+
+
+def test_a_group_that_does_not_fit_local_memory_is_one_item(cl_device, monkeypatch):
+    p, machine, seen = problem(1, order=2, count=9), OpenCL(cl_device, items=32), []
+    kernel = machine.kernel
+
+    def noted(function, defines):
+        seen.append((defines.get("ITEMS", 1), kernel(function, defines)))
+        return seen[-1][1]
+
+    monkeypatch.setattr(machine, "kernel", noted)
+    expected = apart(REFERENCE, p, exact=True)
+    assert_same_bits(apart(machine, p, exact=True), expected)
+    takes = seen[0][1].get_work_group_info(cl.kernel_work_group_info.LOCAL_MEM_SIZE, cl_device.handle)
+    monkeypatch.setattr(machine, "local_memory", takes - 1)
+    assert_same_bits(apart(machine, p, exact=True), expected)
+    assert [items for items, _ in seen] == [32, 1]
+
+
 @pytest.mark.parametrize("form", HOWS, ids=str)
 def test_nothing_is_taken_that_may_not_be(form):
     p = problem(3, order=2, channels=2, edges="reflect", masked=0.5, shape=(12, 13))
@@ -214,7 +239,7 @@ def test_each_neighbour_that_is_continued_or_taken_again_costs():
     assert most > 5
 
 
-FORMS_OF_LAUNCH = [{}, {"vector": 1, "step": 1}, {"vector": 4, "step": 2}, {"step": 8, "work_group": 3}]
+FORMS_OF_LAUNCH = [{}, {"items": 48, "step": 2}, {"vector": 4, "step": 1}, {"vector": 1, "step": 8, "work_group": 3}]
 """The device's own form first; the second is a GPU's."""
 
 

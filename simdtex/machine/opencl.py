@@ -354,7 +354,8 @@ class OpenCL:
         kernel = self.kernel(function, defines)
         kernel.set_args(*map(_argument, args))
         items = int(defines.get("ITEMS", 1))
-        group = items if items > 1 else self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
+        group = self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
+        group = items if items > 1 else min(group, self.most_together(kernel))
         for begin, end in groups.tolist():
             kernel.set_arg(2, np.int32(end))
             for first in range(begin, end, LONGEST):
