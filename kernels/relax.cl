@@ -235,7 +235,7 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     many = kept;
 #endif
 
-    const float most = MOST_GUMBEL * g.spread;
+    const float most = PRODUCT(MOST_GUMBEL, g.spread);
     float best = INFINITY;
     int best_at = 0x7fffffff;
 #ifndef EXACT
