@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import psutil
+import pyopencl as cl
 import pytest
 from cases import ising, opencl, texture
 from click.testing import CliRunner
@@ -511,6 +512,31 @@ def python(code, *words, **environment):
     )
     assert result.returncode == 0, result.stderr[-2000:]
     return result.stdout.split()
+
+
+def test_a_buffer_is_taken_again_when_no_array_has_it(cl_device, monkeypatch):
+    machine = OpenCL(cl_device)
+    one = machine.empty((3, 5), np.int32)
+    view, buffer = one.reshape(15), one.data
+    assert machine._pool.active_bytes >= one.nbytes
+    del one
+    assert machine.empty(15, np.int32).data is not buffer, "the view has it"
+    del view
+    assert machine.empty(14, np.int32).data is buffer
+    assert machine._pool.active_bytes == 0
+
+    made = []
+
+    def full(*args):
+        made.append(args)
+        if len(made) == 1:
+            raise cl.MemoryError
+        return buffer
+
+    monkeypatch.setattr(cl, "Buffer", full)
+    kept = machine.empty(1000, np.int32)  # the free ones go, and it is tried again
+    assert machine._pool.active_bytes >= kept.nbytes
+    assert not any(machine._pool._free.values())
 
 
 THREADS = """

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
-import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
 from simdtex.machine import devices
@@ -67,17 +66,66 @@ def kernel_source(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+class Pool:
+    """Buffers of a device that are used again: allocating one takes long.
+
+    A buffer is free as soon as no array has it, since commands of a queue run in order. Threads may share a pool. They
+    may not share `pyopencl.tools.MemoryPool`: while one thread allocates, another may not free a buffer.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context, self._made, self._free = context, 0, dict[int, list[Any]]()
+
+    @property
+    def active_bytes(self) -> int:
+        """Bytes of the buffers that arrays have."""
+        return self._made - sum(size * len(free) for size, free in self._free.items())
+
+    def take(self, size: int) -> Taken:
+        """Return a buffer of at least ``size`` bytes, a quarter more at most."""
+        unit = 1 << max(6, size.bit_length() - 3)
+        size = max(1, -(-size // unit)) * unit
+        free = self._free.setdefault(size, [])
+        try:
+            return Taken(free.pop(), free)
+        except IndexError:
+            pass
+        try:
+            buffer = cl.Buffer(self._context, cl.mem_flags.READ_WRITE, size)
+        except cl.MemoryError:
+            self._made = self.active_bytes
+            for unused in self._free.values():
+                unused.clear()
+            buffer = cl.Buffer(self._context, cl.mem_flags.READ_WRITE, size)
+        self._made += size
+        return Taken(buffer, free)
+
+
+class Taken:
+    """A buffer of a `Pool`, which gets it back in the end."""
+
+    __slots__ = ("buffer", "free")
+
+    def __init__(self, buffer: Any, free: list[Any]) -> None:
+        self.buffer, self.free = buffer, free
+
+    def __del__(self) -> None:
+        """Give the buffer back."""
+        self.free.append(self.buffer)
+
+
 class DeviceArray:
     """A contiguous array on a device: a buffer, a shape and a type.
 
-    ``event`` belongs to the copy that fills the buffer, and keeps the source alive. Creating a `pyopencl.array.Array`
-    takes tens of microseconds, and a step of ten small kernels creates a dozen.
+    ``event`` belongs to the copy that fills the buffer, and keeps the source alive; ``taken`` keeps a buffer of a pool.
+    Creating a `pyopencl.array.Array` takes tens of microseconds, and a step of ten small kernels creates a dozen.
     """
 
-    __slots__ = ("data", "dtype", "event", "nbytes", "shape", "size")
+    __slots__ = ("data", "dtype", "event", "nbytes", "shape", "size", "taken")
 
-    def __init__(self, data: Any, shape: tuple[int, ...], dtype: np.dtype[Any], event: Any = None) -> None:
-        self.data, self.shape, self.dtype, self.event = data, shape, dtype, event
+    def __init__(self, data: Any, shape: tuple[int, ...], dtype: np.dtype[Any], taken: Any = None) -> None:
+        self.data, self.shape, self.dtype, self.taken = data, shape, dtype, taken
+        self.event: Any = None
         self.size = prod(shape)
         self.nbytes = self.size * dtype.itemsize
 
@@ -89,7 +137,9 @@ class DeviceArray:
         """Return an array of another shape in the same memory."""
         wanted = shape if isinstance(shape, tuple) else (shape,)
         assert prod(wanted) == self.size
-        return DeviceArray(self.data, wanted, self.dtype, self.event)
+        result = DeviceArray(self.data, wanted, self.dtype, self.taken)
+        result.event = self.event
+        return result
 
 
 class OpenCL:
@@ -147,8 +197,8 @@ class OpenCL:
             raise ValueError(f"items is {self.items}; give 1, or a multiple of 16 with vector=1 and no work_group")
         self.local_memory = int(device.local_mem_size)
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
-        self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
+        self._lock = RLock()  # threads share the arguments of kernel objects, and the log
+        self._pool = Pool(self.context)
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
         self._counters: DeviceArray | None = None
         self._spared = 0
@@ -203,8 +253,8 @@ class OpenCL:
         kind = np.dtype(dtype)
         size = prod(wanted) * kind.itemsize
         self._check_size(size)
-        with self._lock:
-            return DeviceArray(self._pool.allocate(max(1, size)), wanted, kind)
+        taken = self._pool.take(size)
+        return DeviceArray(taken.buffer, wanted, kind, taken)
 
     def constant(self, array: Any) -> DeviceArray:
         """Return a small table as a device array, uploaded once."""
