@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times whole jobs of ``mrf`` on gravel in one process, to be run in turns with another checkout's (PYTHONPATH=...).
+"""Times whole jobs on gravel in one process, to be run in turns with another checkout's (PYTHONPATH=...).
 
-python benchmarks/jobs.py [--size 256] [--side 128] [--search coherent,exact] [--runs 9] [--fill] [--device TEXT]
+python benchmarks/jobs.py [--size 256] [--side 128] [--jobs coherent,exact] [--runs 9] [--device TEXT]
 
-``--side`` is that of the sample; ``--fill`` only fills a hole of 64x64 in a picture of 1024x1024. Prints the best and
-the median of the runs after the first, and the most memory that the process had.
+``--side`` is that of the sample; the jobs are both searches of ``mrf``, ``multires``, ``pyramid``, ``solid`` (a block),
+and ``fill`` (a hole of 64x64 in a picture of 1024x1024). Prints the best and the median of the runs after the first,
+and the most memory that the process had.
 """
 
 import resource
@@ -19,18 +20,22 @@ import simdtex
 
 
 @common.command
-def main(size=256, side=128, search=("coherent", "exact"), runs=9, fill=False, device=None):
+def main(size=256, side=128, jobs=("coherent", "exact"), runs=9, device=None):
     given = {"rng": 1, "device": simdtex.open_machine(device)}
     sample, shape = data.gravel()[:side, :side], (size, size)
-    jobs = {f"{way:8} {side} -> {size}": partial(simdtex.synthesize, sample, shape, search=way) for way in search}
-    if fill:
-        picture, hole = np.tile(data.gravel(), (2, 2)), np.zeros((1024, 1024), bool)
-        hole[480:544, 480:544] = True
-        jobs = {"fill 64x64 of 1024x1024": partial(simdtex.fill, picture, hole)}
-    for name, job in jobs.items():
+    picture, hole = np.tile(data.gravel(), (2, 2)), np.zeros((1024, 1024), bool)
+    hole[480:544, 480:544] = True
+    known = {
+        **{way: partial(simdtex.synthesize, sample, shape, search=way) for way in ("coherent", "exact")},
+        **{method: partial(simdtex.synthesize, sample, shape, method=method) for method in ("multires", "pyramid")},
+        "solid": partial(simdtex.synthesize_solid, sample, (size, *shape)),
+        "fill": partial(simdtex.fill, picture, hole),
+    }
+    for name in jobs:
+        job = known[name]
         seconds = common.in_turns(runs, {name: lambda job=job: common.timed(job, **given)[1]})[name]
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(f"{name}: best {min(seconds):.3f} s, median {median(seconds):.3f} s, {memory:.0f} MiB")
+        print(f"{name} {side} -> {size}: best {min(seconds):.3f} s, median {median(seconds):.3f} s, {memory:.0f} MiB")
 
 
 if __name__ == "__main__":
