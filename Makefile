@@ -71,7 +71,7 @@ quick:
 slow:
 	$(call install,slow,[slow])
 	$(device)
-	@$(PY) -m pytest -m slow
+	@$(PY) -m pytest -m slow --numprocesses $(JOBS) --maxprocesses 4 --dist loadfile
 
 portable:
 	$(call install,test,[test])
