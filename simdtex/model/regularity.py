@@ -298,11 +298,7 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
     if min(picture.shape) < LEAST_SIDE or not known.any():
         return None
     correlation = autocorrelation(picture, known)
-    best: list[tuple[float, Lattice, float]] = []
-    for pair in candidates(correlation):
-        found = followed(correlation, pair)
-        if found is not None:
-            best.append(found)
+    best = followed(correlation, candidates(correlation))
     if not best:
         return None
     most = max(strength for strength, *_ in best)
@@ -421,41 +417,49 @@ def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.array(kept, np.int64).reshape(-1, 2, 2)
 
 
-def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, Lattice, float] | None:
-    """Return the strength of a lattice, its vectors fitted to the peaks near its nodes, and the strength's error.
+def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[tuple[float, Lattice, float]]:
+    """Return the strength of each lattice, its vectors fitted to the peaks near its nodes, and the strength's error.
 
-    The strength is the mean autocorrelation over all nodes but the origin.
+    The strength is the mean autocorrelation over all nodes but the origin. Lattices without enough nodes are left out.
+    All are followed together, since their nodes are few.
     """
-    basis, reach, away = pair.astype(np.float64), np.array(correlation.reach), 1
-    while True:  # up to farther nodes as the vectors become exact
-        nodes, lags = _nodes(basis, reach, away)
-        every = away > 2 * np.abs(nodes).max(initial=0)
-        fitted = _least_squares(nodes, summits(correlation.values, lags))
-        if fitted is None or abs(_determinant(fitted)) < LEAST_CELL:
-            return None
-        basis, away = fitted, 2 * away
-        if every:
-            break
-    _, lags = _nodes(basis, reach, away)
-    at = np.rint(lags).astype(int) + reach
-    strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
-    half = (basis**2).sum(1).min() / 4
-    core = correlation.values[correlation.length <= half]
-    error = sqrt(float((core**2).sum()) / correlation.pixels)
-    return strength, _lattice(np.rint(basis * FINE) / FINE), error
+    bases, reach, away = pairs.astype(np.float64), np.array(correlation.reach), 1
+    steps, left = np.ones(len(pairs), np.int64), np.arange(len(pairs))
+    while left.size:  # up to farther nodes as the vectors become exact
+        owner, nodes, lags = _nodes(bases[left], reach, steps[left])
+        far = np.zeros(left.size)
+        np.maximum.at(far, owner, np.abs(nodes).max(1))
+        bases[left] = _least_squares(owner, nodes, summits(correlation.values, lags), left.size)
+        steps[left] *= 2
+        left, away = left[(np.abs(_determinant(bases[left])) >= LEAST_CELL) & (away <= 2 * far)], 2 * away
+    bases = bases[np.abs(_determinant(bases)) >= LEAST_CELL]
+    found = []
+    for basis, (_, _, lags) in ((basis, _nodes(basis[None], reach, np.array([away]))) for basis in bases):
+        at = np.rint(lags).astype(int) + reach
+        strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
+        core = correlation.values[correlation.length <= (basis**2).sum(1).min() / 4]
+        error = sqrt(float((core**2).sum()) / correlation.pixels)
+        found.append((strength, _lattice(np.rint(basis * FINE) / FINE), error))
+    return found
 
 
 def _nodes(
-    basis: NDArray[np.float64], reach: NDArray[np.int64], away: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the nodes (n, 2) of a lattice within ``away`` steps, without the origin, and their lags (n, 2)."""
-    limit = np.minimum(away, np.ceil(np.abs(_inverse(basis)).T @ reach)).astype(int)  # of the window's corners
-    i, j = (np.arange(-n, n + 1, dtype=np.float64) for n in limit)
-    nodes = np.stack([np.repeat(i, j.size), np.tile(j, i.size)], 1)
-    nodes = np.concatenate([nodes[: len(nodes) // 2], nodes[len(nodes) // 2 + 1 :]])
-    lags = nodes @ basis
-    inside = (np.abs(lags) <= reach - 2).all(1)
-    return nodes[inside], lags[inside]
+    bases: NDArray[np.float64], reach: NDArray[np.int64], away: NDArray[np.int64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the nodes of lattices (n, 2, 2) within ``away`` (n,) steps, without the origins.
+
+    These are the number of the lattice of each (k,), the node (k, 2), and its lag (k, 2).
+    """
+    corners = (np.abs(_inverse(bases)) * reach[:, None]).sum(1)  # of the window
+    limits = np.minimum(away[:, None], np.ceil(corners)).astype(np.int64)
+    sides = 2 * limits + 1
+    sizes = sides.prod(1)
+    owner = np.repeat(np.arange(len(bases)), sizes)
+    at = np.arange(owner.size) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    nodes = (np.stack([at // sides[owner, 1], at % sides[owner, 1]], 1) - limits[owner]).astype(np.float64)
+    lags = nodes[:, :1] * bases[owner, 0] + nodes[:, 1:] * bases[owner, 1]
+    inside = (np.abs(lags) <= reach - 2).all(1) & nodes.any(1)
+    return owner[inside], nodes[inside], lags[inside]
 
 
 def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -478,10 +482,20 @@ def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[n
     return shifted
 
 
-def _least_squares(nodes: NDArray[np.float64], peaks: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return the basis (2, 2) for which ``nodes @ basis`` is nearest to ``peaks``; None if it is not determined."""
-    square = nodes.T @ nodes
-    return None if abs(_determinant(square)) < 1e-9 else _inverse(square) @ (nodes.T @ peaks)
+def _least_squares(
+    owner: NDArray[np.intp], nodes: NDArray[np.float64], peaks: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the bases (count, 2, 2) for which ``nodes @ basis`` is nearest to ``peaks``, 0 if not determined."""
+
+    def sums(one: NDArray[np.float64]) -> NDArray[np.float64]:
+        products: list[Any] = [np.bincount(owner, x * y, count) for x in nodes.T for y in one.T]
+        return np.stack(products, 1).reshape(count, 2, 2)
+
+    square, right = sums(nodes), sums(peaks)
+    known = np.abs(_determinant(square)) >= 1e-9
+    found = np.zeros((count, 2, 2))
+    found[known] = _inverse(square[known]) @ right[known]
+    return found
 
 
 def harmonics(picture: NDArray[np.int64], known: NDArray[np.bool_], lattice: Lattice) -> NDArray[np.complex128]:
@@ -518,13 +532,14 @@ def _continued(
 
 
 def _determinant(matrix: NDArray[np.float64]) -> Any:
-    return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+    return matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
 
 
 def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse of a matrix (2, 2), by Cramer's rule."""
-    turned = np.array([[matrix[1, 1], -matrix[0, 1]], [-matrix[1, 0], matrix[0, 0]]])
-    found: NDArray[np.float64] = turned / _determinant(matrix)
+    """Return the inverses of matrices (..., 2, 2), by Cramer's rule."""
+    (a, b), (c, d) = np.moveaxis(matrix, (-2, -1), (0, 1))
+    turned = np.stack([d, -b, -c, a], -1).reshape(matrix.shape)
+    found: NDArray[np.float64] = turned / _determinant(matrix)[..., None, None]
     return found
 
 
