@@ -188,7 +188,7 @@ class OpenCL:
         # PoCL compiles once for each work-group size, so there is only one.
         self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None
         device, grouped = self.context.devices[0], on_gpu and not work_group and vector in (None, 1)
-        self.items = items or (min(ITEMS, int(device.max_work_group_size)) if grouped else 1)
+        self.items = items or (min(ITEMS, int(device.max_work_group_size) // 16 * 16) if grouped else 0) or 1
         self.vector = vector or (1 if on_gpu or self.items > 1 else 16)
         self.step = step or 4
         if self.step not in (1, 2, 4, 8):
