@@ -11,7 +11,7 @@ from simdtex.machine.opencl import OpenCL
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "concepts" / "cost.rst").read_text(encoding="utf-8").partition("\n.. _launches:\n")[2]
-KERNEL = re.compile(r"__kernel\s+(?:__attribute__\s*\(\(.*?\)\)\s*)?void\s+(\w+)", re.DOTALL)
+KERNEL = re.compile(r"__kernel\s+(?:[A-Z]+\s+)?void\s+(\w+)")
 
 
 def functions():
