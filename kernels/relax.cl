@@ -35,7 +35,7 @@
 #define STRIDE(S, g) g.area
 #endif
 #ifndef SLOTS
-#define SLOTS 64 // candidates that a site may have
+#define SLOTS 64 // proposals that a site may have
 #endif
 #define SUGGESTING 12 // nearest neighbours that suggest a candidate each
 #ifdef EXACT
@@ -47,7 +47,7 @@
 #define RAW SLOTS
 #define LISTED SLOTS
 #endif
-#define AGAIN 4       // what being a neighbour's source costs, over continuing it
+#define AGAIN 4    // what being a neighbour's source costs, over continuing it
 #ifndef N
 #define N 64 // most neighbours
 #endif
@@ -151,18 +151,18 @@ static inline float repeated(const int p, const SHARED int *next, const SHARED i
 // noise                 cumulative kernel of equation (7) over grey levels: common/parzen.h
 // work                  in and out: candidates that each site has evaluated; EXACT: multiply-adds of site s
 __kernel GROUP void relax(__global const int *restrict sites, const int first, const int S, __global ushort *values,
-                    __global int *source, __global ushort *temperature, const Level g,
-                    __global const int *restrict offsets, __global const int *restrict reach,
-                    __global const int *restrict index_of, __global const int *restrict positions,
-                    __global const float *restrict disc, __global const int2 *restrict looks, COSTS,
-                    __global const uint *restrict noise, const uint turn,
+                          __global int *source, __global ushort *temperature, const Level g,
+                          __global const int *restrict offsets, __global const int *restrict reach,
+                          __global const int *restrict index_of, __global const int *restrict positions,
+                          __global const float *restrict disc, __global const int2 *restrict looks, COSTS,
+                          __global const uint *restrict noise, const uint turn,
 #ifdef EXACT
-                    __global ulong *restrict work,
+                          __global ulong *restrict work,
 #else
-                    __global int *restrict work,
+                          __global int *restrict work,
 #endif
-                    __global ushort *restrict new_values, __global int *restrict new_source,
-                    __global ushort *restrict new_temperature)
+                          __global ushort *restrict new_values, __global int *restrict new_source,
+                          __global ushort *restrict new_temperature)
 {
 #if ITEMS > 1
     const int s = first + (int)get_group_id(0);

@@ -433,3 +433,11 @@ def test_the_work_is_counted(cl_device):
         channels = 2  # one of them the structure channel
         assert level["fma"] == round(2 * 24 * channels * level["weighed"] * level["relaxations"])
     assert levels[0]["weighed"] == levels[0]["candidates"], "the coarsest level is exact"
+
+
+@pytest.mark.parametrize("form", [{}, {"items": 32}], ids=str)
+def test_more_candidates_are_drawn_than_there_are(cl_device, form):
+    p = problem(4, order=8, sample_shape=(9, 8), shape=(7, 9), edges="reflect", count=40)
+    ours, theirs = (apart(m, p, chance=300) for m in (opencl(cl_device, **form), REFERENCE))
+    assert_same_bits(ours, theirs)
+    assert 64 < ours[-1].max() < 300, "more proposals than candidates, which a list of those would not hold"

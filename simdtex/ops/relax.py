@@ -289,7 +289,7 @@ def _kernel(
         terms = (relaxation.offsets.shape[0] + bool(relaxation.confidences.guides)) * len(field.values)
         work = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)
     else:
-        defines["SLOTS"] = -(-proposal.slots // 64) * 64
+        defines["SLOTS"] = -(-most_listed(proposal.neighbours, proposal.chance) // 64) * 64
     if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
     return defines, [*arguments, machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
