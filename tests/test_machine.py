@@ -525,16 +525,18 @@ def test_a_buffer_is_taken_again_when_no_array_has_it(cl_device, monkeypatch):
     assert machine.empty(14, np.int32).data is buffer
     assert machine._pool.active_bytes == 0
 
-    made = []
+    new, sizes = machine._pool._new, []
 
-    def full(*args):
-        made.append(args)
-        if len(made) == 1:
+    def full(size):
+        sizes.append(size)
+        if len(sizes) == 1:
             raise cl.MemoryError
-        return buffer
+        return new(size)
 
-    monkeypatch.setattr(cl, "Buffer", full)
+    monkeypatch.setattr(machine._pool, "_new", full)
+    monkeypatch.setattr(machine._pool, "_largest", 4001)
     kept = machine.empty(1000, np.int32)  # the free ones go, and it is tried again
+    assert sizes == [4001, 4001], "no more than the device allows"
     assert machine._pool.active_bytes >= kept.nbytes
     assert not any(machine._pool._free.values())
 

@@ -73,8 +73,8 @@ class Pool:
     may not share `pyopencl.tools.MemoryPool`: while one thread allocates, another may not free a buffer.
     """
 
-    def __init__(self, context: Any) -> None:
-        self._context, self._made, self._free = context, 0, dict[int, list[Any]]()
+    def __init__(self, queue: Any, largest: int) -> None:
+        self._queue, self._largest, self._made, self._free = queue, largest, 0, dict[int, list[Any]]()
 
     @property
     def active_bytes(self) -> int:
@@ -85,20 +85,28 @@ class Pool:
         """Return a buffer of at least ``size`` bytes, a quarter more at most."""
         unit = 1 << max(6, size.bit_length() - 3)
         size = max(1, -(-size // unit)) * unit
+        if self._largest > 0:
+            size = min(size, self._largest)
         free = self._free.setdefault(size, [])
         try:
             return Taken(free.pop(), free)
         except IndexError:
             pass
         try:
-            buffer = cl.Buffer(self._context, cl.mem_flags.READ_WRITE, size)
+            buffer = self._new(size)
         except cl.MemoryError:
             self._made = self.active_bytes
             for unused in self._free.values():
                 unused.clear()
-            buffer = cl.Buffer(self._context, cl.mem_flags.READ_WRITE, size)
+            buffer = self._new(size)
         self._made += size
         return Taken(buffer, free)
+
+    def _new(self, size: int) -> Any:
+        """Return a buffer to which a byte was copied, since some runtimes only then find that there is no memory."""
+        buffer = cl.Buffer(self._queue.context, cl.mem_flags.READ_WRITE, size)
+        cl.enqueue_copy(self._queue, buffer, np.zeros(1, np.uint8))
+        return buffer
 
 
 class Taken:
@@ -198,7 +206,7 @@ class OpenCL:
         self.local_memory = int(device.local_mem_size)
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self._lock = RLock()  # threads share the arguments of kernel objects, and the log
-        self._pool = Pool(self.context)
+        self._pool = Pool(self.queue, info.largest)
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
         self._counters: DeviceArray | None = None
         self._spared = 0
