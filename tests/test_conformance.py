@@ -149,6 +149,12 @@ def test_the_form_of_a_launch_changes_no_bit(cl_device, reference, form):
         check(name, machine, reference)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in ON_DEVICES if name in RUNS])
+def test_a_gpus_form_has_the_references_bits(any_device, reference, name):
+    check(name, opencl(any_device, items=64), reference)
+
+
 def test_small_scratch_memory_makes_many_pieces(cl_device):
     """Else the test above would show nothing."""
     small, large = opencl(cl_device, scratch=5_000, vector=4), opencl(cl_device)
