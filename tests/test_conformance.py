@@ -138,14 +138,14 @@ FORMS = [
     {"vector": 4, "work_group": 3, "step": 2, "scratch": 5_000},
     {"vector": 16},
 ]
-FORMED = ("exact-of-many", "density-colour", "more", "synchronous", "multires-luminance", "pyramid-colour")
+FORMED = ("exact-of-many", "more", "synchronous", "density-colour", "multires-luminance", "pyramid-colour")
 
 
 @pytest.mark.parametrize("form", slow_but(FORMS[:1], FORMS), ids=str)
 def test_the_form_of_a_launch_changes_no_bit(cl_device, reference, form):
     """Runs one after another on one machine, whose memory pool keeps nothing of the run before."""
     machine = opencl(cl_device, **form)
-    for name in FORMED:
+    for name in FORMED[:3] if "items" in form else FORMED:  # the others have the programs of the next form
         check(name, machine, reference)
 
 

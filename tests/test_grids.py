@@ -774,6 +774,7 @@ def test_what_is_no_data_array_is_refused(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_an_interrupt_waits_until_a_netcdf_file_is_closed(tmp_path, monkeypatch):
     """A file that is half open prints a traceback when it is collected."""
     interrupted, flush = [], h5netcdf.core.File.flush

@@ -210,6 +210,7 @@ def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, tor
     assert count == wanted.max() + 1
 
 
+@pytest.mark.slow
 def test_colours_beyond_a_word_and_on_a_device(machine):
     for each, shape, order in ((machine, (13, 11), 8), (REFERENCE, (11, 11), 40)):
         mp1, grid = MP1(each, ProcessorArray(8, 8), shape), Grid(shape)

@@ -4,7 +4,7 @@ import numpy as np
 import plain
 import pyopencl as cl
 import pytest
-from cases import REFERENCE, assert_same_bits, check_chi_square, host, opencl, problem, texture
+from cases import REFERENCE, assert_same_bits, check_chi_square, host, opencl, problem, slow_but, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -113,7 +113,7 @@ def test_a_device_has_the_references_bits_of_what_is_given(machine, how, form):
     assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
 
 
-@pytest.mark.parametrize("case", range(6))
+@pytest.mark.parametrize("case", slow_but((0, 3), range(6)))
 def test_a_group_has_the_references_bits_of_what_is_given(cl_device, case):
     how, form = [{}, *GIVEN][case], [{"chance": 0}, *HOWS, {"chance": 0}][case]
     p = problem(9, order=8, sample_shape=(11, 12), shape=(13, 17), edges="reflect", count=90, **how)
