@@ -111,7 +111,6 @@ static inline float repeated(const int p, const SHARED int *next, const SHARED i
 #define EVALUATE(m, coherent)                                                                                          \
     for (int k_ = 0; k_ < (m); ++k_)                                                                                   \
         CONSIDER(DISTANCE(list[k_]), list[k_], FACTOR(k_, coherent))
-#define DISTANCE(p) distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride)
 #else
 #define ABREAST (ITEMS / 16)
 #define EVALUATE(m, coherent)                                                                                          \

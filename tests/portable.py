@@ -22,7 +22,7 @@ from runs import RUNS, Run, call, hole, volume
 
 import simdtex
 from simdtex.machine import devices
-from simdtex.machine.opencl import NONE, OpenCL, kernel_source
+from simdtex.machine.opencl import NONE, OpenCL, kernel_file, kernel_source
 
 TABLE = Path(__file__).resolve().parent.parent / "docs" / "devices" / "builds.csv"
 COLUMNS = ("file", "defines", "kernel", "gfx1100 registers", "gfx1100 scratch", "sm_86 local memory")
@@ -76,9 +76,8 @@ def builds() -> list[Build]:
     found, kernel, listed = set(), OpenCL.kernel, devices.devices
 
     def noted(self, function, defines=NONE):
-        words = function.split("_")
         constants = " ".join(f"{key}={defines[key]}" for key in sorted(defines))
-        found.add(Build("/".join(words[:2]) if words[0] == "maspar" else words[0], constants))
+        found.add(Build(kernel_file(function), constants))
         return kernel(self, function, defines)
 
     def pretended(probe=True):

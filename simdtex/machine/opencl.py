@@ -66,6 +66,12 @@ def kernel_source(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def kernel_file(function: str) -> str:
+    """Return the file of a kernel, without its ending: the first word of its name, of the folder maspar the second."""
+    words = function.split("_")
+    return "/".join(words[:2]) if words[0] == "maspar" else words[0]
+
+
 class Pool:
     """Buffers of a device that are used again: allocating one takes long.
 
@@ -356,12 +362,8 @@ class OpenCL:
         return max(1, min(fit, int(4e9) // (2 * candidates * neighbours * channels)))
 
     def kernel(self, function: str, defines: Mapping[str, int | str] = NONE) -> Any:
-        """Return a kernel, compiled once for these -D constants.
-
-        Its file is the first word of its name, or the second in the folder of the first if that is "maspar".
-        """
-        words = function.split("_")
-        file = "/".join(words[:2]) if words[0] == "maspar" else words[0]
+        """Return a kernel, compiled once for these -D constants."""
+        file = kernel_file(function)
         options = " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = ONE_PROGRAM if file in ONE_PROGRAM and not defines else (file,)
         if (files, options) not in self._kernels:

@@ -424,18 +424,18 @@ def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[tuple[f
     All are followed together, since their nodes are few.
     """
     bases, reach, away = pairs.astype(np.float64), np.array(correlation.reach), 1
-    steps, left = np.ones(len(pairs), np.int64), np.arange(len(pairs))
+    left = np.arange(len(pairs))
     while left.size:  # up to farther nodes as the vectors become exact
-        owner, nodes, lags = _nodes(bases[left], reach, steps[left])
+        owner, nodes, lags = _nodes(bases[left], reach, away)
         far = np.zeros(left.size)
         np.maximum.at(far, owner, np.abs(nodes).max(1))
         bases[left] = _least_squares(owner, nodes, summits(correlation.values, lags), left.size)
-        steps[left] *= 2
         left, away = left[(np.abs(_determinant(bases[left])) >= LEAST_CELL) & (away <= 2 * far)], 2 * away
     bases = bases[np.abs(_determinant(bases)) >= LEAST_CELL]
+    owner, _, lags = _nodes(bases, reach, away)
     found = []
-    for basis, (_, _, lags) in ((basis, _nodes(basis[None], reach, np.array([away]))) for basis in bases):
-        at = np.rint(lags).astype(int) + reach
+    for number, basis in enumerate(bases):
+        at = np.rint(lags[owner == number]).astype(int) + reach
         strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
         core = correlation.values[correlation.length <= (basis**2).sum(1).min() / 4]
         error = sqrt(float((core**2).sum()) / correlation.pixels)
@@ -444,14 +444,14 @@ def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[tuple[f
 
 
 def _nodes(
-    bases: NDArray[np.float64], reach: NDArray[np.int64], away: NDArray[np.int64]
+    bases: NDArray[np.float64], reach: NDArray[np.int64], away: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the nodes of lattices (n, 2, 2) within ``away`` (n,) steps, without the origins.
+    """Return the nodes of lattices (n, 2, 2) within ``away`` steps, without the origins.
 
     These are the number of the lattice of each (k,), the node (k, 2), and its lag (k, 2).
     """
     corners = (np.abs(_inverse(bases)) * reach[:, None]).sum(1)  # of the window
-    limits = np.minimum(away[:, None], np.ceil(corners)).astype(np.int64)
+    limits = np.minimum(away, np.ceil(corners)).astype(np.int64)
     sides = 2 * limits + 1
     sizes = sides.prod(1)
     owner = np.repeat(np.arange(len(bases)), sizes)
