@@ -128,7 +128,7 @@ static inline int candidates_below(const Parents *own, const int row, const int 
 
 // What the scan needs to know of pixel (i, j); it is the same for its siblings.
 static inline void find_parents(Parents *own, __global const int4 *synthesis, __global const int *source, const int match,
-                         const int i, const int j)
+                                const int i, const int j)
 {
     const int level = own->level;
     const int4 tile = own->analysis[level], above = own->analysis[level + 1];

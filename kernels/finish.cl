@@ -18,7 +18,7 @@
 // out     (C, count)           for the sites first .. first + count - 1, row by row
 // One work-item per site.
 static inline int within(const int row, const int col, const int pitch, const int margin, const int rows, const int cols,
-                  __global const uchar *restrict inside)
+                         __global const uchar *restrict inside)
 {
     if (row < margin || row >= margin + rows || col < margin || col >= margin + cols)
         return -1;

@@ -34,7 +34,7 @@ static inline int beside(const int i, const int n, const int torus)
 // 2up(G_{i+1}) at pixel (i, j) of level i. In each direction the first child of a pixel takes (1, 6, 1) / 8 around it,
 // the second (4, 4) / 8. Level i is made of tiles of tile_rows x tile_cols pixels, `coarse` of tiles of half as many.
 static inline int expanded(__global const int *coarse, const int rows, const int cols, const int tile_rows,
-                    const int tile_cols, const int torus, const int i, const int j)
+                           const int tile_cols, const int torus, const int i, const int j)
 {
     const int weight[2][3] = {{1, 6, 1}, {0, 4, 4}};
     const int p = i % tile_rows, q = j % tile_cols;
@@ -65,7 +65,7 @@ __kernel void laplacian_band(__global const int *restrict fine, __global const i
 // Pixel (i, j) of L_i of the output where pieces of the sample that meet fade into each other: (1, 2, 1) / 4 in each
 // direction of what the neighbours, and the pixel itself, were copied from would go on with here.
 static inline int joined(__global const int *band, const int tile_rows, const int tile_cols, const int torus,
-                  __global const int *source, const int rows, const int cols, const int i, const int j)
+                         __global const int *source, const int rows, const int cols, const int i, const int j)
 {
     int sum = 0;
     for (int a = -1; a <= 1; ++a)

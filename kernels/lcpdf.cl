@@ -21,7 +21,7 @@
 
 // W_p times the kernel of equation (7) around y_p, at grey levels x_c in all channels but one.
 static inline ulong weight_at(ulong w, __global const float *y, const int plane, const __private int *x, const int but,
-                       __global const float *window, const int radius)
+                              __global const float *window, const int radius)
 {
     for (int c = 0; c < CHANNELS && w; ++c)
         if (c != but)

@@ -69,7 +69,7 @@
 
 // -G of candidate p; of a density, more by the logarithm of the share of the kernel around it that is legal.
 static inline float noise_of(const Level g, const uint turn, const ulong place, const int p, __global const float *y,
-                      __global const uint *noise)
+                             __global const uint *noise)
 {
     const int row = p / g.cols, col = p % g.cols, run = row * g.runs + col % g.runs, n = col / g.runs;
     float found = minus_gumbel_of(g.seed, g.level, turn, place, run * WIDTH(g) + n / LANES, n % LANES);

@@ -51,7 +51,7 @@ __kernel void solid_reduce(__global const int *restrict fine, const int first, c
 // 2up(G_{i+1}) at the eight children of voxel (slice, i, j) of G_{i+1}, child 4 a + 2 b + c at a slices, b rows and
 // c columns on. In each direction the first child takes (1, 6, 1) / 8 around its parent, the second (4, 4) / 8.
 static inline void expanded(__global const int *coarse, const int depth, const int rows, const int cols,
-                     const int slice, const int i, const int j, int *up)
+                            const int slice, const int i, const int j, int *up)
 {
     int row[3], flat[3][4];
     for (int b = 0; b < 3; ++b)

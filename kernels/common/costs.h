@@ -60,7 +60,7 @@
 #endif
 
 static inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
-                            const float weight, const float tolerance)
+                                   const float weight, const float tolerance)
 {
     float d = 0.0f;
     for (int c = 0; c < WAVES; ++c) {
@@ -79,7 +79,7 @@ static inline float of_kind(__global const ushort *kind, const int listed, __glo
 }
 
 static inline float misfit(const int begin, const int end, __global const int *reach, __global const ushort *told,
-                    const float hard, __global const float *y, const int plane)
+                           const float hard, __global const float *y, const int plane)
 {
     float d = 0.0f;
     for (int n = begin; n < end; ++n)

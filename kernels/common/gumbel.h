@@ -35,7 +35,7 @@ __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 1
 
 // The words of the draws `first`, `first` + 1, ... side by side.
 static inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
-                     __private uvec *word)
+                            __private uvec *word)
 {
     uvec a = (uvec)(uint)place, b = (uvec)turn, c = (uvec)WHAT_OF(level, place, PURPOSE_GUMBEL), d = LOAD(lanes_) + first;
     PHILOX(a, b, c, d, KEY_OF(seed), WIDE(ulong), WIDE(convert_ulong), WIDE(convert_uint))
@@ -46,7 +46,7 @@ static inline void words_of(const ulong seed, const uint level, const uint turn,
 }
 
 static inline float minus_gumbel_of(const ulong seed, const uint level, const uint turn, const ulong place, const int unit,
-                             const int lane)
+                                    const int lane)
 {
     const uint4 bits = draw4(seed, level, turn, place, PURPOSE_GUMBEL, DRAW_OF(unit, lane));
     const uint word = unit & 2 ? (unit & 1 ? bits.w : bits.z) : (unit & 1 ? bits.y : bits.x);

@@ -42,7 +42,7 @@ static inline uint4 philox(const uint4 counter, const uint2 key)
 #define WHAT_OF(level, site, purpose) ((uint)((site) >> 32) << 16 | (level) << 8 | (purpose))
 
 static inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ulong site, const uint purpose,
-                   const uint attempt)
+                          const uint attempt)
 {
     return philox((uint4)((uint)site, turn, WHAT_OF(level, site, purpose), attempt), KEY_OF(seed));
 }

@@ -59,7 +59,7 @@ static inline void rows_around(const Lattice g, const int i, __private int *row)
 
 // Number of the neighbour in row a and column b of the square; -1 where there is none. -D TILES: see lattice.h.
 static inline int in_square(const Lattice g, const int site, const int i, const int j, const __private int *row,
-                     const __private int *col, const int a, const int b)
+                            const __private int *col, const int a, const int b)
 {
     if (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site)
         return -1;

@@ -41,7 +41,7 @@ __kernel void maspar_lcpdf_keep(ARRAY, PLURAL(float, near), const int n, PLURAL(
 // Equation (12): each term two fused multiply-adds, the neighbours of a lane row by row; then lanes n and n + 8 are
 // added, n and n + 4, n and n + 2, n and n + 1.
 static inline void distances(__global const float *restrict y, const int size, __global const int *restrict lanes,
-                      __global const float *z, __private float *d)
+                             __global const float *z, __private float *d)
 {
     vec sum[LANES][STEP];
     for (int n = 0; n < LANES; ++n) {
