@@ -36,8 +36,11 @@ def opencl(info, **options):
 
 
 def slow_but(quick, every):
-    """Parameters of a test, of which all but the quick ones are slow."""
-    return [pytest.param(one, marks=[pytest.mark.slow] * (one not in quick)) for one in every]
+    """Parameters of a test, of which all but the quick ones are slow; a tuple is of several parameters."""
+    return [
+        pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=[pytest.mark.slow] * (one not in quick))
+        for one in every
+    ]
 
 
 def texture(shape, channels=None, dtype=np.uint8, seed=0):

@@ -42,8 +42,15 @@ def pixels(store):
     return zarr.open_group(store, mode="r")["image"][...]
 
 
-def test_tiles_have_the_bytes_of_a_picture(folder):
-    args = ("grey.png", "--known", "known.png", "--guide", "from.png=to.png")
+@pytest.mark.parametrize(
+    "args",
+    [
+        pytest.param(["colour.png"], marks=pytest.mark.slow),
+        ["grey.png", "--known", "known.png", "--guide", "from.png=to.png"],
+    ],
+    ids=str,
+)
+def test_tiles_have_the_bytes_of_a_picture(folder, args):
     whole, tiles = (
         run("synth", *args, "-o", "whole.png", *OPTIONS),
         run("synth", *args, "-o", "o.zarr", "--tiles", 24, *OPTIONS),

@@ -1,11 +1,12 @@
 """The field of a level: its start, temperatures, active sites, the end of a step, and the picture that tiles see."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, problem, problems, texture
+from cases import REFERENCE, assert_same_bits, host, problem, problems, slow_but, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
@@ -329,7 +330,11 @@ def test_a_neighbourhood_reads_the_older_picture_across_an_edge(options):
             assert np.array_equal(values[k, :, s], seen.values[(slice(None), *r)])
 
 
-@pytest.mark.parametrize(("options", "exact"), [(one, n % 2 > 0) for n, one in enumerate(TILED)], ids=str)
+@pytest.mark.parametrize(
+    ("options", "exact"),
+    slow_but([(one, n % 2 > 0) for n, one in enumerate(TILED)], product(TILED, (False, True))),
+    ids=str,
+)
 def test_every_reader_has_its_twins_bits_on_a_device(machine, options, exact):
     p, now, _ = tiled(2, **options)
     how = {"exact": exact, "coherence": 1.0}

@@ -223,11 +223,12 @@ def test_a_source_names_its_sample(search):
 def test_shares_are_about_kept(search):
     samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
     found = {}
-    for first in (1.0, 4.0):  # of one run they vary by 0.15
+    for first in (1.0, 2.5, 4.0):  # of one run they vary by 0.15
         options = {"search": search, "order": 4, "shares": (first, 5.0 - first)}
-        runs = [run(samples, (32, 32), rng, **options)[1] for rng in range(2)]
+        runs = [run(samples, (32, 32), rng, **options)[1] for rng in range(3)]
         found[first] = np.mean([output.source[..., 2] == 0 for output in runs])
     assert abs(found[1.0] - 0.2) < 0.15
+    assert abs(found[2.5] - 0.5) < 0.15
     assert abs(found[4.0] - 0.8) < 0.15
 
 

@@ -123,7 +123,7 @@ def test_each_cell_is_from_the_training_image_of_its_number():
     assert (both[:, number == 0] == 0).all() and (both[:, number == 1] == 0).any()
     few = [
         (simdtex.simulate(images, 2, **options, image_map=of([1 - p, p]), source=True).source_image == 1).mean().item()
-        for p in (0.05, 0.95)
+        for p in (0.05, 0.4, 0.95)
     ]
     assert few == sorted(few) and few[0] < few[-1]
 

@@ -170,7 +170,7 @@ def test_bad_input_is_one_clear_sentence(change, error, words):
         simdtex.lcpdf(**options)
 
 
-DRAWS = 2_000
+DRAWS = 5_000
 SEEDS = (1, 2**33 + 7, 2**64 - 1)
 
 
@@ -200,11 +200,13 @@ def reweighted(p, strength):
     return np.array(found)
 
 
+SLOW = [(1, 1.0, "mixed", 0.0, True), (2, 1.0, "zero", 0.0, False), (2, 1.0, "zero", 2.0, True)]
 CASES = [
     # order, bandwidth, temperatures, coherence, torus
     (2, 1.0, "one", 0.0, True),
     (1, 1.0, "mixed", 1.0, True),
     (4, 1.5, "mixed", 5.0, False),
+    *(pytest.param(case, marks=pytest.mark.slow) for case in SLOW),
 ]
 
 

@@ -4,11 +4,12 @@ import pickle
 import re
 import sys
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, laid_out, opencl, sweeps, texture
+from cases import REFERENCE, assert_same_bits, laid_out, opencl, slow_but, sweeps, texture
 
 import simdtex
 from simdtex.machine import devices
@@ -92,7 +93,11 @@ def plain(value):
 
 
 @pytest.mark.parametrize(
-    ("schedule", "search"), [("coloring", "coherent"), ("luby", "exact"), ("block:3x4", "coherent")]
+    ("schedule", "search"),
+    slow_but(
+        [("coloring", "coherent"), ("luby", "exact"), ("block:3x4", "coherent")],
+        product(("coloring", "luby", "block:3x4"), ("coherent", "exact")),
+    ),
 )
 def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, search):
     machine = opencl(cl_device)

@@ -75,7 +75,7 @@ def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
     live._handle_custom_msg(asked(options={"finish": 99}), [])
     with pytest.raises(ValueError, match="finish is 99"):
         live.wait()
-    live._handle_custom_msg(asked(width=150, height=150), [])
+    live._handle_custom_msg(asked(width=600, height=600), [])
     with pytest.raises(TimeoutError, match=r"within 0\.2 s"):
         live.wait(timeout=0.2)
     live._handle_custom_msg({"kind": "cancel"}, [])

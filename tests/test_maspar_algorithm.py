@@ -1,10 +1,11 @@
 """Algorithm 1 on the processor array: the bytes of the engine, its steps, and the account of the same run."""
 
 from collections import Counter
+from itertools import product
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, assert_same_bits, slow_but, texture
 
 import simdtex
 from simdtex import maspar
@@ -51,7 +52,10 @@ def both(shape, array, device, mapping="cut-and-stack", channels=None, dtype=np.
 
 
 @pytest.mark.parametrize(
-    ("name", "mapping"), [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER)]
+    ("name", "mapping"),
+    slow_but(
+        [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER)], product(CASES, MAPPINGS)
+    ),
 )
 def test_the_program_has_the_bytes_and_the_account_of_the_engine(name, mapping):
     shape, array, options = CASES[name]
@@ -81,7 +85,13 @@ def check_account(output, engine, options, mode):
     assert told["passes"] == sum(bool(layer.any()) for step in output.steps for layer in step.active)
 
 
-@pytest.mark.parametrize("name", ["larger, sides no multiple", "nearest of ties", "mode of colours"])
+@pytest.mark.parametrize(
+    "name",
+    slow_but(
+        ("larger, sides no multiple", "nearest of ties", "mode of colours"),
+        [name for name in CASES if name.startswith(("larger, sides", "colour", "near", "mode"))],
+    ),
+)
 def test_the_program_has_the_same_bytes_on_devices(machine, name):
     shape, array, options = CASES[name]
     image, output, wanted, engine = both(shape, array, machine, "hierarchical", **options)

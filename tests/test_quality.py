@@ -4,11 +4,12 @@ import csv
 import functools
 import re
 from dataclasses import asdict
+from itertools import product
 
 import click
 import numpy as np
 import pytest
-from cases import opencl, texture
+from cases import opencl, slow_but, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage import data
@@ -57,7 +58,10 @@ def half_size(picture):
     return (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) / 4
 
 
-@pytest.mark.parametrize(("dtype", "channels"), [("uint8", ()), ("uint16", (3,)), ("float32", (3,))])
+@pytest.mark.parametrize(
+    ("dtype", "channels"),
+    slow_but([("uint8", ()), ("uint16", (3,)), ("float32", (3,))], product(("uint8", "uint16", "float32"), ((), (3,)))),
+)
 def test_nearest_patches_against_loops(dtype, channels):
     sample, output = noise(1, (15, 17, *channels), dtype), noise(2, (16, 18, *channels), dtype)
     output[:9, :10] = sample[3:12, 2:12]

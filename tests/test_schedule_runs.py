@@ -3,11 +3,12 @@
 import functools
 import re
 import textwrap
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, setting, texture
+from cases import REFERENCE, assert_same_bits, setting, slow_but, texture
 from test_schedules import CLAIMS, Told
 
 import simdtex
@@ -58,7 +59,13 @@ class Apart:
         return state, info._replace(sites=sites, steps=single if sites.size else None)
 
 
-@pytest.mark.parametrize(("name", "form"), [("coloring", "colour"), ("coloring-fixed", "icm"), ("luby", "icm")])
+@pytest.mark.parametrize(
+    ("name", "form"),
+    slow_but(
+        [("coloring", "colour"), ("coloring-fixed", "icm"), ("luby", "icm")],
+        product(("coloring", "coloring-fixed", "luby"), ("icm", "colour")),
+    ),
+)
 def test_independent_sites_may_as_well_be_relaxed_one_by_one(name, form):
     assert_same_bits(run(Apart(get(name)), form), expected(name, form))
 
