@@ -33,13 +33,21 @@ LEAST_PEAK, APART, MOST_PEAKS = 0.08, 4, 80
 LEAST_CELL, MOST_BASES = 30, 48
 """The fewest pixels of a cell, and the most lattices that are followed through the autocorrelation."""
 
-RISE, INSIDE = 0.12, (0.35, 0.5, 0.65)
-"""The least rise of the autocorrelation to the end of a basis vector from these shares of it: excludes stripes."""
+RISE, INSIDE = 0.08, (0.35, 0.5, 0.65)
+"""The least rise of the autocorrelation to the end of a vector from these shares of it: excludes stripes."""
 
-ALIKE = 0.8
-"""Share of the greatest strength that a lattice needs; of those, the one with the smallest cell is taken."""
+CONTRAST, OF_GREATEST = 0.1, 0.5
+"""The least rise of the mean autocorrelation from between the nodes of a lattice to the nodes, and as a share of the
+greatest rise of all lattices: excludes lattices on the ridges of stripes and joints."""
 
-LEAST_STRENGTH, SIGNIFICANT = 0.15, 4.5
+ALIKE, SMALLER = 0.8, 0.6
+"""Share of the greatest strength that a lattice with a smaller cell needs, and the most of the cell that it may have: a
+skewed lattice with nearly the same cell is no better."""
+
+STRIPES = 0.8
+"""The least mean autocorrelation over the nodes of a lattice of stripes, whose period along the stripes is any."""
+
+LEAST_STRENGTH, SIGNIFICANT = 0.15, 6.0
 """The least mean autocorrelation over the nodes of a lattice, and the same in standard errors."""
 
 MOST_STRAIN = 0.15
@@ -292,19 +300,50 @@ def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArra
 def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | None:
     """Return the lattice of a picture (rows, cols) of integers, known where ``known``; None if it has none.
 
-    Each pair of peaks of the autocorrelation is reduced to the shortest vectors of its lattice. Among the lattices
-    whose mean autocorrelation over the nodes is nearly the greatest, the result is the one with the smallest cell.
+    Each pair of peaks of the autocorrelation is reduced to the shortest vectors of its lattice. The result is the
+    lattice with the greatest mean autocorrelation over the nodes, or a much smaller one that is nearly as strong.
     """
     if min(picture.shape) < LEAST_SIDE or not known.any():
         return None
     correlation = autocorrelation(picture, known)
-    best = followed(correlation, candidates(correlation))
-    if not best:
-        return None
-    most = max(strength for strength, *_ in best)
-    good = [one for one in best if one[0] >= ALIKE * most]
-    strength, lattice, error = min(good, key=lambda one: (round(one[1].cell, 6), -one[0]))
-    return lattice if strength >= max(LEAST_STRENGTH, SIGNIFICANT * error) else None
+    found = followed(correlation, candidates(correlation))
+    least = max([CONTRAST, *(OF_GREATEST * one.contrast for one in found)])
+    best = _best([one for one in found if one.contrast >= least])
+    if best is None or best.strength < max(LEAST_STRENGTH, SIGNIFICANT * best.error):
+        best = _best(followed(correlation, candidates(correlation, sides=2)))
+        if best is None or best.strength < STRIPES:
+            return None
+    return best.lattice
+
+
+class Followed(NamedTuple):
+    """A lattice that was followed through the autocorrelation.
+
+    ``strength`` is the mean autocorrelation over all nodes but the origin, ``error`` its standard error, and
+    ``contrast`` the rise to it from the points between the nodes.
+    """
+
+    lattice: Lattice
+    strength: float
+    error: float
+    contrast: float
+
+
+def _best(lattices: list[Followed]) -> Followed | None:
+    """Return the strongest lattice, or a much smaller one that is nearly as strong."""
+    best = max(lattices, key=_by_strength, default=None)
+    limit = ALIKE * best.strength if best else 0
+    while best:
+        smaller = [o for o in lattices if o.strength >= limit and o.lattice.cell <= SMALLER * best.lattice.cell]
+        if not smaller:
+            break
+        best = max(smaller, key=_by_strength)
+    return best
+
+
+def _by_strength(one: Followed) -> tuple[float, float]:
+    """Return the order of lattices: by strength, and of equals the one with the smaller cell."""
+    return round(one.strength, 6), -round(one.lattice.cell, 6)
 
 
 class Correlation(NamedTuple):
@@ -358,8 +397,11 @@ def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
     return values
 
 
-def candidates(correlation: Correlation) -> NDArray[np.int64]:
-    """Return the reduced bases (n, 2, 2) of pairs of peaks, each once, along which the values rise to both ends."""
+def candidates(correlation: Correlation, sides: int = 3) -> NDArray[np.int64]:
+    """Return the reduced bases (n, 2, 2) of pairs of peaks, each once, if the values rise along ``sides`` vectors.
+
+    The three shortest vectors of a lattice end at peaks; on the ridges of stripes only two of them do.
+    """
     values, (m, n) = correlation.values, correlation.reach
     peak = (values == _greatest(values, 2)) & (values > LEAST_PEAK)
     peak[:2] = peak[-2:] = peak[:, :2] = peak[:, -2:] = False  # cut by the border
@@ -372,18 +414,30 @@ def candidates(correlation: Correlation) -> NDArray[np.int64]:
     pairs = reduced(np.stack([vectors[one], vectors[other]], 1))
     if not len(pairs):
         return pairs
-    cell = np.abs(pairs[:, 0, 0] * pairs[:, 1, 1] - pairs[:, 0, 1] * pairs[:, 1, 0])
-    inside = (np.abs(pairs) <= np.array([m, n])).all((1, 2)) & (cell >= LEAST_CELL)
+    reach = np.array([m, n])
+    cell = np.abs(_determinant(pairs))
+    inside = (np.abs(pairs) <= reach).all((1, 2)) & (cell >= LEAST_CELL)
     pairs, cell = pairs[inside], cell[inside]
-    ends = correlation.around[pairs[..., 0] + m, pairs[..., 1] + n]
-    near = ends.mean(1)
-    within = [
-        values[tuple(np.moveaxis(np.rint(pairs * part).astype(int) + np.array([m, n]), -1, 0))] for part in INSIDE
-    ]
-    rising = (ends - np.maximum.reduce(within) >= RISE).all(1)
-    pairs, cell, near = pairs[rising], cell[rising], near[rising]
-    best = near >= ALIKE * near.max(initial=0)
+    vectors = shortest(pairs)
+
+    def at(plane: NDArray[np.float64], lags: NDArray[Any]) -> NDArray[np.float64]:
+        lags = np.clip(np.rint(lags).astype(int), -reach, reach) + reach
+        found: NDArray[np.float64] = plane[lags[..., 0], lags[..., 1]]
+        return found
+
+    ends = at(correlation.around, vectors)
+    near = ends[:, :2].mean(1)
+    rise = ends - np.maximum.reduce([at(values, vectors * part) for part in INSIDE])
+    rising = ((rise >= RISE) | (np.abs(vectors) > reach).any(2))[:, :sides].all(1)
+    best = rising & (near >= ALIKE * near.max(initial=0, where=rising))
     return apart(pairs[best][np.argsort(cell[best], kind="stable")])
+
+
+def shortest(bases: NDArray[Any]) -> NDArray[Any]:
+    """Return the three shortest vectors (n, 3, 2) of lattices with reduced bases (n, 2, 2)."""
+    first, second = bases[:, 0], bases[:, 1]
+    sign = np.where((first * second).sum(1, keepdims=True) < 0, -1, 1)
+    return np.stack([first, second, second - sign * first], 1)
 
 
 def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -417,11 +471,10 @@ def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.array(kept, np.int64).reshape(-1, 2, 2)
 
 
-def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[tuple[float, Lattice, float]]:
-    """Return the strength of each lattice, its vectors fitted to the peaks near its nodes, and the strength's error.
+def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[Followed]:
+    """Return each lattice with its vectors fitted to the peaks near its nodes, and its strength.
 
-    The strength is the mean autocorrelation over all nodes but the origin. Lattices without enough nodes are left out.
-    All are followed together, since their nodes are few.
+    Lattices without enough nodes are left out. All are followed together, since their nodes are few.
     """
     bases, reach, away = pairs.astype(np.float64), np.array(correlation.reach), 1
     left = np.arange(len(pairs))
@@ -433,13 +486,22 @@ def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[tuple[f
         left, away = left[(np.abs(_determinant(bases[left])) >= LEAST_CELL) & (away <= 2 * far)], 2 * away
     bases = bases[np.abs(_determinant(bases)) >= LEAST_CELL]
     owner, _, lags = _nodes(bases, reach, away)
+
+    def mean(plane: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
+        seen = (np.abs(lags) <= reach - 2).all(1)
+        at = np.rint(lags[seen]).astype(int) + reach
+        found, count = (np.bincount(owner[seen], weights, len(bases)) for weights in (plane[at[:, 0], at[:, 1]], None))
+        return np.where(count, found / np.maximum(count, 1), -np.inf)
+
+    strength, vectors = mean(correlation.around, lags), shortest(bases)
+    between = [mean(correlation.values, lags + vectors[owner, k] * part) for k in range(3) for part in INSIDE]
+    contrast = strength - np.max(between, 0)
     found = []
     for number, basis in enumerate(bases):
-        at = np.rint(lags[owner == number]).astype(int) + reach
-        strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
         core = correlation.values[correlation.length <= (basis**2).sum(1).min() / 4]
         error = sqrt(float((core**2).sum()) / correlation.pixels)
-        found.append((strength, _lattice(np.rint(basis * FINE) / FINE), error))
+        lattice = _lattice(np.rint(basis * FINE) / FINE)
+        found.append(Followed(lattice, float(strength[number]), error, float(contrast[number])))
     return found
 
 
@@ -531,7 +593,7 @@ def _continued(
     return lattice.moved(np.rint(np.angle(turn) / (2 * np.pi) * 2**16) / 2**16)
 
 
-def _determinant(matrix: NDArray[np.float64]) -> Any:
+def _determinant(matrix: NDArray[Any]) -> Any:
     return matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
 
 
