@@ -11,7 +11,8 @@
 //   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the SUGGESTING nearest
 //      neighbours that a relaxation has touched (t < 1);
 //   2. the present source of s;
-//   3. `chance` positions at random, and one where there would be none at all.
+//   3. `chance` positions at random, and one where there would be none at all; -D PHASES: of the site's phase, and if it
+//      has no more than `chance`, all of them.
 //
 // -D EXACT proposes every candidate of the level, and skips those that are proved to cost more than the best so far.
 //
@@ -47,6 +48,17 @@
 #define RAW SLOTS
 #define LISTED SLOTS
 #endif
+#ifdef PHASES
+#define IN_PHASE                                                                                                       \
+    __global const int *restrict begin_of, __global const int *restrict of_phase, __global const int *restrict phase_at,
+#else
+#define IN_PHASE
+#endif
+#ifdef NOVEL
+#define LOOKED(g) (g).neighbours
+#else
+#define LOOKED(g) SUGGESTED(g)
+#endif
 #define AGAIN 4    // what being a neighbour's source costs, over continuing it
 #ifndef N
 #define N 64 // most neighbours
@@ -77,6 +89,15 @@ static inline float noise_of(const Level g, const uint turn, const ulong place, 
         found -= log32((float)legal_mass(noise, g.radius, (int)y[c * g.plane], g.top)) - LOG_ONE;
     return found;
 }
+
+// Random candidate k of `draws`, from a word; of a phase with `many` candidates.
+#ifdef PHASES
+#define AT_RANDOM(k, draws, word)                                                                                      \
+    (many_of > draws ? of_phase[from_of + (int)((ulong)(word) * (uint)many_of >> 32)]                                  \
+                     : (k) < many_of ? of_phase[from_of + (k)] : -1)
+#else
+#define AT_RANDOM(k, draws, word) (int)((ulong)(word) * (uint)g.candidates >> 32)
+#endif
 
 // How often candidate p continues a neighbour, and AGAIN times how often it is one's source.
 static inline float repeated(const int p, const SHARED int *next, const SHARED int *same, const int neighbours)
@@ -160,6 +181,7 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
 #else
                           __global int *restrict work,
 #endif
+                          IN_PHASE
                           __global ushort *restrict new_values, __global int *restrict new_source,
                           __global ushort *restrict new_temperature)
 {
@@ -190,11 +212,17 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     SHARED int raw[RAW], list[LISTED];
 #ifdef EXACT
     SHARED int same[N];
+#define NEXT raw
+#elif defined(NOVEL)
+    SHARED int NEXT[N], same[N];
 #endif
-    EACH(k, suggested) {
+    EACH(k, LOOKED(g)) {
         const int r = NEIGHBOUR(h, k), from = r >= 0 && temperature[r] < UNTOUCHED ? source[r] : -1;
-        raw[k] = continuing(index_of, from, reach[k], g.pixels);
-#ifdef EXACT
+        const int p = continuing(index_of, from, reach[k], g.pixels);
+        if (k < suggested)
+            raw[k] = p;
+#if defined(EXACT) || defined(NOVEL)
+        NEXT[k] = p;
         same[k] = number_of(index_of, from);
 #endif
     }
@@ -202,13 +230,17 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
         raw[suggested] = number_of(index_of, source[site]);
     int many = suggested + 1;
 #ifndef EXACT
-    EACH(n, (max(1, g.chance) + 3) / 4) {
+    const int draws = max(1, g.chance);
+#ifdef PHASES
+    const int phase = phase_at[site], from_of = begin_of[phase], many_of = begin_of[phase + 1] - from_of;
+#endif
+    EACH(n, (draws + 3) / 4) {
         const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_SEARCH, n);
         const uint word[4] = {bits.x, bits.y, bits.z, bits.w};
-        for (int k = 4 * n; k < min(4 * n + 4, max(1, g.chance)); ++k)
-            raw[many + k] = (int)((ulong)word[k % 4] * (uint)g.candidates >> 32);
+        for (int k = 4 * n; k < min(4 * n + 4, draws); ++k)
+            raw[many + k] = AT_RANDOM(k, draws, word[k % 4]);
     }
-    many += max(1, g.chance);
+    many += draws;
 #endif
     TOGETHER;
 
@@ -237,12 +269,13 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const float most = PRODUCT(MOST_GUMBEL, g.spread);
     float best = INFINITY;
     int best_at = 0x7fffffff;
-#ifndef EXACT
-#define REPEATED(p) 0.0f
-    EVALUATE(many, coherent)
+#if defined(EXACT) || defined(NOVEL)
+#define REPEATED(p) (g.novelty > 0.0f ? g.novelty * repeated(p, NEXT, same, g.neighbours) : 0.0f)
 #else
-#define REPEATED(p) (g.novelty > 0.0f ? g.novelty * repeated(p, raw, same, g.neighbours) : 0.0f)
+#define REPEATED(p) 0.0f
+#endif
     EVALUATE(many, coherent)
+#ifdef EXACT
 
     // The terms of a sum, the most certain first.
     SHARED int bucket[N + 1], to[N + 1 + CHECK];

@@ -186,6 +186,26 @@ class Waves(NamedTuple):
             found[:, some] = self._levels(self.output, row[some, None], col[None, :])
         return found
 
+    @property
+    def divisions(self) -> tuple[int, int]:
+        """The numbers of phases along the vectors of the lattice: each is a pixel wide or a little less or more."""
+        return tuple(max(1, round(sqrt(y * y + x * x))) for y, x in self.output[:2])  # type: ignore[return-value]
+
+    def phase(self, number: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
+        """Return the numbers of the phases of pixels of one of the sample's pictures."""
+        return self._phase(self.pictures[number], row, col)
+
+    def phase_at(self, grid: Grid) -> NDArray[np.int32]:
+        """Return the numbers (rows, cols) of the phases of the sites of a lattice or a window of it."""
+        row, col = (line * grid.step for line in grid.lines())
+        return self._phase(self.output, row[:, None], col[None, :])
+
+    def _phase(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
+        parts = np.array(self.divisions).reshape(2, *[1] * np.broadcast(row, col).ndim)
+        one, other = np.floor(lattice.phases(row, col) * parts).astype(np.int64) % parts
+        found: NDArray[np.int32] = (one * self.divisions[1] + other).astype(np.int32)
+        return found
+
     def half(self, step: int) -> float:
         """Return the squared difference, in levels, of pixels half a step apart: the mean along rows and columns."""
         turns = self.output._replace(origin=(0.0, 0.0)).phases(*(np.eye(2) * step / 2))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -368,12 +368,26 @@ class Sample:
     def phases_at(self, source: NDArray[np.integer]) -> NDArray[np.uint16]:
         """Return the phases (waves, n) of pixels (n,) of a regular sample."""
         assert self.waves
+        found = np.empty((WAVES, source.size), np.uint16)
+        for here, own, row, col in self._in_pictures(source):
+            found[:, own] = self.waves.sample(here, row, col)
+        return found
+
+    def phase_numbers_at(self, source: NDArray[np.integer]) -> NDArray[np.int32]:
+        """Return the numbers (n,) of the phases of pixels (n,) of a regular sample."""
+        assert self.waves
+        found = np.empty(source.size, np.int32)
+        for here, own, row, col in self._in_pictures(source):
+            found[own] = self.waves.phase(here, row, col)
+        return found
+
+    def _in_pictures(self, source: NDArray[np.integer]) -> Iterator[tuple[int, NDArray[np.bool_], Any, Any]]:
+        """Yield the number of each picture, which of the pixels (n,) are in it, and their rows and columns there."""
         row, col = np.divmod(source, self.cols) - np.full(2, self.margin)[:, None]
-        number, found = self.picture_of(source), np.empty((WAVES, source.size), np.uint16)
+        number = self.picture_of(source)
         for here, (top, *_) in enumerate(self.boxes):
             own = number == here
-            found[:, own] = self.waves.sample(here, row[own] - top, col[own])
-        return found
+            yield here, own, row[own] - top, col[own]
 
     def planes(self, machine: Any) -> Any:
         """Return the working levels on a machine, (C, rows * cols) float32."""

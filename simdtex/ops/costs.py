@@ -100,8 +100,8 @@ class Costs(NamedTuple):
 
     ``penalty`` (n + `simdtex.ops.square.TAIL` or more,) float32, of `simdtex.ops.use`; ``discount``, 1 / (1 +
     coherence), the factor of the distance of candidates that continue a neighbour's source; ``novelty``, the penalty
-    for each neighbour whose source a candidate continues, and `AGAIN` times that for each whose source it is, if all
-    candidates are proposed; ``phased``, ``scattered`` and ``kinds``.
+    for each neighbour whose source a candidate continues, and `AGAIN` times that for each whose source it is;
+    ``phased``, ``scattered`` and ``kinds``.
     """
 
     penalty: Array
@@ -171,8 +171,8 @@ class Costs(NamedTuple):
             times = np.zeros(cost.shape, np.float32)
             pairs = (continuing(candidates, around.source), 1), (candidates.number_of(around.source), AGAIN)
             for number, often in pairs:
-                k, s = np.nonzero(number >= 0)
-                np.add.at(times, (number[k, s], s), np.float32(often))
+                for one in np.where(number < 0, -2, number):  # -1 is an empty slot
+                    times += np.float32(often) * (numbers == one)
             more["novelty"] = self.novelty * times
         for term in more.values():
             cost = cost + term

@@ -34,6 +34,15 @@ EXHAUSTIVE = 64
 SUGGESTING = 12
 """Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/relax.cl."""
 
+IN_PHASE = 128
+"""The most candidates of a phase."""
+
+FEW = 16
+"""Candidates of a phase, on average, below which those of the neighbouring phases are added."""
+
+BLOCK = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+"""A phase and its 8 neighbours."""
+
 PAIRS = 2**18
 """The most pairs of sites and candidates that the twin evaluates together."""
 
@@ -63,16 +72,54 @@ class AllCandidates(NamedTuple):
         return np.arange(self.slots)[:, None], coherent
 
 
+class InPhase(NamedTuple):
+    """The candidates of each phase of a regular sample.
+
+    ``begin`` (phases + 1,) int32: those of phase f are ``numbers[begin[f]]`` .. ``numbers[begin[f + 1] - 1]``, int32;
+    ``sites`` (H, W) int32, the phase of each site.
+    """
+
+    begin: Array
+    numbers: Array
+    sites: Array
+
+
+def in_phase(of: NDArray[np.int32], divisions: tuple[int, int]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return ``begin`` and ``numbers`` of `InPhase` for candidates with the phases ``of`` (n,).
+
+    Where a phase has few candidates on average, those of its 8 neighbours are added. A phase without any has some of
+    all. Of more than `IN_PHASE` candidates so many remain, evenly spaced.
+    """
+    count, numbers = divisions[0] * divisions[1], np.arange(of.size, dtype=np.int32)
+    some = numbers[:: -(-of.size // IN_PHASE)]
+    if of.size < FEW * count:
+        row, col = np.divmod(of, divisions[1])
+        around = [((row + i) % divisions[0]) * divisions[1] + (col + j) % divisions[1] for i, j in BLOCK]
+        of, numbers = np.concatenate(around), np.tile(numbers, len(BLOCK))
+    empty = np.flatnonzero(np.bincount(of, minlength=count) == 0)
+    of = np.concatenate([of, np.repeat(empty, some.size)])
+    numbers = np.concatenate([numbers, np.tile(some, empty.size)])
+    order = np.lexsort((numbers, of))
+    many = np.bincount(of, minlength=count)
+    first, kept = np.cumsum(many) - many, np.minimum(many, IN_PHASE)
+    begin = np.concatenate([[0], np.cumsum(kept)])
+    place = np.arange(begin[-1]) - np.repeat(begin[:-1], kept)
+    chosen = np.repeat(first, kept) + place * np.repeat(many, kept) // np.repeat(np.maximum(kept, 1), kept)
+    return begin.astype(np.int32), numbers[order[chosen]]
+
+
 class CandidateList(NamedTuple):
     """The coherent search, which proposes the candidates that neighbours suggest and a few more.
 
-    ``square``: the candidates' pixels side by side; ``neighbours``: N; ``chance``: the number of random candidates.
+    ``square``: the candidates' pixels side by side; ``neighbours``: N; ``chance``: the number of random candidates;
+    ``phases``: the candidates of each phase, of which the random ones are.
     """
 
     candidates: Candidates
     square: Square
     neighbours: int
     chance: int
+    phases: InPhase | None = None
 
     @property
     def slots(self) -> int:
@@ -95,11 +142,23 @@ class CandidateList(NamedTuple):
         coherent = np.arange(self.slots)[:, None] < size
         add(self.candidates.number_of(around.own))
         draws, places = np.maximum(self.chance, size == 0), relaxation.grid.places(sites)
+        every = np.zeros(sites.size, np.int64), np.full(sites.size, self.candidates.size)
+        first, many = every if self.phases is None else self._of_phase(sites)
         for k in range(draws.max()):
             word = random.draw4(relaxation.seed, relaxation.level, turn, places, random.SEARCH, k // 4)[k % 4]
-            number = (word.astype(np.uint64) * np.uint64(self.candidates.size)) >> np.uint64(32)
-            add(np.where(k < draws, number.astype(np.int64), -1))
+            number = ((word.astype(np.uint64) * many.astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
+            if self.phases is not None:  # if there are no more than draws, each of them once
+                number = np.where(many <= draws, np.where(k < many, k, -1), number)
+                number = np.where(number < 0, -1, self.phases.numbers[np.maximum(first + number, 0)])
+            add(np.where(k < draws, number, -1))
         return numbers[:-1], coherent
+
+    def _of_phase(self, sites: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the place of the first candidate of each site's phase in ``phases.numbers``, and how many there are."""
+        assert self.phases
+        begin = self.phases.begin.astype(np.int64)
+        phase = self.phases.sites.ravel()[sites]
+        return begin[phase], begin[phase + 1] - begin[phase]
 
 
 def most_listed(neighbours: int, chance: int) -> int:
@@ -290,9 +349,12 @@ def _kernel(
         work = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)
     else:
         defines["SLOTS"] = -(-most_listed(proposal.neighbours, proposal.chance) // 64) * 64
+        defines |= {"PHASES": 1} if proposal.phases else {}
+        defines |= {"NOVEL": 1} if relaxation.costs.novelty else {}
     if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
-    return defines, [*arguments, machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
+    arguments += [machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
+    return defines, arguments + list(getattr(proposal, "phases", None) or ())
 
 
 def _shared(defines: dict[str, int], items: int) -> int:
@@ -300,7 +362,7 @@ def _shared(defines: dict[str, int], items: int) -> int:
     channels, most, side = int(defines["C"]), int(defines["N"]), 2 * int(defines["RADIUS"]) + 1
     each = channels + (channels if "OWN" in defines else 1)  # confidences and values
     rows, columns = side ** (2 if defines.get("AXES") == 3 else 1), -(-side // LANES) * LANES
-    lists = 2 * int(defines.get("SLOTS", 0))
+    lists = 2 * int(defines.get("SLOTS", 0)) + 2 * most * ("NOVEL" in defines)
     if "EXACT" in defines:
         lists = (most + 8) * (5 + each) + max(most + 1, items * int(defines["STEP"]))
     return 4 * (rows * columns * each + 2 * items + lists)

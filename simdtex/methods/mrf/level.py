@@ -15,7 +15,7 @@ from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
-from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.options import COARSE, Options
 from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
@@ -23,7 +23,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import EXHAUSTIVE, AllCandidates, CandidateList, Relaxation
+from simdtex.ops.relax import EXHAUSTIVE, IN_PHASE, AllCandidates, CandidateList, InPhase, Relaxation, in_phase
 from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import TAIL, square_of
 from simdtex.ops.use import FairUse
@@ -164,13 +164,13 @@ class Lattices:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid, places = self.grid(number), self.places(number)
         coarsest, count = number == self.levels - 1, places.positions.size
-        every = self.exhaustive(number)
+        every, spaced = self.exhaustive(number), count // (4**number if self.phased else 1)
         candidates = sample.candidates(machine, places, self.planes, every)
         square = square_of(machine, sample, places, every)
         proposal: AllCandidates | CandidateList = AllCandidates(candidates, square)
         if not every:
-            proposal = CandidateList(candidates, square, len(offsets), options.chance_at(number))
-        novelty = options.novelty * min(1.0, WHOLE / count, (count / SMALL) ** 2) if coarsest else 0.0
+            proposal = CandidateList(candidates, square, len(offsets), self.chance(number), self._of_phase(candidates))
+        novelty = options.novelty * min(1.0, WHOLE / spaced, (spaced / SMALL) ** 2) if coarsest else 0.0
         relaxation = Relaxation(
             grid=grid,
             offsets=machine.put(offsets),
@@ -209,10 +209,15 @@ class Lattices:
             scattered=self._scattered(number, grid),
             kinds=costs.kinds and costs.kinds._replace(sites=self._soft(grid)),
         )
+        proposal = level.proposal
+        if isinstance(proposal, CandidateList) and proposal.phases and waves:
+            proposal = proposal._replace(phases=proposal.phases._replace(sites=machine.put(waves.phase_at(grid))))
         return replace(
             level,
             setting=level.setting._replace(grid=grid),
-            relaxation=level.relaxation._replace(grid=replace(grid, tile=schedule.tile), costs=costs),
+            relaxation=level.relaxation._replace(
+                grid=replace(grid, tile=schedule.tile), costs=costs, proposal=proposal
+            ),
             in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
             evaluations=machine.put(np.zeros(grid.shape, np.int32)),
             movable=self.conditions.movable(machine, number, grid),
@@ -238,7 +243,7 @@ class Lattices:
         if not waves:
             return None
         weight = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
-        step = 1 if self.options.phases == "all" else 2**number
+        step = 1 if self.phases == "all" else 2**number
         tolerance = np.float32(round(float(weight) ** 2 * waves.half(step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))
@@ -269,13 +274,13 @@ class Lattices:
 
     def exhaustive(self, number: int) -> bool:
         """Return whether a site of a level evaluates all its candidates."""
-        if self.options.search == "exact" or number == self.levels - 1:
+        if self.options.search == "exact" or (number == self.levels - 1 and not self.phased):
             return True
         return bool(self.places(number).positions.size <= EXHAUSTIVE)
 
     def fair_use(self, number: int) -> FairUse:
         """Return the positions of the candidates of a level, and the fair use of each."""
-        step = 2**number if self.options.phases == "all" else 1
+        step = 2**number if self.phases == "all" else 1
         places = self.places(number)
         around, kinds = int(self.offsets[:, 1].max()) * step, None
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
@@ -286,7 +291,30 @@ class Lattices:
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
-        return self.sample.places(self.offsets, 2**number, self.options.phases, self.options.edges)
+        return self.sample.places(self.offsets, 2**number, self.phases, self.options.edges)
+
+    @property
+    def phased(self) -> bool:
+        """Whether the candidates of a site are of its phase on the lattice of a regular sample."""
+        return self.sample.waves is not None and self.options.search == "coherent"
+
+    @property
+    def phases(self) -> str:
+        """The positions of the sample that are candidates: those of the option, and all if each site has few of them."""
+        return "all" if self.phased else self.options.phases
+
+    def chance(self, number: int) -> int:
+        """Return the number of random candidates of a level; of a regular sample they are many at coarse levels."""
+        chance = self.options.chance_at(number)
+        return max(chance, IN_PHASE) if self.phased and (number >= COARSE or number == self.levels - 1) else chance
+
+    def _of_phase(self, candidates: Candidates) -> InPhase | None:
+        """Return the candidates of each phase, without the sites' phases; None if the sample is not regular."""
+        if not self.phased or not self.sample.waves:
+            return None
+        of = self.sample.phase_numbers_at(self.machine.get(candidates.positions))
+        begin, numbers = in_phase(of, self.sample.waves.divisions)
+        return InPhase(self.machine.put(begin), self.machine.put(numbers), None)
 
 
 @dataclass(frozen=True)

@@ -218,7 +218,7 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
         each = run.places(number).positions.size
         if not run.exhaustive(number):
-            each = LISTED * min(each, most_listed(len(run.offsets), options.chance_at(number)))
+            each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
         sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
         work[number] = (sweep * sweeps, sweep * options.free_sweeps)
     return work
