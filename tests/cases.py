@@ -20,7 +20,7 @@ from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.neighbourhood import Confidences, Field
-from simdtex.ops.relax import AllCandidates, CandidateList, Relaxation
+from simdtex.ops.relax import AllCandidates, CandidateList, InPhase, Relaxation, in_phase
 from simdtex.ops.square import TAIL, square_of
 from simdtex.schedules import Setting
 
@@ -120,6 +120,15 @@ class Problem(NamedTuple):
         here = rng.choice([0, 40], (4, *self.field.source.shape)).astype(np.uint16)
         return Phased(machine.put(waves), machine.put(here), np.float32(3), np.float32(15000))
 
+    def in_phase(self, machine):
+        """Candidates of 12 phases, of which one has none of its own, and the phase of each site; None without."""
+        if not self.regular:
+            return None
+        rng = np.random.default_rng(11)
+        of = rng.integers(1, 12, self.candidates(REFERENCE).size).astype(np.int32)
+        here = rng.integers(0, 12, self.field.source.shape).astype(np.int32)
+        return InPhase(*map(machine.put, (*in_phase(of, (3, 4)), here)))
+
     def scattered(self, machine):
         """Up to 3 data around each site, some unknown in some channels; None without."""
         if not self.between:
@@ -165,7 +174,7 @@ class Problem(NamedTuple):
         candidates, square = self.candidates(machine, exact), self.square(machine, exact)
         proposal = AllCandidates(candidates, square)
         if not exact:
-            proposal = CandidateList(candidates, square, len(self.offsets), chance)
+            proposal = CandidateList(candidates, square, len(self.offsets), chance, self.in_phase(machine))
         terms = self.costs(machine, every=exact, **{"dear": 0.0} | costs)
         choice = lcpdf.Choice(gibbs, density, self.window(bandwidth)[0])
         offsets = machine.put(self.offsets)

@@ -9,7 +9,7 @@ a result is rounded to it. The numbers in the comments are the algorithm's own.
 
 from copy import deepcopy
 from itertools import product
-from math import exp, isqrt, log, log2, sqrt
+from math import exp, floor, hypot, isqrt, log, log2, sqrt
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,6 +28,7 @@ UNIT = 16  # candidates, four of which share their draws
 CATEGORIES = 16  # different pixels of a map of categories, at most
 EXHAUSTIVE = 64  # candidates of a level that are all evaluated, at most
 SUGGESTING = 12  # nearest neighbours that suggest a candidate
+IN_PHASE, FEW = 128, 16  # candidates of a phase, at most, and on average if its neighbours' are added
 
 DEFAULTS = {
     **{"order": 18, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
@@ -166,7 +167,7 @@ def relaxed(level, X, old, s, turn):
         d = d + misfit(level, s, numbers)
     if level.Y.soft:
         d = d + of_kind(level, s, numbers)
-    if level.novelty:  # the numbers are all candidates
+    if level.novelty:
         d = d + level.novelty * np.bincount([p for p, _ in charged], [n for _, n in charged], len(d)).astype(float32)
 
     if level.gibbs:  # 6.2.2.2
@@ -234,7 +235,8 @@ class Level:
         self.between = self.data_between(torus) if Y.given else {}
         self.held = {(i, j) for i, j in Y.given if i % self.spacing == j % self.spacing == 0}
 
-        radius, step = isqrt(o.order), 1 if o.phases == "all" else self.spacing
+        self.phased = Y.waves is not None and o.search == "coherent"
+        radius, step = isqrt(o.order), 1 if o.phases == "all" or self.phased else self.spacing
         self.step, self.above = step, above
         self.places = positions(Y, self.spacing, step, o)
         self.number_of = {place: p for p, place in enumerate(self.places)}
@@ -261,12 +263,29 @@ class Level:
 
         coarsest, coherent = number == levels - 1, o.search == "coherent"
         self.gibbs = o.relaxation == "gibbs" or coarsest
-        self.all = not coherent or coarsest or n <= EXHAUSTIVE
+        self.all = not coherent or (coarsest and not self.phased) or n <= EXHAUSTIVE
+        self.chance = max(o.chance, o.coarse_chance) if self.spacing >= 4 else o.chance
+        if self.phased:
+            self.chance = max(self.chance, IN_PHASE // 4 ** (levels - 1 - number))
+            self.of_phase = self.by_phase()
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate, self.strict = o.balance * differing, 0.5 * differing
-        freedom = min(1.0, 256 / n, (n / 128) ** 2) if coarsest else 0.0
+        apart = n // 4**number if self.phased else n  # candidates that lie the spacing apart
+        freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0
         self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
+
+    def by_phase(self):
+        """The candidates of each phase, and of its neighbours where there are few; some of all where there are none."""
+        down, right = self.divisions = [min(255, max(1, round(hypot(*v)))) for v in self.Y.lattices[1][:2]]
+        own = [phase(self.Y.lattices[0][n], self.divisions, i, j) for n, i, j in self.places]
+        steps = product((-1, 0, 1), repeat=2) if len(own) < FEW * down * right else [(0, 0)]
+        found = {f: [] for f in product(range(down), range(right))}
+        for a, b in steps:
+            for p, (y, x) in enumerate(own):
+                found[(y + a) % down, (x + b) % right].append(p)
+        some = list(range(0, len(own), -(-len(own) // IN_PHASE)))
+        return {f: thinned(those or some) for f, those in found.items()}
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""
@@ -302,6 +321,20 @@ class Level:
             (rows, cols), there = self.Y.usable[n].shape, (i + offset[0] * self.spacing, j + offset[1] * self.spacing)
             found.append(self.Y.planes[n][c][within(there[0], rows, False), within(there[1], cols, False)])
         return found
+
+
+def phase(lattice, divisions, i, j):
+    """Which of the divisions of a lattice's cell a pixel is in."""
+    (a, b), (c, d), (top, left) = lattice
+    y, x, area = i - top, j - left, a * d - b * c
+    parts = ((y * d - x * c) / area, (x * a - y * b) / area)
+    return tuple(floor(part * n) % n for part, n in zip(parts, divisions, strict=True))
+
+
+def thinned(those):
+    """At most IN_PHASE of a list, evenly spaced."""
+    kept = min(len(those), IN_PHASE)
+    return [those[k * len(those) // kept] for k in range(kept)]
 
 
 def positions(Y, spacing, step, o):
@@ -374,14 +407,15 @@ def candidates_of(level, X, s, near, turn):
     """The numbers of the candidates that a site weighs; which of them continue a neighbour's source; and the number of
     each that does so, once for every such neighbour, and of each that is a neighbour's source, which counts 4 times.
     """
-    o = level.o
     suggested, charged = [], []
-    for (di, dj), r in list(zip(level.offsets, near, strict=True))[: None if level.all else SUGGESTING]:
+    for k, ((di, dj), r) in enumerate(zip(level.offsets, near, strict=True)):
         if r is None or r[2] == 1024 or r[3] == NOWHERE:  # as nothing has touched it yet
             continue
         n, i, j = r[3]
-        suggested.append(level.number_of.get((n, i - di * level.spacing, j - dj * level.spacing)))
-        charged += [(suggested[-1], 1), (level.number_of.get((n, i, j)), 4)]
+        one = level.number_of.get((n, i - di * level.spacing, j - dj * level.spacing))
+        charged += [(one, 1), (level.number_of.get((n, i, j)), 4)]
+        if level.all or k < SUGGESTING:
+            suggested.append(one)
     if level.all:
         numbers = list(range(len(level.places)))
         return numbers, [p in suggested for p in numbers], [(p, n) for p, n in charged if p is not None]
@@ -390,12 +424,17 @@ def candidates_of(level, X, s, near, turn):
     favoured = len(found)
     found.append(level.number_of.get(tuple(X.source[level.pixel(s)].tolist())))
     found = list(dict.fromkeys(p for p in found if p is not None))
-    chance = max(o.chance, o.coarse_chance) if level.spacing >= 4 else o.chance
-    for k in range(max(chance, not found)):
+    draws, those = max(level.chance, not found), range(len(level.places))
+    if level.phased:
+        those = level.of_phase[phase(level.Y.lattices[1], level.divisions, *level.pixel(s))]
+    for k in range(draws):
         word = words(level.seed, level.number, turn, level.index(s), random.SEARCH, k // 4)[k % 4]
-        found.append(word * len(level.places) >> 32)
+        found.append(those[word * len(those) >> 32])
+    if level.phased and len(those) <= draws:
+        found[-draws:] = those
     found = list(dict.fromkeys(found))
-    return found, [k < favoured for k in range(len(found))], []
+    charged = [(found.index(p), n) for p, n in charged if p in found]
+    return found, [k < favoured for k in range(len(found))], charged
 
 
 def distances(level, near, numbers):

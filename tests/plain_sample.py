@@ -69,6 +69,7 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     Y.waves = None  # of the pictures and of the output
     if lattices:
         raised = min(sqrt(2 * spread / 4), Y.height / 2)
+        Y.lattices = lattices
         own = [phases(one, raised, *y[0].shape) for y, one in zip(planes, lattices[0], strict=True)]
         half = lambda step: apart(lattices[1], step / 2) * raised**2  # noqa: E731
         Y.waves = own, phases(lattices[1], raised, *shape), round(sqrt(5 / 4 * N)), half

@@ -40,7 +40,10 @@ CONTRAST, OF_GREATEST = 0.1, 0.5
 """The least rise of the mean autocorrelation from between the nodes of a lattice to the nodes, and as a share of the
 greatest rise of all lattices: excludes lattices on the ridges of stripes and joints."""
 
-ALIKE, SMALLER = 0.8, 0.6
+ALIKE = 0.8
+"""Share of the greatest height of peaks that those of a lattice need."""
+
+ENOUGH, SMALLER = 0.87, 0.6
 """Share of the greatest strength that a lattice with a smaller cell needs, and the most of the cell that it may have: a
 skewed lattice with nearly the same cell is no better."""
 
@@ -188,8 +191,8 @@ class Waves(NamedTuple):
 
     @property
     def divisions(self) -> tuple[int, int]:
-        """The numbers of phases along the vectors of the lattice: each is a pixel wide or a little less or more."""
-        return tuple(max(1, round(sqrt(y * y + x * x))) for y, x in self.output[:2])  # type: ignore[return-value]
+        """The numbers of phases along the vectors of the lattice: each is a pixel wide, and all fit in 16 bits."""
+        return tuple(min(255, max(1, round(sqrt(y * y + x * x)))) for y, x in self.output[:2])  # type: ignore[return-value]
 
     def phase(self, number: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
         """Return the numbers of the phases of pixels of one of the sample's pictures."""
@@ -352,7 +355,7 @@ class Followed(NamedTuple):
 def _best(lattices: list[Followed]) -> Followed | None:
     """Return the strongest lattice, or a much smaller one that is nearly as strong."""
     best = max(lattices, key=_by_strength, default=None)
-    limit = ALIKE * best.strength if best else 0
+    limit = ENOUGH * best.strength if best else 0
     while best:
         smaller = [o for o in lattices if o.strength >= limit and o.lattice.cell <= SMALLER * best.lattice.cell]
         if not smaller:

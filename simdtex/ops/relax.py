@@ -99,7 +99,7 @@ def in_phase(of: NDArray[np.int32], divisions: tuple[int, int]) -> tuple[NDArray
     empty = np.flatnonzero(np.bincount(of, minlength=count) == 0)
     of = np.concatenate([of, np.repeat(empty, some.size)])
     numbers = np.concatenate([numbers, np.tile(some, empty.size)])
-    order = np.lexsort((numbers, of))
+    order = np.argsort(of.astype(np.min_scalar_type(count)), kind="stable")  # of 16 bits in linear time
     many = np.bincount(of, minlength=count)
     first, kept = np.cumsum(many) - many, np.minimum(many, IN_PHASE)
     begin = np.concatenate([[0], np.cumsum(kept)])
@@ -154,7 +154,7 @@ class CandidateList(NamedTuple):
         return numbers[:-1], coherent
 
     def _of_phase(self, sites: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the place of the first candidate of each site's phase in ``phases.numbers``, and how many there are."""
+        """Return where the candidates of each site's phase begin in ``phases.numbers``, and how many there are."""
         assert self.phases
         begin = self.phases.begin.astype(np.int64)
         phase = self.phases.sites.ravel()[sites]

@@ -15,7 +15,7 @@ from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
-from simdtex.methods.mrf.options import COARSE, Options
+from simdtex.methods.mrf.options import Options
 from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
@@ -140,6 +140,7 @@ class Lattices:
         self.conditions = conditions or Conditioning(plan)
         self._last: Level | None = None  # without the parts that depend on the window
         self._whole: Level | None = None
+        self._in_phase: Any = None  # positions and their phases, which most levels share
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10)."""
@@ -300,20 +301,27 @@ class Lattices:
 
     @property
     def phases(self) -> str:
-        """The positions of the sample that are candidates: those of the option, and all if each site has few of them."""
+        """The option ``phases``; all positions of a regular sample, since a site has few candidates of its phase."""
         return "all" if self.phased else self.options.phases
 
     def chance(self, number: int) -> int:
-        """Return the number of random candidates of a level; of a regular sample they are many at coarse levels."""
+        """Return the number of random candidates of a level.
+
+        Of a regular sample they are all of a phase at the coarsest level, and a quarter as many at each finer level,
+        which has four times as many sites.
+        """
         chance = self.options.chance_at(number)
-        return max(chance, IN_PHASE) if self.phased and (number >= COARSE or number == self.levels - 1) else chance
+        return max(chance, IN_PHASE >> 2 * (self.levels - 1 - number)) if self.phased else chance
 
     def _of_phase(self, candidates: Candidates) -> InPhase | None:
         """Return the candidates of each phase, without the sites' phases; None if the sample is not regular."""
         if not self.phased or not self.sample.waves:
             return None
-        of = self.sample.phase_numbers_at(self.machine.get(candidates.positions))
-        begin, numbers = in_phase(of, self.sample.waves.divisions)
+        positions = self.machine.get(candidates.positions)
+        if self._in_phase is None or not np.array_equal(self._in_phase[0], positions):
+            of = self.sample.phase_numbers_at(positions)
+            self._in_phase = positions, *in_phase(of, self.sample.waves.divisions)
+        _, begin, numbers = self._in_phase
         return InPhase(self.machine.put(begin), self.machine.put(numbers), None)
 
 

@@ -402,14 +402,15 @@ class Options:
 def begins(before: Options, now: Options, levels: int) -> int:
     """Return the first level at which a run with other options differs from an earlier one with the same input.
 
-    ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only the
-    finish does.
+    ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does, and the sample
+    has no lattice; -1 if only the finish does.
     """
     old, new = vars(before), vars(now)
     different = {name for name in old if old[name] != new[name]}
     if different <= {"finish"}:
         return -1
-    if different <= {"finish", *SEARCHED} and levels > 1:  # the coarsest level weighs all candidates
+    weighs_all = now.lattice == "none"  # at the coarsest level
+    if different <= {"finish", *SEARCHED} and levels > 1 and weighs_all:
         return levels - 2
     return levels - 1
 
