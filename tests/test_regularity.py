@@ -54,6 +54,63 @@ def test_the_lattice_of_a_regular_picture_is_found(name):
     assert same_lattice(found.basis, BASES[name], 0.5 if name == "hexagons" else 0.25), found
 
 
+def bars(shape, period, seed=1):
+    """Bright bars 8 pixels wide and dark lines between them, along both axes, slightly turned, in noise."""
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
+    grey = 120.0
+    for t in (y - 0.01 * x, x + 0.01 * y):
+        grey = grey + np.where(t % period < 8, 60, 0) - np.where((t + 17) % period < 3, 40, 0)
+    return (grey + np.random.default_rng(seed).normal(0, 8, shape)).clip(0, 255).astype(np.uint8)
+
+
+def planks(shape, width, length, shift, seed=1):
+    """Planks of different greys between dark joints; each row is moved by a part ``shift`` of a length."""
+    rng, (y, x) = np.random.default_rng(seed), np.indices(shape)
+    row = y // width
+    along = x + row % shift * length // shift
+    grey = rng.normal(130, 12, (shape[0] // width + 1, shape[1] // length + 3))[row, along // length]
+    grey[(y % width < 3) | (along % length < 3)] = 40
+    return (grey + rng.normal(0, 6, shape)).clip(0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("picture", "basis"),
+    [
+        (bars((300, 300), 100), ((100, -1), (1, 100))),
+        (planks((256, 256), 24, 120, 3), ((24, -40), (24, 80))),
+        (planks((384, 384), 24, 120, 3), ((24, -40), (24, 80))),
+        (planks((192, 256), 32, 90, 2), ((32, 45), (32, -45))),
+    ],
+    ids=["bars", "planks", "many planks", "wide planks"],
+)
+def test_ridges_of_the_autocorrelation_mislead_nobody(picture, basis):
+    """All lags of whole rows are alike in planks, and neighbours of a node in bars, so false lattices are strong."""
+    assert same_lattice(found_in(picture[..., None]).basis, basis, 0.5)
+
+
+def jog(picture, period, width=8):
+    """The largest distance in pixels of a bright vertical bar, the mean of nine rows each, from a straight line."""
+    picture = picture - np.median(picture, 1, keepdims=True)
+    strength = ndimage.uniform_filter(picture.astype(float), (9, width), mode="wrap")
+    worst, step = 0.0, picture.shape[1] / round(picture.shape[1] / period)
+    first = strength.mean(0)[: round(step)].argmax()
+    for left in np.arange(first, picture.shape[1] - 1, step):
+        near = (round(left) + np.arange(-10, 11)) % picture.shape[1]
+        row, at = np.arange(len(picture)), strength[:, near].argmax(1)
+        worst = max(worst, np.abs(at - np.polyval(np.polyfit(row, at, 1), row)).max())
+    return worst
+
+
+def test_bars_and_joints_stay_straight(any_device):
+    cloth, wall = bars((132, 132), 44), 255 - planks((96, 132), 24, 44, 2)
+    made = [
+        np.asarray(simdtex.synthesize(one, shape, rng=1, device=any_device), float)
+        for one, shape in ((cloth, (176, 176)), (wall, (144, 132)))
+    ]
+    assert max(jog(cloth, 44), jog(wall.T, 24, 3)) < 1
+    assert max(jog(made[0], 44), jog(made[0].T, 44), jog(made[1].T, 24, 3)) <= 2
+
+
 @pytest.mark.parametrize("how", ["colour", "float", "gaps", "noisy"])
 def test_it_is_found_in_pictures_of_every_kind(how):
     picture = spots(BASES["oblique"], channels=3 if how == "colour" else 1, noise=40 if how == "noisy" else 20)
