@@ -104,7 +104,8 @@ class Options:
         "Keep a regular texture on the lattice of the sample (auto), on that of two vectors DY,DX,DY,DX in pixels, or "
         "on none",
         more="``auto`` finds the lattice of a sample of 32 or more rows and columns, if it has one. A pixel's place "
-        "within a cell is then a guide, as in `guide`, of weight 1. On a torus the lattice is deformed to fit, by 15 % "
+        "within a cell is then a guide, as in `guide`, of weight 1, and random candidates are of a site's own place in "
+        "the cell unless the search is exact. On a torus the lattice is deformed to fit, by 15 % "
         'at most. With categories, and with ``pixel="density"``, there is no lattice.',
         paper="none",
         group="Appearance",
