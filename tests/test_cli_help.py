@@ -36,7 +36,7 @@ def help_of(name, width=100):
 
 
 def test_there_are_not_too_many_options():
-    assert len([one for name, one in OPTIONS if name == "synth"]) <= 50, "one more is --help"
+    assert len([one for name, one in OPTIONS if name == "synth"]) <= 51, "one more is --help"
     assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 115, "each is needed"
 
 
