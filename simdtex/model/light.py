@@ -132,7 +132,7 @@ def unevenness(picture: NDArray[Any]) -> dict[str, float]:
 
     ``smooth`` is the trend's share of the variance of the means, and ``share`` its deviation in units of the pixels'.
     """
-    if min(picture.shape[:2]) < BLOCKS or np.abs(picture).max() > LARGEST:
+    if min(picture.shape[:2]) < BLOCKS or float(np.abs(picture).max()) > LARGEST:
         return {"smooth": 0.0, "share": 0.0}
     means = plane = picture.mean(-1, dtype=np.float64)
     for axis, side in enumerate(plane.shape):
