@@ -32,7 +32,7 @@ TEXTS = {
     ),
     *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
     *("origin", "cell", "several", "outside", "columns", "categories", "variables"),
-    *("direction", "mapping", "memory", "film", "phases"),
+    *("direction", "light", "mapping", "memory", "film", "phases"),
     *("names", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")

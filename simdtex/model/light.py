@@ -25,11 +25,14 @@ LIGHTS = ("keep", "even")
 ROUNDS, CUT = 5, 7.0
 """Rounds of least squares, and the residual, in medians of all residuals, from which a pixel has no weight."""
 
-MOST = 2**20
+MOST = 2**18
 """The most pixels that a fit uses: of a larger picture every n-th row and column."""
 
 ROUND = 2.0**20
 """Coefficients are rounded to 1 / ROUND of the channel's range: libraries differ in their last bits by less."""
+
+EXACT = 2.0**53
+"""The largest integers of floats."""
 
 SINGULAR = 1e-6
 """Ratio of singular values below which a term is not determined, and is 0: such as the bend of two rows."""
@@ -94,6 +97,8 @@ def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
     y, x = (_centred(np.arange(side)[part], side) for side, part in zip(shape, every, strict=True))
     known = picture[inside]
     ends = np.stack([known.min(0), known.max(0)])
+    if picture.dtype.kind in "iu" and float(np.abs(ends.astype(np.float64)).max()) > EXACT:
+        raise ValueError(f"integers beyond {EXACT:.0f} have no trend in floats; give smaller ones, or leave light out")
     terms, limits = np.zeros((6, len(ends[0]))), np.zeros((2, len(ends[0])))
     for channel, (low, high) in enumerate(ends.T.astype(np.float64).tolist()):
         plane = picture[(*every, channel)]
