@@ -16,20 +16,7 @@ COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
 READ, WRITE = ("read", "enter"), ("write", "folder", "either")
 TEXTS = {
     # options and arguments of text that name no file; those of `mix` repeat the name of a SAMPLE
-    *(
-        "host",
-        "device",
-        "size",
-        "light",
-        "method",
-        "preset",
-        "relaxation",
-        "pixel",
-        "search",
-        "edges",
-        "boundary",
-        "weights",
-    ),
+    *("host", "device", "size", "method", "preset", "relaxation", "pixel", "search", "edges", "boundary", "weights"),
     *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
     *("origin", "cell", "several", "outside", "columns", "categories", "variables"),
     *("direction", "light", "mapping", "memory", "film", "phases"),

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from simdtex.checkpoint import check_version, warn
 from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
+from simdtex.inputs import Lit
 from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs, with_light
 from simdtex.machine import Machine, memory
@@ -23,9 +24,9 @@ from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.model.light import LIGHTS, unevenness
+from simdtex.model.light import unevenness
 from simdtex.model.source_map import apply_source_map
-from simdtex.options import one_of, require, resolve
+from simdtex.options import require, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -236,7 +237,7 @@ def plan(
 
 
 def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any], light: str) -> Plan:
-    one_of("light", light, LIGHTS)
+    table(Lit)["light"].check("light", light)
     chosen = resolve(Options, "synth", options)
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")

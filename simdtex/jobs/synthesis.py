@@ -169,8 +169,8 @@ def explain(
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
     **options
-        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``light``, ``device`` and
-        ``rng``, the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
+        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``light``,
+        ``device`` and ``rng``, the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
 
     Returns
     -------

@@ -19,9 +19,6 @@ from simdtex.options import LARGEST, moderate
 
 Axes = tuple[int, ...]
 
-LIGHTS = ("keep", "even")
-"""The words of the option ``light``."""
-
 ROUNDS, CUT = 5, 7.0
 """Rounds of least squares, and the residual, in medians of all residuals, from which a pixel has no weight."""
 
@@ -30,9 +27,6 @@ MOST = 2**18
 
 ROUND = 2.0**20
 """Coefficients are rounded to 1 / ROUND of the channel's range: libraries differ in their last bits by less."""
-
-EXACT = 2.0**53
-"""The largest integers of floats."""
 
 SINGULAR = 1e-6
 """Ratio of singular values below which a term is not determined, and is 0: such as the bend of two rows."""
@@ -97,8 +91,8 @@ def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
     y, x = (_centred(np.arange(side)[part], side) for side, part in zip(shape, every, strict=True))
     known = picture[inside]
     ends = np.stack([known.min(0), known.max(0)])
-    if picture.dtype.kind in "iu" and float(np.abs(ends.astype(np.float64)).max()) > EXACT:
-        raise ValueError(f"integers beyond {EXACT:.0f} have no trend in floats; give smaller ones, or leave light out")
+    if picture.dtype.kind in "iu" and np.abs(ends.astype(np.float64)).max() > 2.0**53:  # those of floats
+        raise ValueError("integers beyond 2**53 have no trend; give smaller ones, or leave light out")
     terms, limits = np.zeros((6, len(ends[0]))), np.zeros((2, len(ends[0])))
     for channel, (low, high) in enumerate(ends.T.astype(np.float64).tolist()):
         plane = picture[(*every, channel)]
