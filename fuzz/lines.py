@@ -78,6 +78,7 @@ CHOICES = {
     "preset": ("default", "paper"),
     "alpha": ("0", "0.3", "auto"),
     "start": ("up", "random"),
+    "light": ("keep", "even"),
 }
 """Valid words of options that are not a `simdtex.options.Choice` of a method."""
 

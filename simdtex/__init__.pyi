@@ -115,6 +115,7 @@ class SynthesizeKeywords(MrfOptions, total=False):
     mask: ArrayLike | Sequence[ArrayLike] | None
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     guide: tuple[Any, Any] | None
+    light: Literal["keep", "even"]
     method: Literal["mrf"]
     known_source: ArrayLike | None
     device: str | Machine | None
@@ -124,6 +125,7 @@ class SynthesizeKeywords(MrfOptions, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 class SynthesizeMultiresKeywords(MultiresOptions, total=False):
+    light: Literal["keep", "even"]
     method: Required[Literal["multires"]]
     device: str | Machine | None
     callback: Callback | None
@@ -132,6 +134,7 @@ class SynthesizeMultiresKeywords(MultiresOptions, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 class SynthesizePyramidKeywords(PyramidOptions, total=False):
+    light: Literal["keep", "even"]
     method: Required[Literal["pyramid"]]
     device: str | Machine | None
     callback: Callback | None
@@ -147,6 +150,7 @@ class SynthesizeSolidKeywords(SolidOptions, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 class FillKeywords(MrfOptions, total=False):
+    light: Literal["keep", "even"]
     grow: int
     feather: int
     sample: ArrayLike | None
@@ -158,6 +162,7 @@ class FillKeywords(MrfOptions, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 class ExtendKeywords(MrfOptions, total=False):
+    light: Literal["keep", "even"]
     left: int
     right: int
     top: int
@@ -233,6 +238,7 @@ class ReplayKeywords(MrfOptions, total=False):
     mask: ArrayLike | Sequence[ArrayLike] | None
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     guide: tuple[Any, Any] | None
+    light: Literal["keep", "even"]
     known_source: ArrayLike | None
     device: str | Machine | None
     channel_axis: int | None

@@ -271,7 +271,22 @@ class Guided:
 
 
 @dataclass
-class Synth(Common, Guided, Sampled):
+class Lit:
+    """How uneven light is treated."""
+
+    light: Literal["keep", "even"] = given(
+        Choice(("keep", "even")),
+        "Keep the sample's light, or take pixels from the sample in even light",
+        "Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic "
+        "of row and column. A part that is made in a picture gets the picture's light again. Where a result wraps "
+        "around, it has even light.",
+        default="keep",
+        group="Appearance",
+    )
+
+
+@dataclass
+class Synth(Common, Lit, Guided, Sampled):
     """The inputs of `simdtex.synthesize`."""
 
     sample: ArrayLike = needed(
@@ -322,7 +337,7 @@ class Solid(Common):
 
 
 @dataclass
-class Fill(Common):
+class Fill(Common, Lit):
     """The inputs of `simdtex.fill`."""
 
     image: ArrayLike = needed(Data(PICTURE), doc="The picture; any real type.", checker="picture with gaps")
@@ -362,7 +377,7 @@ class Fill(Common):
 
 
 @dataclass
-class Extend(Common):
+class Extend(Common, Lit):
     """The inputs of `simdtex.extend`."""
 
     image: ArrayLike = needed(

@@ -150,6 +150,8 @@ class Output:
         ``lattice`` of ``mrf`` is None unless the sample repeats. It has the two ``vectors`` of the output's lattice,
         (row, column) in pixels, the ``deformation`` that fits the sample's lattice to the output, 0 if none, and
         ``fitting``, the rows and columns of an output that needs less deformation.
+        ``light`` has the value of the option ``light`` and, but for ``fill``, how uneven the light of the sample is:
+        ``smooth`` and ``share``, see `simdtex.model.light.unevenness`.
     fit : (rows, cols, classes) float32 array or None
         `simdtex.classify`: the probability that a texture of each class differs from its samples as much as the picture
         does around each pixel, within its segment.

@@ -402,6 +402,7 @@ RUNS = {
         simdtex.fill, lambda: texture((14, 15), 3, np.float64), hole, channel_axis=-1, order=2, grow=1, feather=1
     ),
     "extend": arguments(simdtex.extend, GREY, right=3, seamless="y", band=2, order=2),
+    "extend-light": arguments(simdtex.extend, GREY, right=3, seamless="y", band=2, order=2, light="even"),
     # the other methods
     "multires": multires((13, 11), (15, 18)),
     "multires-luminance": multires((9, 10), (13, 8), channels=3, alpha=3, beta=1, levels=4),

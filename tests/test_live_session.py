@@ -19,6 +19,7 @@ from PIL import ImageCms
 
 import simdtex
 from simdtex import cli
+from simdtex.inputs import inputs
 from simdtex.io.image import read_bytes
 from simdtex.live import frames, results
 from simdtex.live import session as sessions
@@ -922,9 +923,9 @@ def test_several_holes_are_not_looked_into():
 def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
     options, command = TABLES[name]
     flags = {flag for one in cli.load(command).params if isinstance(one, click.Option) for flag in one.opts}
-    own = table(options)
+    own = {other: one for other, one in table(options).items() if command in one.shown} | inputs(command)
     found = json.loads(json.dumps(controls(name), allow_nan=False))  # as the page gets them
-    assert {one["name"] for one in found} <= {other for other, one in own.items() if command in one.shown}
+    assert {one["name"] for one in found} <= own.keys()
     for control in found:
         one = own[control["name"]]
         assert f"--{control['name'].replace('_', '-')}" in flags

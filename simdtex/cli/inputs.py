@@ -423,8 +423,8 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArr
     free: it has NaN there.
     """
     from simdtex.io.image import coloured
-    from simdtex.methods.mrf.options import CATEGORIES, few
     from simdtex.methods.mrf.plan import LABELS
+    from simdtex.model.pictures import CATEGORIES, few
 
     _check_flat(files)
     (paths, out), samples, labels = pair, files.samples, files.options["labels"]

@@ -228,6 +228,14 @@ def command_line() -> str:
     return os.fsencode(words).decode(errors="backslashreplace")  # the name of a file may be no text
 
 
+def notes(output: Any) -> None:
+    """Print the sentences on the sample of a run, if there are any."""
+    from simdtex.model.light import sample_sentences
+
+    if found := sample_sentences(output.statistics):
+        click.echo(found)
+
+
 def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) -> None:
     """Write the page of a texture and its sample, and the command line."""
     from simdtex.report.synthesis import write_synthesis

@@ -34,7 +34,7 @@ from simdtex.cli.inputs import (
     size_text,
     take_reading,
 )
-from simdtex.cli.job import Task, command_line, job, observed, short_seed, watching, write_page
+from simdtex.cli.job import Task, command_line, job, notes, observed, short_seed, watching, write_page
 from simdtex.cli.options import (
     DEVICE,
     DIRECTION,
@@ -236,11 +236,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
             click.echo(f"candidates per level, coarse to fine: {counts}")
         elif method == "pyramid":
             click.echo(last_iteration(statistics))
-        else:
-            from simdtex.model.regularity import lattice_sentence
-
-            if note := lattice_sentence(statistics["lattice"]):
-                click.echo(note)
+        notes(output)
         if options["array"]:
             from simdtex.report.tables import print_accounting
 
@@ -269,7 +265,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
 @OUTPUT
 @input_options("extend", *SIDES)
 @size_option("that with the pixels of --left, --right, --top and --bottom", base="PICTURE")
-@input_options("extend", "seamless", "band")
+@input_options("extend", "seamless", "band", "light")
 @material_options
 @PREVIEW
 @stages_option("every level and sweep")
@@ -302,7 +298,7 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     show_default=True,
     help="Join left and right (x), top and bottom (y), or both.",
 )
-@input_options("extend", "band")
+@input_options("extend", "band", "light")
 @material_options
 @PREVIEW
 @stages_option("every level and sweep")
@@ -338,7 +334,8 @@ def continued(
         str(target),
         writers,
         whole.limits,
-        report=partial(write_page, pixels, continued=True),
+        lambda made, output: notes(output),
+        partial(write_page, pixels, continued=True),
     )
 
 

@@ -257,11 +257,13 @@ class Store:
         source: bool,
         maps: Maps,
         command: Any = None,
+        light: str = "keep",
     ) -> Store:
         """Make a store, ready for its first turn, and return it.
 
         ``channels``: whether the image has a channel axis; ``source``: whether the source map is written, too;
-        ``maps``: further maps to write, one for each picture of the sample; ``command``: kept for ``ended``.
+        ``maps``: further maps to write, one for each picture of the sample; ``command``: kept for ``ended``;
+        ``light``: whether the light of the plan's sample was made even.
         """
         zarr.open_group(Files(where), mode="w-")
         store, held, scattered = Store(where), False, {}
@@ -281,7 +283,7 @@ class Store:
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
-        about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command}
+        about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command, "light": light}
         more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
         store._keep("run", about, [described(plan), layout.levels[0].side, *more])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
@@ -359,6 +361,7 @@ class Store:
     def finish(self, work: Work) -> None:
         """Note that the output is complete, with its description."""
         about = {"format": FORMAT, "version": version("simdtex"), "name": self._files.name, "seed": work.seed}
+        about["light"] = self.about["light"]
         arrays = {name: self._description(name) for name in work.outputs}
         self.root.attrs["simdtex"] = about | {"options": asdict(work.plan.options), "arrays": arrays}
 

@@ -16,15 +16,17 @@ from numpy.typing import ArrayLike
 from simdtex.checkpoint import check_version, warn
 from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
+from simdtex.inputs import Lit
 from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
-from simdtex.jobs.inputs import Inputs, check_inputs
+from simdtex.jobs.inputs import Inputs, check_inputs, with_light
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
+from simdtex.model.light import unevenness
 from simdtex.model.source_map import apply_source_map
-from simdtex.options import require, resolve
+from simdtex.options import require, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -59,6 +61,7 @@ def synthesize(
     known: ArrayLike | None = None,
     known_source: ArrayLike | None = None,
     guide: tuple[Any, Any] | None = None,
+    light: str = "keep",
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
     callback: Callback | None = None,
@@ -88,7 +91,7 @@ def synthesize(
         Further maps of the material, of the sample's size, which are written in the same arrangement into arrays of
         these names. With several samples a list of maps for each name, as in
         `simdtex.model.source_map.apply_source_map`.
-    mask, known, known_source, guide, rng
+    mask, known, known_source, guide, light, rng
         As in `simdtex.synthesize`. This process copies known values and guides into the store.
     device : str, optional
         As in `simdtex.synthesize`, on every worker.
@@ -124,7 +127,7 @@ def synthesize(
     """
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
-    run, seed = _plan(inputs, size, options), as_seed(rng)
+    run, seed = _plan(inputs, size, options, light), as_seed(rng)
     layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
     require("distributed", "zarr", "dask")
     from simdtex.distributed.cluster import check_workers, connected
@@ -136,7 +139,8 @@ def synthesize(
     with connected(workers) as client:
         with _made(store) as temporary:
             channels = channel_axis is not None
-            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, command=command)
+            about = {"command": command, "light": light}
+            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, **about)
         how: dict[str, Any] = {"device": device, "callback": callback, "note": note, "ended": ended}
         return resume(store, workers=client, channel_axis=channel_axis, **how)
 
@@ -189,6 +193,8 @@ def resume(
                     image, output = drive(Tiles(opened, each), Reference(), opened.about["seed"], callback)
                     for name in ("device", "device_seconds"):  # of the leading process
                         del output.statistics[name]
+                    pixels = opened.work.plan.sample.pictures.pixels[0]
+                    output.statistics["light"] = {"light": opened.about["light"], **unevenness(pixels)}
                     if ended:
                         ended(opened.samples(), image, output, opened.about["command"])
                     opened.finish(opened.work)
@@ -209,13 +215,14 @@ def plan(
     channel_axis: int | None = None,
     source_map: bool = False,
     maps: dict[str, Any] | None = None,
+    light: str = "keep",
     **options: Any,
 ) -> Layout:
     """Return the layout of an output in tiles, and the memory and disk that it needs.
 
     Parameters
     ----------
-    sample, shape, tiles, channel_axis, source_map, maps, **options
+    sample, shape, tiles, channel_axis, source_map, maps, light, **options
         As in `synthesize`; the options may include ``mask``, ``known``, ``known_source`` and ``guide``.
 
     Returns
@@ -225,15 +232,17 @@ def plan(
     """
     size = check_shape(shape)
     given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
-    run = _plan(check_inputs(sample, size, channel_axis, **given), size, options)
+    run = _plan(check_inputs(sample, size, channel_axis, **given), size, options, light)
     return planned(run, 0, tiles, further(run, source_map, _maps(maps or {}, run)))
 
 
-def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Plan:
+def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any], light: str) -> Plan:
+    table(Lit)["light"].check("light", light)
     chosen = resolve(Options, "synth", options)
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
-    return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+    sample, _ = with_light(inputs.pictures, light, chosen.categorical)
+    return planned_run(sample, size, chosen, inputs.given, inputs.guide)
 
 
 def _maps(maps: dict[str, Any], plan: Plan) -> Maps:

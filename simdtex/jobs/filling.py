@@ -15,16 +15,17 @@ from scipy import ndimage
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import drive
 from simdtex.inputs import Extend, Fill
-from simdtex.jobs.inputs import Work, public
+from simdtex.jobs.inputs import Work, public, trends, with_light
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
-from simdtex.methods.mrf.options import Options, few
+from simdtex.methods.mrf.options import Options
 from simdtex.methods.mrf.replay import Instant, Replay, Sweep
 from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.light import Relit, unevenness
+from simdtex.model.pictures import Mask, Pictures, few
 from simdtex.options import resolve, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
@@ -122,8 +123,14 @@ def fill(call: Fill) -> Work:
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     chosen = resolve(Options, "fill", call.options)
     call.image, call.mask = np.where(hole[..., None], 0, pixels), hole
-    job = Filling(pixels, hole, call.sample, call.reach, chosen, share)
-    return Work(job, chosen, call.channel_axis)
+    sample, relit = call.sample, None
+    if call.light == "even":
+        sample = sample and with_light(sample, call.light, chosen.categorical)[0]
+        (found,) = trends([pixels], [~hole], chosen.categorical)
+        relit = Relit(pixels, hole, found)
+        pixels = found.removed(pixels)
+    job: Any = Filling(pixels, hole, sample, call.reach, chosen, share)
+    return Work(job, chosen, call.channel_axis, light={"light": call.light}, relit=relit)
 
 
 @public("extend", without="boundary")
@@ -158,7 +165,6 @@ def extend(call: Extend) -> Work:
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
     canvas = np.zeros(shape, pixels.dtype)
-    canvas[top : top + rows, left : left + cols] = pixels
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
     if 2 * across >= cols or 2 * along >= rows:
@@ -167,6 +173,16 @@ def extend(call: Extend) -> Work:
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
     chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | call.options)
+    at: Any = slice(top, top + rows), slice(left, left + cols)
+    light, relit = {"light": call.light, **unevenness(pixels)}, None
+    if call.light == "even":
+        (found,) = trends([pixels], [np.ones((rows, cols), bool)], chosen.categorical)
+        wraps = (0,) * tall + (1,) * wide
+        whole = canvas.copy()
+        whole[at] = found.removed(pixels, wraps)
+        relit = Relit(whole, hole, found, (top, left), wraps)
+        pixels = found.removed(pixels)
+    canvas[at] = pixels
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
@@ -176,7 +192,8 @@ def extend(call: Extend) -> Work:
     if not seamless and _has_tones(chosen, pictures):
         corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
-    return Work(mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), chosen, call.channel_axis)
+    plan = mrf.plan(pictures, canvas.shape[:2], chosen, given, guide)
+    return Work(plan, chosen, call.channel_axis, light=light, relit=relit)
 
 
 class Made(NamedTuple):

@@ -25,9 +25,10 @@ from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
 from simdtex.machine import Machine, memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
-from simdtex.model.pictures import HALVES, Mask, Pictures, Turned, check_alike, turned, unknown_in
+from simdtex.model.light import Relit, Trend, trend, unevenness
+from simdtex.model.pictures import HALVES, Mask, Pictures, Turned, check_alike, few, turned, unknown_in
 from simdtex.options import UNSET, DataWarning, check_real, entries, lists, option_parameters, unmasked
-from simdtex.run import Callback, Output
+from simdtex.run import Callback, Output, Progress
 
 SUMS = 1e-3
 """The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
@@ -53,12 +54,34 @@ class Work(NamedTuple):
 
     ``run`` is a plan, or a function that drives several in turn; ``options`` are those of the method; ``axis`` is the
     channel axis of the returned picture; and ``finish(picture, output)`` returns what the function returns instead.
+    ``light`` is for the statistics, and ``relit`` puts the light back into pictures of the run.
     """
 
     run: Plan | Callable[[Machine, int, Callback | None, Checkpointing], tuple[NDArray[Any], Output]]
     options: Any
     axis: int | None
     finish: Callable[[Any, Output], Any] | None = None
+    light: dict[str, Any] | None = None
+    relit: Relit | None = None
+
+    def lit(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Run the job; its pictures have the light of the picture that they continue."""
+        run: Any = self.run if callable(self.run) else partial(drive, self.run)
+        relit, seen = self.relit, callback
+        if relit and callback:
+
+            def seen(progress: Progress) -> Any:
+                return callback(replace(progress, image=lambda: relit(progress.image(), progress.level)))
+
+        made, output = run(machine, seed, seen, checkpointing)
+        if self.light:
+            output.statistics["light"] = self.light
+        if relit is None:
+            return made, output
+        stages = [replace(stage, image=relit(stage.image, stage.level)) for stage in output.stages]
+        return relit(made), replace(output, stages=stages)
 
 
 def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any]:
@@ -98,9 +121,8 @@ def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any
                 found = {name: IDENTITIES[one.identity](call, name) for name, one in own.items() if one.identity}
                 return found | {"options": work.options}
 
-            run: Any = work.run if callable(work.run) else partial(drive, work.run)
             shared = (work.axis, call.rng, call.device, call.callback, bool(work.finish or call.full_output))
-            made: Any = execute(plan.__name__, run, identity, *shared, call.checkpoint)
+            made: Any = execute(plan.__name__, work.lit, identity, *shared, call.checkpoint)
             return work.finish(*made) if work.finish else made
 
         if plan.__doc__:
@@ -211,6 +233,32 @@ def check_picture(image: Any, channel_axis: int | None, axes: int = 2) -> tuple[
     pixels = check_sample(array, channel_axis, unknown=True, axes=axes)
     hidden = np.ma.getmaskarray(array)
     return pixels, unknown_in(pixels) | (hidden if channel_axis is None else hidden.any(channel_axis))
+
+
+def with_light(pictures: Pictures, light: str, categorical: Any = False) -> tuple[Pictures, dict[str, Any]]:
+    """Return the pictures of a sample with the option ``light``, and how uneven their light is, for the statistics.
+
+    Only pixels that are known and may be taken count. Raises ValueError if the values are categories.
+    """
+    about = {"light": light, **unevenness(pictures.pixels[0])}
+    if light == "keep":
+        return pictures, about
+    use = [np.ones(one.shape[:2], bool) for one in pictures.pixels]
+    for masks in filter(None, (pictures.known, pictures.usable)):
+        use = [one & mask for one, mask in zip(use, masks, strict=True)]
+    found = trends(pictures.pixels, use, categorical)
+    pixels = tuple(one.removed(picture) for one, picture in zip(found, pictures.pixels, strict=True))
+    return replace(pictures, pixels=pixels), about
+
+
+def trends(pixels: Sequence[NDArray[Any]], use: Sequence[Mask], categorical: Any) -> list[Trend]:
+    """Return the trends that ``light="even"`` removes; raise ValueError if the values are categories."""
+    if categorical or few(pixels):
+        raise ValueError(
+            'light="even" subtracts a smooth trend, and categories, or at most 16 different pixels, have none; '
+            "leave light out"
+        )
+    return [trend(*pair) for pair in zip(pixels, use, strict=True)]
 
 
 def is_several(sample: Any, channel_axis: int | None) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.driver import with_channels_last
 from simdtex.inputs import Mix, Solid, Synth, options_of
-from simdtex.jobs.inputs import Work, check_inputs, public
+from simdtex.jobs.inputs import Work, check_inputs, public, with_light
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf, pyramid
 from simdtex.methods.mrf.replay import Replay
@@ -70,11 +70,12 @@ def synthesize(call: Synth) -> Work:
         )
     given = with_channels_last(call.options, call.channel_axis)
     chosen: Any = resolve(options_of("synth")[call.method], "synth", given)
+    sample, light = with_light(call.sample, call.light, getattr(chosen, "categorical", False))
     if call.method == "mrf":
-        plan = mrf.plan(call.sample, call.shape, chosen, call.inputs.given, call.inputs.guide)
-        return Work(replace(plan, remedy=TILED), chosen, call.channel_axis)
-    algorithm = import_module(f"simdtex.methods.{call.method}.algorithm")
-    return Work(algorithm.Plan(call.sample.pixels[0], call.shape, chosen), chosen, call.channel_axis)
+        plan: Any = replace(mrf.plan(sample, call.shape, chosen, call.inputs.given, call.inputs.guide), remedy=TILED)
+    else:
+        plan = import_module(f"simdtex.methods.{call.method}.algorithm").Plan(sample.pixels[0], call.shape, chosen)
+    return Work(plan, chosen, call.channel_axis, light=light)
 
 
 @public("solid")
@@ -168,8 +169,8 @@ def explain(
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
     **options
-        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``device`` and ``rng``,
-        the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
+        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``light``,
+        ``device`` and ``rng``, the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
 
     Returns
     -------

@@ -331,13 +331,17 @@ def _suffix(pixels: Array) -> str:
 def controls(name: str) -> list[dict[str, Any]]:
     """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider.
 
+    Inputs that are words are options, too.
+
     A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
     ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
     Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
     ``empty``, the text of an empty field; and ``usual``, its number, None if that is not fixed.
     """
     options, job = TABLES[name]
-    made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
+    shown = {name: one for name, one in table(options).items() if job in one.shown}
+    words = {name: one for name, one in inputs(job).items() if isinstance(one.kind, Choice) and not one.painter}
+    made = [_control(name, one, one.default_of(job)) for name, one in (shown | words).items()]
     return [control for control in made if "kind" in control]
 
 

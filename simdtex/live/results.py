@@ -19,7 +19,7 @@ from simdtex.live.job import Job
 from simdtex.machine import Machine
 from simdtex.model.display import write_labels
 from simdtex.model.explanation import Explanation
-from simdtex.model.regularity import lattice_sentence
+from simdtex.model.light import sample_sentences
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of, whole
 from simdtex.run import Output
@@ -52,7 +52,7 @@ class Result:
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
         self.source, self.temperature = output.source, output.temperature
-        self.lattice = output.statistics.get("lattice")
+        self.lattice, self.note = output.statistics.get("lattice"), sample_sentences(output.statistics)
         complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
@@ -93,7 +93,7 @@ class Result:
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "settings": self.job.message},
             **{"picture": self.job.given[0].name},
-            **{"note": lattice_sentence(self.lattice), "lattice": self.lattice, "shares": self.job.shares(self.image)},
+            **{"note": self.note, "lattice": self.lattice, "shares": self.job.shares(self.image)},
             **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
         }

@@ -34,7 +34,7 @@ from simdtex.methods import mrf
 from simdtex.model.display import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
-from simdtex.options import one_of, resolve
+from simdtex.options import one_of, resolve, table
 from simdtex.run import Progress
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
@@ -483,7 +483,9 @@ class Session:
         """Return the states of the run, with the level that it starts from, and send that to the page."""
         key = {name: value for name, value in job.message.items() if name != "options"}
         restarts = job.method == "mrf" and job.kind != "fill"
-        options = resolve(mrf.Options, job.kind, job.options if restarts else {})
+        own = {name: value for name, value in job.options.items() if name in table(mrf.Options)}
+        key |= {name: value for name, value in job.options.items() if name not in own}  # of inputs
+        options = resolve(mrf.Options, job.kind, own if restarts else {})
         levels = Levels(key if restarts else None, options, self._levels)
         first = "labels" if job.kind == "classify" else "picture"
         layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]

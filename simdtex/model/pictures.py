@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 
+CATEGORIES = 16
+"""Different pixels up to which a sample is taken for a map of categories."""
+
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
@@ -120,6 +123,18 @@ def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
     nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     filled: NDArray[Any] = np.ascontiguousarray(picture[tuple(nearest)])
     return filled
+
+
+def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
+    """Return whether a sample, pictures (rows, cols, C), has at most ``most`` different pixels: a map of them."""
+    seen = np.zeros((0, pictures[0].shape[-1]), pictures[0].dtype)
+    for picture in pictures:
+        flat = picture.reshape(-1, picture.shape[-1])
+        for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
+            seen = np.unique(np.concatenate([seen, part]), axis=0)
+            if len(seen) > most:
+                return False
+    return True
 
 
 EIGHTHS = 8

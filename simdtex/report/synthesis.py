@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from simdtex.experiments.ensemble import WINDOW
 from simdtex.io.image import to_display
 from simdtex.model.display import label_colours, source_colours, temperature_colours, use_colours
-from simdtex.model.regularity import lattice_sentence
+from simdtex.model.light import sample_sentences
 from simdtex.model.source_map import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
 from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
@@ -58,7 +58,7 @@ def write_synthesis(
     pair = _sheet([("the sample", shown), *made], 2)
     factor = reduction(image.shape)
     reduced = f"The output is reduced: one pixel is the mean of {factor} x {factor}." if factor > 1 else ""
-    caption = " ".join(["The sample and the output.", reduced, lattice_sentence(statistics.get("lattice"))])
+    caption = " ".join(["The sample and the output.", reduced, sample_sentences(statistics)])
     sections = [Section("The picture", [Figure("picture.png", pair, " ".join(caption.split()))])]
     if output.source is not None:
         uses, whole = _counted(output.source, (rows, cols))
@@ -67,6 +67,7 @@ def write_synthesis(
             results |= {"taken": np.count_nonzero(uses) / uses.size, "copied": whole}
         sections.append(Section("Use of the sample", _use(shown, uses, made, output.source, results)))
     job: dict[str, Any] = {name: statistics[name] for name in ("seed", "tiles") if name in statistics}
+    job |= {"light": statistics["light"]["light"]} if "light" in statistics else {}
     job |= {"seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
     settings = [{"What": k, "Value": str(v)} for k, v in job.items() if not isinstance(v, np.ndarray)]
     sections.append(Section("The job", [Table("The run and the options of its method", settings)]))

@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.maspar.array import ARRAYS, parse_array
 from simdtex.model.lattice import MOST_ORDER
-from simdtex.model.pictures import Pictures
+from simdtex.model.pictures import Pictures, few
 from simdtex.model.regularity import LATTICES, parse_lattice
 from simdtex.options import (
     Choice,
@@ -29,9 +27,6 @@ from simdtex.options import (
     shown,
     whole,
 )
-
-CATEGORIES = 16
-"""Different pixels up to which a sample is taken for a map of categories."""
 
 FINISH = 1.5
 """The default standard deviation of the finish, pixels."""
@@ -414,15 +409,3 @@ def begins(before: Options, now: Options, levels: int) -> int:
     if different <= {"finish", *SEARCHED} and levels > 1 and weighs_all:
         return levels - 2
     return levels - 1
-
-
-def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
-    """Return whether a sample, pictures (rows, cols, C), has at most ``most`` different pixels: a map of them."""
-    seen = np.zeros((0, pictures[0].shape[-1]), pictures[0].dtype)
-    for picture in pictures:
-        flat = picture.reshape(-1, picture.shape[-1])
-        for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
-            seen = np.unique(np.concatenate([seen, part]), axis=0)
-            if len(seen) > most:
-                return False
-    return True

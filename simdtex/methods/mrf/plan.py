@@ -16,11 +16,11 @@ from simdtex.machine import Machine, memory
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.level import number_of_levels
-from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.pictures import CATEGORIES as MOST
 from simdtex.model.pictures import Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
