@@ -11,6 +11,7 @@ a checkpoint; the option of the command and the reader of its files (`simdtex.cl
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -129,6 +130,9 @@ MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader":
 NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
 
 
+declared: Any = partial(dataclass, init=False, repr=False, eq=False)  # of tables there are no instances
+
+
 class Planned:
     """What the call of a planner has beside the inputs: ``options`` as given, and what checks and planners add."""
 
@@ -139,7 +143,7 @@ class Planned:
     maps: Any
 
 
-@dataclass
+@declared
 class Watched(Planned):
     """The inputs that all functions share."""
 
@@ -160,7 +164,7 @@ class Watched(Planned):
     )
 
 
-@dataclass
+@declared
 class Seeded(Watched):
     """The inputs of functions that draw random numbers."""
 
@@ -188,14 +192,14 @@ class Seeded(Watched):
     )
 
 
-@dataclass
+@declared
 class Common(Seeded):
     """The inputs of functions that return the result of a run."""
 
     full_output: bool = given(Data("bool"), doc="Return a `simdtex.run.Output` too.", identity=False, default=False)
 
 
-@dataclass
+@declared
 class Sampled:
     """The inputs about the sample and what is known of the output."""
 
@@ -250,7 +254,7 @@ class Sampled:
     )
 
 
-@dataclass
+@declared
 class Guided:
     """A guide."""
 
@@ -270,7 +274,7 @@ class Guided:
     )
 
 
-@dataclass
+@declared
 class Synth(Common, Guided, Sampled):
     """The inputs of `simdtex.synthesize`."""
 
@@ -305,7 +309,7 @@ class Synth(Common, Guided, Sampled):
     )
 
 
-@dataclass
+@declared
 class Solid(Common):
     """The inputs of `simdtex.synthesize_solid`."""
 
@@ -321,7 +325,7 @@ class Solid(Common):
     )
 
 
-@dataclass
+@declared
 class Fill(Common):
     """The inputs of `simdtex.fill`."""
 
@@ -361,7 +365,7 @@ class Fill(Common):
     )
 
 
-@dataclass
+@declared
 class Extend(Common):
     """The inputs of `simdtex.extend`."""
 
@@ -392,7 +396,7 @@ class Extend(Common):
     )
 
 
-@dataclass
+@declared
 class Cells(Sampled):
     """The inputs about the training image, and where its cells and data lie."""
 
@@ -447,7 +451,7 @@ class Cells(Sampled):
     )
 
 
-@dataclass
+@declared
 class Simulate(Seeded, Guided, Cells):
     """The inputs of `simdtex.simulate`."""
 
@@ -519,7 +523,7 @@ class Simulate(Seeded, Guided, Cells):
     )
 
 
-@dataclass
+@declared
 class Estimate(Watched, Cells):
     """The inputs of `simdtex.estimate`."""
 
@@ -545,7 +549,7 @@ class Estimate(Watched, Cells):
     )
 
 
-@dataclass
+@declared
 class Classify(Common):
     """The inputs of `simdtex.classify`."""
 
@@ -593,7 +597,7 @@ class Classify(Common):
     )
 
 
-@dataclass
+@declared
 class Mix(Common):
     """The inputs of `simdtex.mix`."""
 
