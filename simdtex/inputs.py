@@ -346,7 +346,7 @@ class Fill(Common):
         Whole(0),
         "Blend the filled pixels with the picture up to this many pixels around the holes",
         default=0,
-        more="Values without a mean (categories, 16 different pixels or fewer) change half-way instead.",
+        more="Values without a mean (categories, few different pixels) change half-way instead.",
     )
     sample: ArrayLike | None = given(
         Data("array of the image's type"),

@@ -111,6 +111,8 @@ def job(
                 seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
                 drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
                 click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
+                if order := chosen_order(own, statistics):
+                    click.echo(f"The neighbourhood has order {order}, the largest that fits the sample.")
                 if task.more:
                     task.more(made, output)
             if profile:
@@ -125,6 +127,14 @@ def job(
         return command(*examples, usual=usual)(function)
 
     return decorate
+
+
+def chosen_order(given: dict[str, Any], statistics: dict[str, Any]) -> int | None:
+    """Return the order of a run if it is smaller than the default, since the sample is small."""
+    from simdtex.methods.mrf.options import ORDERS
+
+    found = None if given.get("order") else statistics.get("options", {}).get("order")
+    return None if found in ORDERS.values() else found
 
 
 def short_seed() -> int:

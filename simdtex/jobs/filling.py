@@ -18,7 +18,7 @@ from simdtex.inputs import Extend, Fill
 from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
-from simdtex.methods.mrf.options import Options, few
+from simdtex.methods.mrf.options import Options, of_palette
 from simdtex.methods.mrf.replay import Instant, Replay, Sweep
 from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
@@ -97,8 +97,8 @@ def fill(call: Fill) -> Work:
     sites, has a separate lattice, unless the picture wraps around (``boundary="torus"``) or there are many holes. The
     smooth colours around a hole, continued into it, and the place in the picture are a guide
     (`simdtex.model.guide.Surroundings`), so that the hole gets the texture of its surroundings. There is no such guide
-    with a `sample`, with categories or with 16 different pixels or fewer. Cost: that of `simdtex.synthesize` for the
-    holes' pixels, and of a sample of the surroundings' size.
+    with a `sample`, with categories or with few different pixels (see `finish`). Cost: that of `simdtex.synthesize` for
+    the holes' pixels, and of a sample of the surroundings' size.
 
     Examples
     --------
@@ -301,7 +301,7 @@ class Filling:
         """Return the windows, in the order in which they are filled."""
         if self.options.boundary == "torus":
             return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
-        return windows(self.hole, int(neighbourhood_offsets(self.options.order).max()), self.options.levels)
+        return windows(self.hole, int(neighbourhood_offsets(self.options.neighbourhood).max()), self.options.levels)
 
     def begin(self) -> Whole:
         """Return the picture before any hole is filled."""
@@ -353,7 +353,7 @@ def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:
     """Return whether the mean of pixels is a legal pixel: not for categories or for grey levels of a density."""
-    return not (options.categorical or options.pixel == "density" or few(pictures.pixels))
+    return not (options.categorical or options.pixel == "density" or of_palette(pictures.pixels))
 
 
 def _fewest_levels(pictures: Pictures) -> int:

@@ -17,6 +17,7 @@ from simdtex.inputs import Synth, options_of
 from simdtex.jobs.inputs import Work, check_inputs, public
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf
+from simdtex.methods.mrf.options import ORDERS
 from simdtex.methods.mrf.replay import Replay
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -188,7 +189,7 @@ def lcpdf(
     sample: ArrayLike,
     sites: ArrayLike,
     *,
-    order: int = mrf.Options.order,
+    order: int = ORDERS[2],
     bandwidth: float = 1.0,
     temperature: ArrayLike | None = None,
     greys: int = 256,
@@ -207,7 +208,7 @@ def lcpdf(
     sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int
-        The order o of the neighbourhood, equation (3); by default that of `synthesize`.
+        The order o of the neighbourhood, equation (3); by default that of `synthesize` with a large sample.
     bandwidth : float
         h in units of h_opt, equation (8). 1.0 is the paper's.
     temperature : (rows, cols) array, 0 to 1, optional
