@@ -26,7 +26,7 @@ RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 def test_an_order_that_was_chosen_to_fit_is_said(tmp_path, monkeypatch, side, more, said):
     monkeypatch.chdir(tmp_path)
     image.write("tile.png", (np.indices((side, side)).sum(0) % 3 * 60).astype(np.uint8))
-    words = ["tile.png", "-o", "more.png", "--size", 3, "--xi", -16, "--free-sweeps", 0, *more, "--device", "reference"]
+    words = ["tile.png", "-o", "more.png", "--size", 3, *more, "--device", "reference"]
     assert ("has order 15, the largest that fits the sample.\n" in run("synth", *words).output) == said
 
 
