@@ -42,7 +42,7 @@ ScheduleName = Literal[
 
 class MrfOptions(TypedDict, total=False):
     preset: Literal["default", "paper"]
-    order: int
+    order: int | None
     structure: float
     lattice: Literal["auto", "none"] | tuple[tuple[float, float], tuple[float, float]]
     coherence: float

@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
-from importlib.metadata import version
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,6 +23,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+import simdtex
 from simdtex.io.files import Damaged, check_target, exclusive, read_checked, write_checked
 from simdtex.options import real
 from simdtex.random import as_seed
@@ -160,7 +160,13 @@ class Checkpoint:
                 )
         command = self._command or (about or {}).get("command")
         seed = as_seed(None) if seed is None else seed
-        self._about = {"version": version("simdtex"), "seed": seed, "inputs": now, "command": command, "device": device}
+        self._about = {
+            "version": simdtex.__version__,
+            "seed": seed,
+            "inputs": now,
+            "command": command,
+            "device": device,
+        }
         if about is None:
             self._write(None)
         return seed, found
@@ -253,7 +259,7 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
 
 def check_version(name: str, about: dict[str, Any], known: int) -> None:
     """Raise unless a state with the description ``about`` has a known format and this version."""
-    wrote, own = about.get("version"), version("simdtex")
+    wrote, own = about.get("version"), simdtex.__version__
     wrong = f"format {about.get('format')} and this simdtex reads {known}" if about.get("format") != known else ""
     if not wrong and wrote != own:
         wrong = f"simdtex {wrote} and this is {own}, whose results may differ"

@@ -11,6 +11,7 @@ a checkpoint; the option of the command and the reader of its files (`simdtex.cl
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -129,6 +130,9 @@ MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader":
 NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
 
 
+declared: Any = partial(dataclass, init=False, repr=False, eq=False)  # of tables there are no instances
+
+
 class Planned:
     """What the call of a planner has beside the inputs: ``options`` as given, and what checks and planners add."""
 
@@ -139,7 +143,7 @@ class Planned:
     maps: Any
 
 
-@dataclass
+@declared
 class Watched(Planned):
     """The inputs that all functions share."""
 
@@ -160,7 +164,7 @@ class Watched(Planned):
     )
 
 
-@dataclass
+@declared
 class Seeded(Watched):
     """The inputs of functions that draw random numbers."""
 
@@ -188,14 +192,14 @@ class Seeded(Watched):
     )
 
 
-@dataclass
+@declared
 class Common(Seeded):
     """The inputs of functions that return the result of a run."""
 
     full_output: bool = given(Data("bool"), doc="Return a `simdtex.run.Output` too.", identity=False, default=False)
 
 
-@dataclass
+@declared
 class Sampled:
     """The inputs about the sample and what is known of the output."""
 
@@ -250,7 +254,7 @@ class Sampled:
     )
 
 
-@dataclass
+@declared
 class Guided:
     """A guide."""
 
@@ -270,7 +274,7 @@ class Guided:
     )
 
 
-@dataclass
+@declared
 class Lit:
     """How uneven light is treated."""
 
@@ -285,7 +289,7 @@ class Lit:
     )
 
 
-@dataclass
+@declared
 class Synth(Common, Lit, Guided, Sampled):
     """The inputs of `simdtex.synthesize`."""
 
@@ -320,7 +324,7 @@ class Synth(Common, Lit, Guided, Sampled):
     )
 
 
-@dataclass
+@declared
 class Solid(Common):
     """The inputs of `simdtex.synthesize_solid`."""
 
@@ -336,7 +340,7 @@ class Solid(Common):
     )
 
 
-@dataclass
+@declared
 class Fill(Common, Lit):
     """The inputs of `simdtex.fill`."""
 
@@ -357,7 +361,7 @@ class Fill(Common, Lit):
         Whole(0),
         "Blend the filled pixels with the picture up to this many pixels around the holes",
         default=0,
-        more="Values without a mean (categories, 16 different pixels or fewer) change half-way instead.",
+        more="Values without a mean (categories, few different pixels) change half-way instead.",
     )
     sample: ArrayLike | None = given(
         Data("array of the image's type"),
@@ -376,7 +380,7 @@ class Fill(Common, Lit):
     )
 
 
-@dataclass
+@declared
 class Extend(Common, Lit):
     """The inputs of `simdtex.extend`."""
 
@@ -407,7 +411,7 @@ class Extend(Common, Lit):
     )
 
 
-@dataclass
+@declared
 class Cells(Sampled):
     """The inputs about the training image, and where its cells and data lie."""
 
@@ -462,7 +466,7 @@ class Cells(Sampled):
     )
 
 
-@dataclass
+@declared
 class Simulate(Seeded, Guided, Cells):
     """The inputs of `simdtex.simulate`."""
 
@@ -534,7 +538,7 @@ class Simulate(Seeded, Guided, Cells):
     )
 
 
-@dataclass
+@declared
 class Estimate(Watched, Cells):
     """The inputs of `simdtex.estimate`."""
 
@@ -560,7 +564,7 @@ class Estimate(Watched, Cells):
     )
 
 
-@dataclass
+@declared
 class Classify(Common):
     """The inputs of `simdtex.classify`."""
 
@@ -608,7 +612,7 @@ class Classify(Common):
     )
 
 
-@dataclass
+@declared
 class Mix(Common):
     """The inputs of `simdtex.mix`."""
 

@@ -170,9 +170,13 @@ JOBS = {
     "solid": (["a.png", "--size", "16"], "16x16x16 from 24x20"),
     "simulate": (["a.png", "--known", "w.csv", "-n", 2, "--order", 2], "2 realisations of 24x20, 2 levels"),
     "estimate": (["a.png", "--known", "w.csv"], "maps of 24x20"),
+    "schedules": (
+        ["a.png", "--schedule", "coloring,raster", "--seeds", 2, "--size", 16, "--order", 2],
+        "2 schedules, 2 seeds, 2 levels",
+    ),
     "classify": (["a.png", "--texture", "a=a.png", "--texture", "b=b.png", "--order", 2], "24x20, 2 classes"),
 }
-OUTPUTS = {"solid": "out.npz", "simulate": "out.npz", "estimate": "out.npz"}
+OUTPUTS = {"schedules": "out", "solid": "out.npz", "simulate": "out.npz", "estimate": "out.npz"}
 
 
 @pytest.fixture
@@ -195,7 +199,7 @@ def test_a_dry_run_tells_size_memory_and_time_and_writes_nothing(inputs, name):
     command = "synth" if name == "pyramid" else name
     done = run(command, *words, "-o", OUTPUTS.get(name, "out.png"), "--dry-run", "--device", "reference")
     assert done.exit_code == 0, done.output
-    out, more = OUTPUTS.get(name, "out.png"), r", \d+ MiB of memory, about \d+\.\d s on reference \(NumPy\)"
+    out, more = OUTPUTS.get(name, "out.png"), r", \d+ MiB of memory, about \d+\.\d (s|min) on reference \(NumPy\)"
     assert re.fullmatch(rf"{out}: {summary}{more}; nothing was written\n", done.output), done.output
     assert sorted(os.listdir()) == before
 
@@ -237,7 +241,7 @@ def test_a_long_run_is_said_once_and_lines_follow_every_ten_seconds(clock, capsy
         for clock[0] in np.arange(0, 25, 0.25):
             show(Progress(fraction=clock[0] / whole, doing="level 2", image=print))
     said = ["simdtex: this is expected to last about 90.0 s"] * (whole > 60)
-    lines = [f"{now / whole:.0%}, level 2; about {whole - now:.1f} s left" for now in (10, 20)]
+    lines = [f"{now / whole:.0%}, level 2; after {now} s about {whole - now:.1f} s left" for now in (10, 20)]
     assert capsys.readouterr().err.splitlines() == said + lines
 
 

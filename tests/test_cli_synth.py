@@ -22,6 +22,14 @@ QUICK = ["--order", 2, "--seed", 5, "--device", "reference"]
 RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
 
 
+@pytest.mark.parametrize(("side", "more", "said"), [(7, [], True), (7, ["--order", 2], False), (9, [], False)])
+def test_an_order_that_was_chosen_to_fit_is_said(tmp_path, monkeypatch, side, more, said):
+    monkeypatch.chdir(tmp_path)
+    image.write("tile.png", (np.indices((side, side)).sum(0) % 3 * 60).astype(np.uint8))
+    words = ["tile.png", "-o", "more.png", "--size", 3, *more, "--device", "reference"]
+    assert ("has order 15, the largest that fits the sample.\n" in run("synth", *words).output) == said
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Samples, masks, tables, pictures of known values, and guides."""

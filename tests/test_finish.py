@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
+from simdtex.methods.mrf import Options
 from simdtex.model.lattice import Grid
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.source_map import apply_source_map
 from simdtex.ops.finish import finish
@@ -159,6 +161,28 @@ def test_categories_are_never_averaged(sample):
     seen = {tuple(np.atleast_1d(pixel)) for row in image for pixel in row}
     assert seen <= {tuple(np.atleast_1d(pixel)) for pixel in sample[0]}
     assert output.statistics["options"]["finish"] == 0
+
+
+@pytest.mark.parametrize(("side", "colours", "order"), [(3, 5, 3), (8, 7, 15), (16, 64, 18)])
+def test_the_output_of_pixel_art_has_its_colours(side, colours, order):
+    """At most 64 colours are a palette, and the default order fits a small sample; a given order has to fit."""
+    palette = np.random.default_rng(2).integers(0, 256, (colours, 3)).astype(np.uint8)
+    sample = palette[np.arange(side * side).reshape(side, side) % colours]
+    given = {"channel_axis": -1, "rng": 1, "device": REFERENCE, "xi": -16.0, "free_sweeps": 0}
+    image, output = simdtex.synthesize(sample, (5, 6), full_output=True, **given)
+    assert {tuple(one) for one in image.reshape(-1, 3)} <= {tuple(one) for one in palette}
+    options = output.statistics["options"]
+    assert (options["order"], options["finish"]) == (order, 0)
+    if order < 18:
+        with pytest.raises(ValueError, match=f"the largest order that fits is {order}"):
+            simdtex.synthesize(sample, (5, 6), order=18, **given)
+
+
+def test_a_small_photograph_is_finished():
+    """Of 65 colours, or if hardly a pixel has the colour of another one."""
+    for shape, colours in (((16, 16), 65), ((5, 5), 24)):
+        pixels = np.stack([np.arange(np.prod(shape)).reshape(shape) % colours] * 3, -1).astype(np.uint8)
+        assert Options().resolved(Pictures((pixels,))).finish == 1.5
 
 
 def test_a_finish_that_is_asked_for_averages_categories_too():

@@ -184,7 +184,7 @@ def test_a_near_miss_is_named():
 def test_the_users_values_win_over_the_preset_over_the_job_over_the_method():
     def values(job, **given):
         found = resolve(mrf.Options, job, given)
-        return found.balance, found.boundary, found.order
+        return found.balance, found.boundary, found.neighbourhood
 
     assert values("synth") == (0.5, "torus", 18)
     assert values("simulate") == (1.0, "open", 18)

@@ -65,7 +65,7 @@ def test_signatures_list_options_with_the_defaults_of_the_job():
         shown = {one.name: one.default for one in signature(getattr(simdtex, name)).parameters.values()}
         assert vars(resolve(method.Options, name, {})).items() - shown.items() <= {("boundary", "torus")}
     first, of_lcpdf = signature(simdtex.synthesize).parameters, signature(simdtex.lcpdf).parameters
-    assert (first["edges"].default, of_lcpdf["order"].default) == ("auto", first["order"].default)
+    assert (first["edges"].default, of_lcpdf["order"].default) == ("auto", mrf.Options().neighbourhood)
 
 
 def test_an_option_that_is_declared_is_everywhere(monkeypatch):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from simdtex.run import Progress
 
 
-CALIBRATION, SURE = 0.1, 1.0
+CALIBRATION, SURE = 1.0, 1.0
 """Seconds of a run after which its duration is estimated, and is said to be long."""
 
 SMOOTH, ROUGH = 0.5, 10.0
@@ -89,7 +89,7 @@ def job(
             if task is None:
                 return
             if dry_run:
-                click.echo(f"{task.names}: {task.summary}, {expected(task.make, device)}; nothing was written")
+                click.echo(f"{task.names}: {task.summary}, {expected(device, task.make)}; nothing was written")
                 return
             began = time.perf_counter()
             kept = _checkpoint(checkpoint)
@@ -111,6 +111,8 @@ def job(
                 seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
                 drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
                 click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
+                if order := chosen_order(own, statistics):
+                    click.echo(f"The neighbourhood has order {order}, the largest that fits the sample.")
                 if task.more:
                     task.more(made, output)
             if profile:
@@ -125,6 +127,16 @@ def job(
         return command(*examples, usual=usual)(function)
 
     return decorate
+
+
+def chosen_order(given: dict[str, Any], statistics: dict[str, Any]) -> int | None:
+    """Return the order of a run of ``mrf`` if it is smaller than the default, since the sample is small."""
+    if given.get("order") or "lattice" not in statistics:
+        return None
+    from simdtex.methods.mrf.options import ORDERS
+
+    order: int = statistics["options"]["order"]
+    return None if order in ORDERS.values() else order
 
 
 def short_seed() -> int:
@@ -179,20 +191,20 @@ def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
     return time.perf_counter() - forecast.began if seconds is None else seconds, levels
 
 
-def expected(make: Callable[..., Any], device: str | None) -> str:
-    """Return the levels, the memory and the expected time of a run, in words."""
+def expected(device: str | None, *makes: Callable[..., Any]) -> str:
+    """Return the levels and the memory of the last of several runs, and the expected time of all, in words."""
     from simdtex.machine import memory, open_machine
     from simdtex.report.tables import duration_text
 
-    seconds, levels = observed(make, device)
+    times, levels = zip(*(observed(make, device) for make in makes), strict=True)
     machine = open_machine(device)
     host, on_device = (
         sum(size for (where, _), size in memory.required.items() if where == here) / 2**20
         for here in ("host", "device")
     )
-    parts = [f"{levels} levels"] * (levels > 1) + [f"{host:.0f} MiB of memory"]
+    parts = [f"{levels[-1]} levels"] * (levels[-1] > 1) + [f"{host:.0f} MiB of memory"]
     parts += [] if memory.shared(machine) else [f"{on_device:.0f} MiB on the device"]
-    return ", ".join([*parts, f"about {duration_text(seconds)} on {machine.name}"])
+    return ", ".join([*parts, f"about {duration_text(sum(times))} on {machine.name}"])
 
 
 def _device(device: str | None, profile: bool) -> Any:
@@ -266,8 +278,9 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
             echo(f"simdtex: this is expected to last {duration(seconds)}")
         now = time.perf_counter()
         if now >= next_line and not bar:
-            next_line, left = now + EVERY, duration(seconds - (now - forecast.began))
-            click.echo(f"{progress.fraction:.0%}, {progress.doing}; {left} left", err=True)
+            next_line, past = now + EVERY, now - forecast.began
+            line = f"{progress.fraction:.0%}, {progress.doing}; after {past:.0f} s {duration(seconds - past)} left"
+            click.echo(line, err=True)
 
     def duration(seconds: float) -> str:
         from simdtex.report.tables import duration_text

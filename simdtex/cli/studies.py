@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import click
 
 from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
 from simdtex.cli.inputs import channels, output_shape, read_material, read_picture
-from simdtex.cli.job import Task, command_line, job, watching
+from simdtex.cli.job import Task, command_line, expected, job, watching
 from simdtex.cli.options import (
     DEVICE,
+    DRY_RUN,
     QUIET,
     SEED,
     given,
@@ -25,7 +27,7 @@ from simdtex.cli.options import (
     size_option,
 )
 from simdtex.maspar import EXECUTED
-from simdtex.schedules import PARALLEL
+from simdtex.schedules import PARALLEL, Schedule
 
 
 @command(
@@ -52,6 +54,7 @@ from simdtex.schedules import PARALLEL
 @click.option("--ising", is_flag=True, help="Relax Ising spins as well, and compare with the exact energy.")
 @job_options("schedules")
 @DEVICE
+@DRY_RUN
 @QUIET
 def schedules(
     sample: Path | None,
@@ -61,6 +64,7 @@ def schedules(
     seed: int,
     size: str,
     ising: bool,
+    dry_run: bool,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -83,16 +87,20 @@ def schedules(
     whole("--seeds", seeds, 1)
     pixels, channel_axis = _sample(sample)
     began = time.perf_counter()
+    own = {"seeds": range(seed, seed + seeds), "channel_axis": channel_axis, **given(options)}
+    if dry_run:
+
+        def spin(callback: Any, device: str | None, **_: Any) -> None:
+            of_schedules(chosen, device, seed, callback)
+
+        def run(schedule: Schedule, callback: Any, **_: Any) -> None:
+            compare(pixels, shape, [schedule], callback=callback, **own)
+
+        told = expected(options["device"], *[spin] * ising, *(partial(run, one) for one in chosen))
+        click.echo(f"{output}: {len(chosen)} schedules, {seeds} seeds, {told}; nothing was written")
+        return
     with watching(quiet) as callback:
-        found = compare(
-            pixels,
-            shape,
-            chosen,
-            seeds=range(seed, seed + seeds),
-            channel_axis=channel_axis,
-            callback=callback,
-            **given(options),
-        )
+        found = compare(pixels, shape, chosen, callback=callback, **own)
         spins = of_schedules(chosen, options["device"], seed, callback) if ising else None
     with afterwards():
         write_comparison(output, found, command_line(), spins)

@@ -194,5 +194,5 @@ def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
     """Return the layout of a level; each step of a sweep reaches the radius of the neighbourhood farther."""
     lattice, torus = Grid.of(plan.shape, 2**number), plan.options.boundary == "torus"
     assert isinstance(plan.schedule, Windowed)
-    steps = plan.schedule.count(Grid(lattice.shape, torus), plan.options.order, seed)
+    steps = plan.schedule.count(Grid(lattice.shape, torus), plan.options.neighbourhood, seed)
     return LevelLayout(number, lattice.rows, lattice.cols, side, steps * int(plan.offsets.max()), torus)

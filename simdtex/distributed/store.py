@@ -95,7 +95,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     guides: list[Any] = [Ready(tree["guides"])] if tree["guides"] else []
     phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
     sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
-    schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)
+    schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.neighbourhood)
     return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"])
 
 

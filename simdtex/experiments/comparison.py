@@ -19,7 +19,7 @@ from simdtex.experiments.quality import COPIED_PATCH, as_planes, measure
 from simdtex.io.image import check_sample
 from simdtex.jobs.synthesis import synthesize
 from simdtex.machine import Machine, open_machine
-from simdtex.methods.mrf import Options
+from simdtex.methods.mrf.options import ORDERS, Options
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback, Progress
@@ -420,7 +420,7 @@ class _Call:
 
     def build_kernels(self, schedule: Schedule, size: tuple[int, int]) -> None:
         """Build every kernel that the schedule needs, by a small picture of at most two levels."""
-        side, levels = 4 * isqrt(self.options["order"]) + 1, self.options["levels"]
+        side, levels = 4 * isqrt(self.options["order"] or ORDERS[2]) + 1, self.options["levels"]
         small = (min(size[0], side), min(size[1], side))
         self._synthesize(schedule, 0, small, **({} if levels is None else {"levels": min(levels, 2)}))
 

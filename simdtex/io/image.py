@@ -464,7 +464,8 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
     elif suffix in (".tif", ".tiff"):
         write_tiff(path, [pixels], metadata)
     else:
-        kind = PIL.Image.registered_extensions()[suffix]
+        PIL.Image.preinit()  # the modules of common formats; registered_extensions loads some 40 others
+        kind = PIL.Image.EXTENSION.get(suffix) or PIL.Image.registered_extensions()[suffix]
         picture = PIL.Image.fromarray(pixels)
         if palette:
             picture.putpalette(palette.ljust(768, b"\0"))  # of 256 colours, so that indices keep 8 bits

@@ -153,7 +153,7 @@ def problem(run: Lattices) -> Problem:
     source = run.sample.places(np.zeros((1, 2), np.int32), 1).positions
     first = np.concatenate([source[None], run.sample.working[:, source].astype(np.int32)])
     xi = min(-1, round(run.options.xi * 1024))
-    return Problem(first, run.offsets[by_lane(run.offsets)], run.options.order, xi, run.seed)
+    return Problem(first, run.offsets[by_lane(run.offsets)], run.options.neighbourhood, xi, run.seed)
 
 
 def level_of(run: Lattices, number: int) -> Level:

@@ -18,14 +18,14 @@ from simdtex.inputs import Extend, Fill
 from simdtex.jobs.inputs import Work, public, trends, with_light
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
-from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.options import Options, of_palette
 from simdtex.methods.mrf.replay import Instant, Replay, Sweep
 from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.light import Relit, unevenness
-from simdtex.model.pictures import Mask, Pictures, few
+from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
@@ -98,8 +98,8 @@ def fill(call: Fill) -> Work:
     sites, has a separate lattice, unless the picture wraps around (``boundary="torus"``) or there are many holes. The
     smooth colours around a hole, continued into it, and the place in the picture are a guide
     (`simdtex.model.guide.Surroundings`), so that the hole gets the texture of its surroundings. There is no such guide
-    with a `sample`, with categories or with 16 different pixels or fewer. Cost: that of `simdtex.synthesize` for the
-    holes' pixels, and of a sample of the surroundings' size.
+    with a `sample`, with categories or with few different pixels (see `finish`). Cost: that of `simdtex.synthesize` for
+    the holes' pixels, and of a sample of the surroundings' size.
 
     Examples
     --------
@@ -318,7 +318,7 @@ class Filling:
         """Return the windows, in the order in which they are filled."""
         if self.options.boundary == "torus":
             return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
-        return windows(self.hole, int(neighbourhood_offsets(self.options.order).max()), self.options.levels)
+        return windows(self.hole, int(neighbourhood_offsets(self.options.neighbourhood).max()), self.options.levels)
 
     def begin(self) -> Whole:
         """Return the picture before any hole is filled."""
@@ -370,7 +370,7 @@ def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:
     """Return whether the mean of pixels is a legal pixel: not for categories or for grey levels of a density."""
-    return not (options.categorical or options.pixel == "density" or few(pictures.pixels))
+    return not (options.categorical or options.pixel == "density" or of_palette(pictures.pixels))
 
 
 def _fewest_levels(pictures: Pictures) -> int:

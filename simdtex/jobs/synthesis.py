@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions that most users need: `synthesize`, `synthesize_solid`, `mix`, `explain`, `replay`, `lcpdf`."""
+"""The functions that most users need: `synthesize`, `explain`, `replay`, `lcpdf`."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.driver import with_channels_last
-from simdtex.inputs import Mix, Solid, Synth, options_of
+from simdtex.inputs import Synth, options_of
 from simdtex.jobs.inputs import Work, check_inputs, public, with_light
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf, pyramid
+from simdtex.methods import mrf
+from simdtex.methods.mrf.options import ORDERS
 from simdtex.methods.mrf.replay import Replay
-from simdtex.methods.pyramid import solid
-from simdtex.methods.pyramid.mixtures import mixture
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
@@ -76,64 +75,6 @@ def synthesize(call: Synth) -> Work:
     else:
         plan = import_module(f"simdtex.methods.{call.method}.algorithm").Plan(sample.pixels[0], call.shape, chosen)
     return Work(plan, chosen, call.channel_axis, light=light)
-
-
-@public("solid")
-def synthesize_solid(call: Solid) -> Work:
-    """Make a solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
-
-    Returns
-    -------
-    volume : (depth, rows, cols) array of the sample's type
-        With `channel_axis`, the channels are last.
-
-    Notes
-    -----
-    Cost: some 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration. Memory: see
-    ``docs/concepts/pyramid.rst``.
-
-    Examples
-    --------
-    >>> from skimage import data
-    >>> import simdtex
-    >>> block = simdtex.synthesize_solid(data.gravel()[:64, :64], (16, 24, 32), rng=1)
-    >>> block.shape
-    (16, 24, 32)
-    """
-    chosen = resolve(solid.Options, "solid", call.options)
-    return Work(solid.Plan(call.sample, call.shape, chosen), chosen, None if call.channel_axis is None else -1)
-
-
-@public("mix")
-def mix(call: Mix) -> Work:
-    """Return a mixture of several textures, by pyramid matching.
-
-    Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
-    frequencies of one sample with the high frequencies of another (`low`, `high`). Its colours are those of its
-    pattern, or of another sample (`palette`).
-
-    Returns
-    -------
-    image : array of the samples' type
-        `shape` plus the channel axis, if the samples have one.
-
-    Notes
-    -----
-    Cost: that of `simdtex.synthesize` with ``method="pyramid"``, and an analysis of every sample.
-
-    Examples
-    --------
-    >>> from skimage import data
-    >>> import simdtex
-    >>> brick, gravel = data.brick()[:64, :64], data.gravel()[:64, :64]
-    >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
-    (96, 96)
-    """
-    chosen = resolve(pyramid.Options, "mix", with_channels_last(call.options, call.channel_axis))
-    pattern = (call.pattern, call.average, call.low, call.high, call.split)
-    plan = mixture(call.samples, call.shape, call.channel_axis, chosen, call.palette, *pattern)
-    call.samples = plan.pictures
-    return Work(plan, chosen, call.channel_axis)
 
 
 REPLAYED = [
@@ -249,7 +190,7 @@ def lcpdf(
     sample: ArrayLike,
     sites: ArrayLike,
     *,
-    order: int = mrf.Options.order,
+    order: int = ORDERS[2],
     bandwidth: float = 1.0,
     temperature: ArrayLike | None = None,
     greys: int = 256,
@@ -268,7 +209,7 @@ def lcpdf(
     sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int
-        The order o of the neighbourhood, equation (3); by default that of `synthesize`.
+        The order o of the neighbourhood, equation (3); by default that of `synthesize` with a large sample.
     bandwidth : float
         h in units of h_opt, equation (8). 1.0 is the paper's.
     temperature : (rows, cols) array, 0 to 1, optional

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from importlib.metadata import entry_points
 
 from simdtex.schedules.partition import (
     Block,
@@ -105,6 +104,8 @@ def get(schedule: str | Schedule) -> Schedule:
         return _WITH_PARAMETER[name](parameter)
     if schedule in SCHEDULES:
         return SCHEDULES[schedule]()
+    from importlib.metadata import entry_points  # slow to load
+
     brought = {entry.name: entry for entry in entry_points(group=GROUP)}
     if schedule in brought:
         return get(brought[schedule].load()())

@@ -15,7 +15,7 @@ from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
-from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.options import Options, largest_order
 from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
@@ -189,7 +189,7 @@ class Lattices:
             level=number,
             confidences=self.conditions.confidences,
         )
-        setting = Setting(machine, grid, offsets, options.order, self.seed, number)
+        setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, number)
         rate = options.balance * self.typical_distance
         return Level(setting, self.plan.schedule, relaxation, rate, self.fair_use(number))
 
@@ -255,7 +255,7 @@ class Lattices:
         data = self.conditions.scattered(number)
         if data is None:
             return None
-        site, datum, apart = nearest_data(data.place, grid, self.options.order)
+        site, datum, apart = nearest_data(data.place, grid, self.options.neighbourhood)
         if not site.size:
             return None
         begin = np.searchsorted(site, np.arange(grid.size + 1)).astype(np.int32)
@@ -470,7 +470,7 @@ def number_of_levels(
     """
     radius = int(offsets[:, 1].max())
     for sample in samples:
-        check_fit(sample, radius, options.order)
+        check_fit(sample, radius, options.neighbourhood)
     step = 1 if options.phases == "all" else 2
 
     def candidates(levels: int) -> int:
@@ -502,7 +502,7 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
     if side > 2 * radius:
         return
     least = "x".join("3" * len(sample))
-    largest = f"the largest order that fits is {((side - 1) // 2 + 1) ** 2 - 1}" if side > 2 else ""
+    largest = f"the largest order that fits is {largest_order(side)}" if side > 2 else ""
     names = ("layers", "rows", "columns")[-len(sample) :]
     sides = " x ".join(f"{n} {name}" for n, name in zip(sample, names, strict=True))
     remedy = largest or f"give at least {least} pixels"

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.maspar.array import ARRAYS, parse_array
 from simdtex.model.lattice import MOST_ORDER
-from simdtex.model.pictures import Pictures, few
+from simdtex.model.pictures import CATEGORIES, Pictures, few
 from simdtex.model.regularity import LATTICES, parse_lattice
 from simdtex.options import (
     Choice,
@@ -27,6 +29,12 @@ from simdtex.options import (
     shown,
     whole,
 )
+
+COLOURS = 64
+"""Different pixels up to which a sample in colour is taken for one of a palette."""
+
+ORDERS = {2: 18, 3: 12}
+"""The default order by the number of axes."""
 
 FINISH = 1.5
 """The default standard deviation of the finish, pixels."""
@@ -72,14 +80,14 @@ class Options:
     Numbers are at most 1e6 and integers at most 2**31 - 1, if no other limit is given.
     """
 
-    order: int = appearance(
-        18,
+    order: int | None = appearance(
+        None,
         Whole(1, MOST_ORDER),
         "Compare neighbours within sqrt(order) pixels: order 8 has 24, order 18 has 60; a larger order keeps larger "
         "shapes",
         more="The time grows with the number of neighbours. In three dimensions order 8 has 92 and order 12 has 178.",
+        none="18; 12 in three dimensions; of a sample of fewer than 9 pixels the largest that fits",
         symbol="o of equation (3)",
-        jobs={"simulate 3-D": 12},
         slider=(2, 40, 1),
     )
     structure: float = appearance(
@@ -142,8 +150,8 @@ class Options:
         "Blend seams over this many pixels; with 0 every pixel is one of the sample's",
         more="Each output pixel is the mean of the pixels that continue its neighbours' sources, with Gaussian weights "
         "of this standard deviation, 0.01 to 16 or 0. A sample of at most 16 different pixels is a map of categories, "
-        "which have no mean.",
-        none="1.5; 0 for samples of at most 16 different pixels, and for pixels of the density",
+        "which have no mean, and one of at most 64 colours, each of 4 pixels on average, has a palette.",
+        none="1.5; 0 for samples of at most 16 different pixels or of a palette, and for pixels of the density",
         unit="pixels",
         paper=0.0,
         slider=(0, 4, 0.25),
@@ -353,6 +361,11 @@ class Options:
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 
+    @property
+    def neighbourhood(self) -> int:
+        """The order; while the sample is not known, by default that of a large picture."""
+        return self.order or ORDERS[2]
+
     def chance_at(self, level: int) -> int:
         """Return how many candidates at random a coherent search weighs at a level."""
         return max(self.chance, self.coarse_chance) if level >= COARSE else self.chance
@@ -374,7 +387,7 @@ class Options:
         return replace(pictures, categorical=kinds, weights=self.weights, shares=self.shares)
 
     def resolved(self, pictures: Pictures) -> Options:
-        """Return the options as they are executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
+        """Return the options as they are executed: what ``auto`` and None mean for a sample.
 
         Grey levels of a density have no source: no structure channel and no lattice. A volume has neither, and no
         finish.
@@ -383,7 +396,7 @@ class Options:
         search = usual if self.search == "auto" else self.search
         finish = self.finish
         if finish is None:
-            categories = (pictures.categorical and any(pictures.categorical)) or few(pictures.pixels)
+            categories = (pictures.categorical and any(pictures.categorical)) or of_palette(pictures.pixels)
             finish = 0.0 if self.pixel == "density" or categories else FINISH
         plain = self.pixel == "density" or pictures.deep
         named = pictures.categorical and any(pictures.categorical)
@@ -392,7 +405,10 @@ class Options:
         wanted = self.proportions
         if wanted is None and named and pictures.deep and pictures.pixels[0].shape[-1] == 1:
             wanted = tuple(np.unique(pictures.values(0, 0), return_counts=True)[1].tolist())
-        return replace(self, search=search, finish=finish, structure=structure, lattice=lattice, proportions=wanted)
+        least = min(min(one.shape[:-1]) for one in pictures.pixels)
+        order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
+        found = replace(self, order=order, search=search, finish=finish, structure=structure)
+        return replace(found, lattice=lattice, proportions=wanted)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:
@@ -409,3 +425,14 @@ def begins(before: Options, now: Options, levels: int) -> int:
     if different <= {"finish", *SEARCHED} and levels > 1 and weighs_all:
         return levels - 2
     return levels - 1
+
+
+def largest_order(side: int) -> int:
+    """Return the largest order whose neighbourhood fits a sample of this many pixels; 0 if there is none."""
+    return ((side - 1) // 2 + 1) ** 2 - 1
+
+
+def of_palette(pictures: Sequence[NDArray[Any]]) -> bool:
+    """Return whether a sample, pictures (rows, cols, C), has so few different pixels that a mean is a new one."""
+    pixels, channels = sum(one[..., 0].size for one in pictures), pictures[0].shape[-1]
+    return few(pictures, max(CATEGORIES, min(COLOURS, pixels // 4)) if channels > 2 else CATEGORIES)

@@ -88,7 +88,7 @@ def plan(
     options = options.resolved(pictures)
     if pictures.deep:
         check_volume(pictures, options, guide)
-    offsets = neighbourhood_offsets(options.order, len(shape))
+    offsets = neighbourhood_offsets(options.neighbourhood, len(shape))
     sides = [picture.shape[:-1] for picture in pictures.pixels]
     if soft and soft.images is not None:  # each picture must serve the sites that it is probable at
         pictures, sides = replace(pictures, shares=soft.shares), [min(sides, key=min)]

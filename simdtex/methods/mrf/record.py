@@ -6,13 +6,12 @@ from __future__ import annotations
 import time
 from functools import partial
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.reference import Reference
-from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.explain import Moment, explained
 from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
@@ -22,6 +21,9 @@ from simdtex.model.source_map import effective_use
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import CandidateList, most_listed
 from simdtex.run import Callback, Observer, OutputWithSource, Progress, Stage
+
+if TYPE_CHECKING:
+    from simdtex.maspar.accounting import Account
 
 STEP, LISTED = 200_000, 16
 """What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
@@ -38,6 +40,8 @@ class Record(Observer):
         options = run.options
         self.account: Account | None = None
         if options.array:
+            from simdtex.maspar.accounting import Account  # loads the emulator
+
             self.account = Account(parse_array(options.array), run.offsets, run.sample.channels)
         self.launches = run.machine.launches
         self._expected = expected_work(run)
