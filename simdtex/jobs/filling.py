@@ -173,7 +173,9 @@ def extend(call: Extend) -> Work:
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
-    chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | call.options)
+    # on a torus the lattice of the picture is deformed, and its known pixels are not
+    usual = {"boundary": "torus", "lattice": "none"} if seamless else {"boundary": "open"}
+    chosen = resolve(Options, "extend", usual | call.options)
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
@@ -181,8 +183,13 @@ def extend(call: Extend) -> Work:
 
     guide, pictures = None, Pictures((pixels,))
     if _has_tones(chosen, pictures):
-        corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
-        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner, colours=not seamless)
+        fixed = np.array([not (top or bottom), not (left or right)])[:, None, None]  # rows for rows, columns for columns
+        if seamless:  # rows guide beside the picture and columns above it, so that parts move towards a seam
+            place = np.indices(hole.shape) - np.array([top + along, left + across])[:, None, None]
+            size = np.array([rows - 2 * along, cols - 2 * across])[:, None, None]
+            fixed = fixed & ((place < 0) | (place >= size))[::-1]
+        row, col = np.broadcast_to(np.where(fixed, 0.0, np.nan), (2, *hole.shape))
+        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, (row, col), colours=not seamless)
     return Work(mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), chosen, call.channel_axis)
 
 
