@@ -183,13 +183,9 @@ def extend(call: Extend) -> Work:
 
     guide, pictures = None, Pictures((pixels,))
     if _has_tones(chosen, pictures):
-        fixed = np.array([not (top or bottom), not (left or right)])[:, None, None]  # rows for rows, columns for columns
-        if seamless:  # rows guide beside the picture and columns above it, so that parts move towards a seam
-            place = np.indices(hole.shape) - np.array([top + along, left + across])[:, None, None]
-            size = np.array([rows - 2 * along, cols - 2 * across])[:, None, None]
-            fixed = fixed & ((place < 0) | (place >= size))[::-1]
-        row, col = np.broadcast_to(np.where(fixed, 0.0, np.nan), (2, *hole.shape))
-        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, (row, col), colours=not seamless)
+        # rows go on as rows, and columns as columns; along a row, parts move towards the seam
+        corner = (np.nan if top or bottom else 0, np.nan if left or right or seamless else 0)
+        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner, colours=not seamless)
     return Work(mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), chosen, call.channel_axis)
 
 

@@ -138,14 +138,14 @@ class Surroundings:
 
     ``sample`` (rows, cols, C) is the picture, and ``known`` the mask of its known pixels. ``values`` (H, W, C) is the
     output, and ``given`` the mask of its known pixels; ``corner`` is the first row and the first column of the output
-    in the sample, each a number or (H, W), NaN where it does not guide. ``colours`` says whether colours guide too.
+    in the sample, NaN for an axis that does not guide. ``colours`` says whether colours guide too.
     """
 
     sample: NDArray[Any]
     known: NDArray[np.bool_]
     values: NDArray[Any]
     given: NDArray[np.bool_]
-    corner: tuple[float | NDArray[np.float64], float | NDArray[np.float64]]
+    corner: tuple[float, float]
     colours: bool = True
 
     @property
@@ -161,7 +161,7 @@ class Surroundings:
         reach = AROUND + int(distance_transform_cdt(~self.given, metric="chessboard").max())
         found = []
         for picture, where, corner in (
-            (self.sample, self.known, (0, 0)),
+            (self.sample, self.known, tuple(0 * side for side in self.corner)),
             (self.values, self.given, self.corner),
         ):
             colours = [smooth(scale.levels(picture), where, reach)] if self.colours else []
@@ -185,11 +185,11 @@ def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_], reach: int) -> 
     return np.array(means, np.uint16).reshape(levels.shape)
 
 
-def _places(shape: tuple[int, ...], corner: tuple[Any, Any], step: float, top: int) -> NDArray[np.uint16]:
-    """Return row and column of each pixel as levels (2, rows, cols), rounded; `UNKNOWN` where the corner is NaN."""
-    places = np.stack([line + first for line, first in zip(np.indices(shape), corner, strict=True)])
-    found = np.rint(np.clip(places * step, 0, top))
-    return np.where(np.isnan(found), UNKNOWN, found).astype(np.uint16)
+def _places(shape: tuple[int, ...], corner: tuple[float, ...], step: float, top: int) -> NDArray[np.uint16]:
+    """Return row and column of each pixel as levels (2, rows, cols), rounded; 0 if the corner is NaN."""
+    places = np.indices(shape) + np.array(corner)[:, None, None]
+    found: NDArray[np.uint16] = np.rint(np.clip(np.nan_to_num(places) * step, 0, top)).astype(np.uint16)
+    return found
 
 
 def _scaled(unit: NDArray[Any], height: float, most: int) -> NDArray[np.uint16]:
