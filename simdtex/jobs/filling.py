@@ -192,8 +192,8 @@ def extend(call: Extend) -> Work:
 def band_of(pixels: NDArray[Any]) -> int:
     """Return the width of the bands that make a picture (rows, cols, C) seamless: the size of its parts, in pixels.
 
-    That is the longer vector of its lattice, or the lag at which its autocorrelation has fallen to a tenth, but 8 or
-    more, an eighth of the shorter side up to 64 or more, and a quarter of the shorter side at most.
+    That is the longer vector of its lattice, or the lag at which its autocorrelation has fallen to a tenth, but a
+    fifth of the shorter side at most. It is at least 8, and an eighth of the shorter side up to 64.
     """
     side = min(pixels.shape[:2])
     factor = -(-max(pixels.shape[:2]) // ENOUGH)
@@ -205,7 +205,7 @@ def band_of(pixels: NDArray[Any]) -> int:
         values = autocorrelation(reduced, known).values
         row, col = (n // 2 for n in values.shape)
         size = max(int(np.argmax(np.append(line, 0) < TENTH)) for line in (values[row:, col], values[row, col:]))
-    return max(8, min(64, side // 8), min(round(factor * size), side // 4))
+    return max(8, min(64, side // 8), min(round(factor * size), side // 5))
 
 
 class Made(NamedTuple):

@@ -157,7 +157,7 @@ class Surroundings:
         """Return the means of the known colours around each pixel, its row and its column."""
         from scipy.ndimage import distance_transform_cdt  # only for a hole, since it loads slowly
 
-        step = sqrt(NEARNESS * spread) / FAR
+        step = min(sqrt(NEARNESS * spread) / FAR, top / max(self.sample.shape[:2]))
         reach = AROUND + int(distance_transform_cdt(~self.given, metric="chessboard").max())
         found = []
         for picture, where, corner in (
