@@ -386,8 +386,8 @@ def wall(shape, brick, joint, seed=0):
 def test_the_default_band_is_as_wide_as_the_parts_of_the_picture():
     for shape, width in (((24, 30), 8), ((72, 80), 9), ((600, 600), 64)):
         assert band_of(np.random.default_rng(1).integers(0, 256, (*shape, 1)).astype(np.uint8)) == width
-    stones = ndimage.gaussian_filter(np.random.default_rng(2).normal(size=(160, 200, 1)), (8, 8, 0))
-    assert 22 <= band_of(stones) <= 30, "sqrt(4 ln 10) standard deviations are 24 pixels"
+    stones = ndimage.gaussian_filter(np.random.default_rng(3).normal(size=(240, 280, 1)), (11, 11, 0))
+    assert 31 <= band_of(stones) <= 39, "sqrt(4 ln 10) standard deviations are 33 pixels"
     for scale in (1, 5):
         bricks = wall((190 * scale, 230 * scale), (12 * scale, 60 * scale), 2 * scale)[..., None]
         assert abs(band_of(bricks) - 32.3 * scale) < 2 * scale, "from a brick to one of the next course"
