@@ -195,8 +195,8 @@ def band_of(pixels: NDArray[Any]) -> int:
     That is the longer vector of its lattice, or the lag at which its autocorrelation has fallen to a tenth, but a
     fifth of the shorter side at most. It is at least 8, and an eighth of the shorter side up to 64.
     """
-    side = min(pixels.shape[:2])
-    factor = -(-max(pixels.shape[:2]) // ENOUGH)
+    side: int = min(pixels.shape[:2])
+    factor: int = -(-max(pixels.shape[:2]) // ENOUGH)
     (reduced,), (known,) = plain(Pictures((pixels[::factor, ::factor],)))
     found = regular(reduced, known)
     if found:
