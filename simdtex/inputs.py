@@ -407,7 +407,8 @@ class Extend(Common, Lit):
     band: int | None = given(
         Whole(1),
         "Replace this many pixels along each edge that no pixels are added to, so that the output tiles",
-        none="an eighth of the shorter side, 8 to 64",
+        none="the size of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter "
+        "side",
     )
 
 

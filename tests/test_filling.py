@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import simdtex
-from simdtex.jobs.filling import FEW, windows
+from simdtex.jobs.filling import FEW, band_of, windows
 from simdtex.model.source_map import apply_source_map
 
 TYPES = [np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64]
@@ -374,12 +374,55 @@ def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
     assert (found[:3, :20] != image[:3]).any()
 
 
-def test_the_default_band_is_an_eighth_of_the_shorter_side_and_8_at_least():
-    for shape, width in (((24, 30), 8), ((72, 80), 9)):
-        image = texture(shape)
-        found = extend(image, seamless="x", finish=0.0, order=1)
-        changed = (found != image).any(0)
-        assert changed[:width].all() and changed[-width:].all() and not changed[width:-width].any()
+def wall(shape, brick, joint, seed=0):
+    """Bricks of two sides, (rows, columns), with dark joints; every second course is shifted by half a brick."""
+    rng, (y, x) = np.random.default_rng(seed), np.indices(shape)
+    course = y // brick[0]
+    x = x + course % 2 * (brick[1] // 2)
+    tone = rng.integers(110, 200, shape)[course, x // brick[1]] + rng.integers(0, 30, shape)
+    return np.where((y % brick[0] < joint) | (x % brick[1] < joint), 40, tone).astype(np.uint8)
+
+
+def test_the_default_band_is_as_wide_as_the_parts_of_the_picture():
+    for shape, width in (((24, 30), 8), ((72, 80), 9), ((600, 600), 64)):
+        assert band_of(np.random.default_rng(1).integers(0, 256, (*shape, 1)).astype(np.uint8)) == width
+    stones = ndimage.gaussian_filter(np.random.default_rng(3).normal(size=(240, 280, 1)), (11, 11, 0))
+    assert 31 <= band_of(stones) <= 39, "sqrt(4 ln 10) standard deviations are 33 pixels"
+    for scale in (1, 5):
+        bricks = wall((190 * scale, 230 * scale), (12 * scale, 60 * scale), 2 * scale)[..., None]
+        assert abs(band_of(bricks) - 32.3 * scale) < 2 * scale, "from a brick to one of the next course"
+    assert band_of(np.arange(4000.0).reshape(100, 40, 1)) == 8
+
+
+def test_the_default_band_is_replaced():
+    image = texture((72, 80))
+    changed = (extend(image, seamless="x", finish=0.0, order=1) != image).any(0)
+    assert changed[: band_of(image[..., None])].all() and changed[-band_of(image[..., None]) :].all()
+    assert not changed[band_of(image[..., None]) : -band_of(image[..., None])].any()
+
+
+def test_bricks_stay_whole_across_the_seam(any_device):
+    """Of a wall whose width is no multiple of a brick; on a deformed lattice no joint would meet another."""
+    image, courses = wall((96, 130), (16, 50), 2), np.arange(96) % 16 < 2
+    made = simdtex.extend(image, seamless="x", rng=1, device=opencl(any_device))
+    assert (made[courses] < 80).mean() > 0.99
+    assert abs((made[~courses] < 80).mean() - (image[~courses] < 80).mean()) < 0.01
+
+
+def test_joints_go_on_through_a_hole(any_device):
+    image, hole = wall((160, 200), (20, 50), 3), np.zeros((160, 200), bool)
+    hole[45:115, 55:145] = True
+    joints = hole & (np.arange(160) % 20 < 3)[:, None]
+    made = simdtex.fill(image, hole, rng=1, device=opencl(any_device))
+    assert (made[joints] < 80).mean() > 0.97
+
+
+def test_the_bands_beside_a_picture_take_pixels_of_about_the_same_rows(any_device):
+    """Of noise, 14 pixels away on average; 60 to 90 without a guide, which puts grass into a sky."""
+    image, device = np.random.default_rng(1).integers(0, 256, (400, 40)).astype(np.uint8), opencl(any_device)
+    _, output = simdtex.extend(image, seamless="x", band=9, order=4, rng=1, device=device, full_output=True)
+    rows = output.source[:, np.r_[:9, 31:40], 0]
+    assert np.abs(rows - np.arange(400)[:, None]).mean() < 30
 
 
 def step(image, axis):

@@ -26,6 +26,7 @@ from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.light import Relit, unevenness
 from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.regularity import autocorrelation, plain, regular
 from simdtex.options import resolve, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
@@ -43,6 +44,12 @@ MANY = 2**17
 
 FEW = 16
 """The most windows that are filled one by one; holes in more places are in a single window."""
+
+ENOUGH = 512
+"""Rows and columns of a picture that determine the size of its parts; of a larger one every n-th pixel is taken."""
+
+TENTH = 0.1
+"""The autocorrelation at a lag of the size of a picture's parts."""
 
 EACH = 2**18
 """Pixels of a window with all holes that take about as long as the window of a small hole, which has one level."""
@@ -160,7 +167,7 @@ def extend(call: Extend) -> Work:
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
     if not (seamless or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
-    width = call.band = min(64, max(8, min(rows, cols) // 8)) if call.band is None else call.band
+    width = call.band = band_of(pixels) if call.band is None else call.band
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
@@ -172,7 +179,9 @@ def extend(call: Extend) -> Work:
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
-    chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | call.options)
+    # on a torus the lattice of the picture is deformed, and its known pixels are not
+    usual = {"boundary": "torus", "lattice": "none"} if seamless else {"boundary": "open"}
+    chosen = resolve(Options, "extend", usual | call.options)
     at: Any = slice(top, top + rows), slice(left, left + cols)
     light, relit = {"light": call.light, **unevenness(pixels)}, None
     if call.light == "even":
@@ -189,11 +198,31 @@ def extend(call: Extend) -> Work:
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(seamless))
 
     guide, pictures = None, Pictures((pixels,))
-    if not seamless and _has_tones(chosen, pictures):
-        corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
-        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
+    if _has_tones(chosen, pictures):
+        # rows go on as rows, and columns as columns; along a row, parts move towards the seam
+        corner = (np.nan if top or bottom else 0, np.nan if left or right or seamless else 0)
+        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner, colours=not seamless)
     plan = mrf.plan(pictures, canvas.shape[:2], chosen, given, guide)
     return Work(plan, chosen, call.channel_axis, light=light, relit=relit)
+
+
+def band_of(pixels: NDArray[Any]) -> int:
+    """Return the width of the bands that make a picture (rows, cols, C) seamless: the size of its parts, in pixels.
+
+    That is the longer vector of its lattice, or the lag at which its autocorrelation has fallen to a tenth, but a
+    fifth of the shorter side at most. It is at least 8, and an eighth of the shorter side up to 64.
+    """
+    side: int = min(pixels.shape[:2])
+    factor: int = -(-max(pixels.shape[:2]) // ENOUGH)
+    (reduced,), (known,) = plain(Pictures((pixels[::factor, ::factor],)))
+    found = regular(reduced, known)
+    if found:
+        size = float(np.hypot(*found.basis.T).max())
+    else:
+        values = autocorrelation(reduced, known).values
+        row, col = (n // 2 for n in values.shape)
+        size = max(int(np.argmax(np.append(line, 0) < TENTH)) for line in (values[row:, col], values[row, col:]))
+    return max(8, min(64, side // 8), min(round(factor * size), side // 5))
 
 
 class Made(NamedTuple):

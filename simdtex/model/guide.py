@@ -126,9 +126,9 @@ class Colocated:
 
 
 AROUND = 4
-"""Pixels to each side over which known colours are averaged; beyond the nearest known pixel if it is unknown."""
+"""Pixels by which the squares of known colours reach beyond the rim of a hole, from its deepest pixel."""
 
-NEARNESS, FAR = 0.3, 300
+NEARNESS, FAR = 3.0, 300
 """Variance of the place in a picture, in units of the colours' variance, for places ``FAR`` pixels apart."""
 
 
@@ -138,7 +138,7 @@ class Surroundings:
 
     ``sample`` (rows, cols, C) is the picture, and ``known`` the mask of its known pixels. ``values`` (H, W, C) is the
     output, and ``given`` the mask of its known pixels; ``corner`` is the first row and the first column of the output
-    in the sample, NaN for an axis that does not guide.
+    in the sample, NaN for an axis that does not guide. ``colours`` says whether colours guide too.
     """
 
     sample: NDArray[Any]
@@ -146,22 +146,27 @@ class Surroundings:
     values: NDArray[Any]
     given: NDArray[np.bool_]
     corner: tuple[float, float]
+    colours: bool = True
 
     @property
     def channels(self) -> int:
         """The number of channels: the colours, the row and the column."""
-        return int(self.sample.shape[-1]) + 2
+        return self.colours * int(self.sample.shape[-1]) + 2
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """Return the means of the known colours around each pixel, its row and its column."""
-        step = sqrt(NEARNESS * spread) / FAR
-        sample, output = (
-            np.concatenate([smooth(scale.levels(picture), where), _places(where.shape, corner, step, top)])
-            for picture, where, corner in (
-                (self.sample, self.known, tuple(0 * side for side in self.corner)),
-                (self.values, self.given, self.corner),
-            )
-        )
+        from scipy.ndimage import distance_transform_cdt  # only for a hole, since it loads slowly
+
+        step = min(sqrt(NEARNESS * spread) / FAR, top / max(self.sample.shape[:2]))
+        reach = AROUND + int(distance_transform_cdt(~self.given, metric="chessboard").max())
+        found = []
+        for picture, where, corner in (
+            (self.sample, self.known, tuple(0 * side for side in self.corner)),
+            (self.values, self.given, self.corner),
+        ):
+            colours = [smooth(scale.levels(picture), where, reach)] if self.colours else []
+            found.append(np.concatenate([*colours, _places(where.shape, corner, step, top)]))
+        sample, output = found
         return Planes([sample], output)
 
 
@@ -169,23 +174,15 @@ AnyGuide = Guide | Colocated | Surroundings
 """A guide, whose planes are matched with those of the pixels."""
 
 
-def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """Return the mean of the known pixels in a square around each pixel of a picture (C, rows, cols).
+def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_], reach: int) -> NDArray[np.uint16]:
+    """Return the mean of the known pixels in a square of ``reach`` around each pixel of a picture (C, rows, cols).
 
-    The square of a known pixel has 9 x 9 pixels; that of an unknown pixel reaches `AROUND` pixels beyond the nearest
-    known one, or up to 1.5 times as far. Cost: about twelve passes over the picture for each size of square.
+    One size of square for hole and picture: means over smaller ones differ more, so that a hole, whose pixels have the
+    means of large squares, would get no joints. 0 where no pixel is known. Cost: about six passes over the picture.
     """
-    from scipy.ndimage import distance_transform_cdt  # only for unknown pixels, since it loads slowly
-
-    needed = distance_transform_cdt(~known, metric="chessboard") + AROUND
-    found, before, reach = np.zeros_like(levels), 0, AROUND
-    while before < needed.max():
-        here = (needed > before) & (needed <= reach)
-        count = sums_around(known, reach)[here]
-        for plane, smoothed in zip(levels, found, strict=True):  # one by one, to save memory
-            smoothed[here] = sums_around(np.where(known, plane, 0), reach)[here] // count
-        before, reach = reach, reach * 3 // 2
-    return found
+    count = np.maximum(sums_around(known, reach), 1)
+    means = [sums_around(np.where(known, plane, 0), reach) // count for plane in levels]
+    return np.array(means, np.uint16).reshape(levels.shape)
 
 
 def _places(shape: tuple[int, ...], corner: tuple[float, ...], step: float, top: int) -> NDArray[np.uint16]:
