@@ -31,7 +31,7 @@ SUGGESTING = 12  # nearest neighbours that suggest a candidate
 IN_PHASE, FEW = 128, 16  # candidates of a phase, at most, and on average if its neighbours' are added
 
 DEFAULTS = {
-    **{"order": 18, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
+    **{"order": None, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"lattice": "auto"},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
@@ -57,6 +57,8 @@ def options(pictures, preset="default", **given):
         o.finish = 0 if categories or o.pixel == "density" else 1.5
     if o.pixel == "density":
         o.structure = 0
+    if o.order is None:  # the largest up to 18 whose neighbourhood is no larger than a picture
+        o.order = min(18, ((min(min(y.shape[:2]) for y in pictures) - 1) // 2 + 1) ** 2 - 1)
     return o
 
 

@@ -222,10 +222,10 @@ def clock(monkeypatch):
 
 def test_the_rest_of_a_run_takes_as_long_as_its_beginning(clock):
     forecast, found = job.Forecast(), {}
-    for clock[0], share in [(2, 0.1), (2.05, 0.11), (9.05, 0.11), (9.25, 0.2)]:
+    for clock[0], share in [(2, 0.1), (2.5, 0.11), (9.5, 0.11), (10, 0.2)]:
         found[clock[0]] = forecast.seconds(share)
     assert list(found.values())[:3] == [None, None, None]
-    assert found[9.25] == pytest.approx(9.25 + 0.25 / 0.1 * 0.8), "in the seven seconds a kernel was compiled"
+    assert found[10] == pytest.approx(10 + 1 / 0.1 * 0.8), "in the seven seconds a kernel was compiled"
 
 
 def test_of_rare_callbacks_all_time_counts(clock):

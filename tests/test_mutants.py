@@ -319,7 +319,7 @@ def test_a_run_is_counted(given):
         assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16 * 2
     assert statistics["options"]["levels"] == 3
     assert statistics["options"]["schedule"] == "coloring"
-    own = {"device", "seed", "options", "seconds", "device_seconds", "levels", "use", "lattice"}
+    own = {"device", "seed", "options", "seconds", "device_seconds", "levels", "use", "lattice", "light"}
     assert set(statistics) == own | ({"accounting"} if "array" in given else set())
 
 

@@ -433,7 +433,7 @@ def test_a_package_brings_schedules_as_entry_points(monkeypatch):
         assert group == "simdtex.schedules"
         return [EntryPoint(name, value, group) for name, value in brought.items()]
 
-    monkeypatch.setattr(schedules, "entry_points", entry_points)
+    monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
     assert isinstance(get("mine"), schedules.Raster)
     assert isinstance(get("luby"), schedules.Luby), "what is here goes first"
     with pytest.raises(ValueError, match=r"choose one of: coloring, .*, block, mine, "):

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from simdtex.run import Progress
 
 
-CALIBRATION, SURE = 1.0, 1.0
-"""Seconds of a run after which its duration is estimated, and is said to be long."""
+OBSERVED = 1.0
+"""Seconds of a run after which its duration is estimated."""
 
 SMOOTH, ROUGH = 0.5, 10.0
 """The most seconds between two callbacks without the compilation of a kernel, and how long others are disregarded."""
@@ -152,8 +152,8 @@ class Forecast:
         self.last: tuple[float, float] | None = None
         self.smooth, self.all = [0.0, 0.0], [0.0, 0.0]  # seconds, and the share that was done in them
 
-    def seconds(self, fraction: float, observed: float = CALIBRATION) -> float | None:
-        """Return the expected seconds from the beginning to the end; None before so many seconds are ``observed``.
+    def seconds(self, fraction: float) -> float | None:
+        """Return the expected seconds from the beginning to the end; None before `OBSERVED` seconds.
 
         The time before the first callback, and between two that are far apart, is that of compiling kernels.
         """
@@ -163,7 +163,7 @@ class Forecast:
             for sums in (self.all, self.smooth) if took <= SMOOTH else (self.all,):
                 sums[0], sums[1] = sums[0] + took, sums[1] + done
         self.last = now, fraction
-        for (took, share), least in ((self.smooth, observed), (self.all, ROUGH)):
+        for (took, share), least in ((self.smooth, OBSERVED), (self.all, ROUGH)):
             if took >= least and share > 0:
                 return now + took / share * (1 - fraction)
         return None
@@ -270,7 +270,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
         nonlocal last, said, next_line
         if (job := progress.details.get("job")) != last and not bar:
             click.echo(job, err=True)
-        last, seconds = job, forecast.seconds(progress.fraction, SURE)
+        last, seconds = job, forecast.seconds(progress.fraction)
         if seconds is None:
             return
         if seconds > LONG and not said:
