@@ -33,8 +33,9 @@ LEAST_PEAK, APART, MOST_PEAKS = 0.08, 4, 80
 LEAST_CELL, MOST_BASES = 30, 48
 """The fewest pixels of a cell, and the most lattices that are followed through the autocorrelation."""
 
-RISE, INSIDE = 0.08, (0.35, 0.5, 0.65)
-"""The least rise of the autocorrelation to the end of a vector from these shares of it: excludes stripes."""
+RISE, INSIDE = (0.08, 0.08, 0.05), (0.35, 0.5, 0.65)
+"""The least rise of the autocorrelation to the ends of the three shortest vectors from these shares of each: excludes
+stripes."""
 
 CONTRAST, OF_GREATEST = 0.1, 0.5
 """The least rise of the mean autocorrelation from between the nodes of a lattice to the nodes, and as a share of the
@@ -50,8 +51,10 @@ skewed lattice with nearly the same cell is no better."""
 STRIPES = 0.8
 """The least mean autocorrelation over the nodes of a lattice of stripes, whose period along the stripes is any."""
 
-LEAST_STRENGTH, SIGNIFICANT = 0.15, 6.0
-"""The least mean autocorrelation over the nodes of a lattice, and the same in standard errors."""
+LEAST_STRENGTH, SIGNIFICANT = 0.15, 5.0
+"""The least mean autocorrelation over the nodes of a lattice, and the same in standard errors for a square cell.
+
+That of a long cell is greater by the root of its sides' ratio: stripes that fork are regular across for some periods."""
 
 MOST_STRAIN = 0.15
 """The largest deformation of a lattice to fit a torus."""
@@ -330,9 +333,10 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
         return None
     correlation = autocorrelation(picture, known)
     found = followed(correlation, candidates(correlation))
+    found = [one for one in found if one.strength >= max(LEAST_STRENGTH, SIGNIFICANT * one.error * one.length)]
     least = max([CONTRAST, *(OF_GREATEST * one.contrast for one in found)])
     best = _best([one for one in found if one.contrast >= least])
-    if best is None or best.strength < max(LEAST_STRENGTH, SIGNIFICANT * best.error):
+    if best is None:
         best = _best(followed(correlation, candidates(correlation, sides=2)))
         if best is None or best.strength < STRIPES:
             return None
@@ -350,6 +354,12 @@ class Followed(NamedTuple):
     strength: float
     error: float
     contrast: float
+
+    @property
+    def length(self) -> float:
+        """The root of the ratio of the longer vector to the shorter one."""
+        one, other = (sqrt(y * y + x * x) for y, x in self.lattice[:2])
+        return sqrt(max(one, other) / min(one, other))
 
 
 def _best(lattices: list[Followed]) -> Followed | None:
@@ -451,7 +461,7 @@ def candidates(correlation: Correlation, sides: int = 3) -> NDArray[np.int64]:
     ends = at(correlation.around, vectors)
     near = ends[:, :2].mean(1)
     rise = ends - np.maximum.reduce([at(values, vectors * part) for part in INSIDE])
-    rising = ((rise >= RISE) | (np.abs(vectors) > reach).any(2))[:, :sides].all(1)
+    rising = ((rise >= np.array(RISE)) | (np.abs(vectors) > reach).any(2))[:, :sides].all(1)
     best = rising & (near >= ALIKE * near.max(initial=0, where=rising))
     return apart(pairs[best][np.argsort(cell[best], kind="stable")])
 
