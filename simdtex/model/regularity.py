@@ -54,7 +54,7 @@ STRIPES = 0.8
 LEAST_STRENGTH, SIGNIFICANT = 0.15, 5.0
 """The least mean autocorrelation over the nodes of a lattice, and the same in standard errors for a square cell.
 
-That of a long cell is greater by the root of its sides' ratio: stripes that fork are regular across for some periods."""
+That of a long cell is greater by the root of its sides' ratio: stripes that fork are regular across some periods."""
 
 MOST_STRAIN = 0.15
 """The largest deformation of a lattice to fit a torus."""
