@@ -150,9 +150,9 @@ class SynthesizeSolidKeywords(SolidOptions, total=False):
     checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 class FillKeywords(MrfOptions, total=False):
-    light: Literal["keep", "even"]
     grow: int
     feather: int
+    light: Literal["keep", "even"] | None
     sample: ArrayLike | None
     reach: int | None
     device: str | Machine | None

@@ -341,7 +341,7 @@ class Solid(Common):
 
 
 @declared
-class Fill(Common, Lit):
+class Fill(Common):
     """The inputs of `simdtex.fill`."""
 
     image: ArrayLike = needed(Data(PICTURE), doc="The picture; any real type.", checker="picture with gaps")
@@ -362,6 +362,14 @@ class Fill(Common, Lit):
         "Blend the filled pixels with the picture up to this many pixels around the holes",
         default=0,
         more="Values without a mean (categories, few different pixels) change half-way instead.",
+    )
+    light: Literal["keep", "even"] | None = given(
+        Choice(("keep", "even")),
+        "Take pixels in the light of their place, or in even light, which then gets that of the hole's place",
+        "Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row "
+        "and column, which is then added at their new place (even).",
+        none="even, but keep for categories or few different pixels, and with finish 0, a reach, or the boundary torus",
+        group="Appearance",
     )
     sample: ArrayLike | None = given(
         Data("array of the image's type"),

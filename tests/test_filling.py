@@ -85,18 +85,18 @@ def test_what_a_hole_holds_makes_no_difference():
 
 
 def test_a_hole_is_widened_and_its_rim_blended():
-    image = texture((30, 40))
+    image, as_is = texture((30, 40)), {"light": "keep", "full_output": True}
     mask = hole_at(np.s_[12:16, 15:21], shape=image.shape)
     away = ndimage.distance_transform_edt(~mask)
     assert_same_bits(fill(image, mask, grow=2), fill(image, away <= 2))
-    filled, far = fill(image, away <= 5, full_output=True)
-    blended, output = fill(image, mask, grow=2, feather=3, full_output=True)
+    filled, far = fill(image, away <= 5, **as_is)
+    blended, output = fill(image, mask, grow=2, feather=3, **as_is)
     share = np.clip(1 - np.ceil(away - 2) / 4, 0, 1)
     assert ((share > 0) == (away <= 5)).all()
     assert_same_bits(blended, np.round(share * filled + (1 - share) * image).astype(np.uint8))
     assert ((blended != filled) & (blended != image)).any()
     assert_same_bits(output.source[share >= 0.5], far.source[share >= 0.5])
-    kept = fill(image, mask, grow=2, full_output=True)[1].source
+    kept = fill(image, mask, grow=2, **as_is)[1].source
     assert_same_bits(output.source[share < 0.5], kept[share < 0.5])
 
 

@@ -48,6 +48,9 @@ FEW = 16
 ENOUGH = 512
 """Rows and columns of a picture that determine the size of its parts; of a larger one every n-th pixel is taken."""
 
+MODERATE = 2.0**53
+"""The largest value of a picture whose trend of light is removed without being asked for."""
+
 TENTH = 0.1
 """The autocorrelation at a lag of the size of a picture's parts."""
 
@@ -131,6 +134,11 @@ def fill(call: Fill) -> Work:
     chosen = resolve(Options, "fill", call.options)
     call.image, call.mask = np.where(hole[..., None], 0, pixels), hole
     sample, relit = call.sample, None
+    if call.light is None:
+        known = pixels[~hole][None]
+        whole = call.reach is None and chosen.boundary == "open"  # the trend is of the whole picture, and does not wrap
+        tones = chosen.finish != 0 and _has_tones(chosen, Pictures((known,)))
+        call.light = "even" if whole and tones and np.abs(known, dtype=np.float64).max() <= MODERATE else "keep"
     if call.light == "even":
         sample = sample and with_light(sample, call.light, chosen.categorical)[0]
         (found,) = trends([pixels], [~hole], chosen.categorical)
