@@ -368,7 +368,7 @@ class Fill(Common):
         "Take pixels in the light of their place, or in even light, which then gets that of the hole's place",
         "Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row "
         "and column, which is then added at their new place (even).",
-        none="even, but keep for categories or few different pixels, and with finish 0, a reach, or the boundary torus",
+        none="even if the picture is smooth for the most part, such as a sky; keep with a reach or finish 0",
         group="Appearance",
     )
     sample: ArrayLike | None = given(

@@ -133,15 +133,13 @@ def fill(call: Fill) -> Work:
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     chosen = resolve(Options, "fill", call.options)
     call.image, call.mask = np.where(hole[..., None], 0, pixels), hole
-    sample, relit = call.sample, None
-    if call.light is None:
-        known = pixels[~hole][None]
-        whole = call.reach is None and chosen.boundary == "open"  # the trend is of the whole picture, and does not wrap
-        tones = chosen.finish != 0 and _has_tones(chosen, Pictures((known,)))
-        call.light = "even" if whole and tones and np.abs(known, dtype=np.float64).max() <= MODERATE else "keep"
-    if call.light == "even":
-        sample = sample and with_light(sample, call.light, chosen.categorical)[0]
+    sample, found, relit = call.sample, None, None
+    if call.light == "even" or (call.light is None and _may_be_lit(call, chosen, pixels[~hole][None])):
         (found,) = trends([pixels], [~hole], chosen.categorical)
+        found = found if call.light or found.explains(pixels, ~hole) else None
+    call.light = "even" if found else "keep"
+    if found:
+        sample = sample and with_light(sample, call.light, chosen.categorical)[0]
         relit = Relit(pixels, hole, found)
         pixels = found.removed(pixels)
     job: Any = Filling(pixels, hole, sample, call.reach, chosen, share)
@@ -408,6 +406,15 @@ def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:
 def _has_tones(options: Options, pictures: Pictures) -> bool:
     """Return whether the mean of pixels is a legal pixel: not for categories or for grey levels of a density."""
     return not (options.categorical or options.pixel == "density" or of_palette(pictures.pixels))
+
+
+def _may_be_lit(call: Fill, options: Options, known: NDArray[Any]) -> bool:
+    """Return whether the known pixels (1, n, C) of a picture to fill may lose their trend without being asked.
+
+    The trend is of the whole picture, does not wrap around, and changes pixels.
+    """
+    whole, tones = call.reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
+    return whole and tones and options.finish != 0 and bool(np.abs(known, dtype=np.float64).max() <= MODERATE)
 
 
 def _fewest_levels(pictures: Pictures) -> int:
