@@ -43,7 +43,8 @@ class Plan(Input):
         14 channels + 80 per pixel of the sample with its margin, and the scratch memory of the machine. On the host,
         which includes a CPU's device memory: 84 per output pixel (100 with ``block``) and 10 + 1.5 n for each of its
         channels, n the bytes of a value of the sample, and 64 per pixel of the sample (benchmarks/memory.py). Soft
-        data: 4 per output pixel and kind on the device, and 32 on the host.
+        data: 4 per output pixel and kind on the device, and 32 on the host. A regular sample: 12 per output pixel and
+        56 per pixel of the sample on the device, and as much on the host.
         """
         copies = 2 if self.schedule.tile else 1
         pixels, channels = prod(self.shape), len(self.sample.working)
@@ -51,8 +52,9 @@ class Plan(Input):
         field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
         kinds = self.soft.rows if self.soft else 0
-        device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 80)
-        memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held, self.remedy)
+        phases = 12 * pixels + 56 * held if self.sample.waves else 0
+        device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 80) + phases
+        memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held + phases, self.remedy)
         return Run(self, machine, seed)
 
 
