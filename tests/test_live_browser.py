@@ -14,6 +14,7 @@ import PIL.Image
 import pytest
 from browsing import AXE, browser, drop, live, missing, shown, until
 from live import png, striped, texture
+from test_regularity import BASES, spots
 
 import simdtex
 from simdtex.io.image import example
@@ -649,8 +650,9 @@ def test_the_tour_has_five_steps_and_needs_nothing(page):
     assert explained(page)["candidates"], "the tour has explained a pixel"
 
 
-def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
-    page.button("brick").click()
+def test_the_lattice_is_drawn_and_the_fitting_size_taken(page, tmp_path):
+    (tmp_path / "spots.png").write_bytes(png(spots(BASES["square"], (96, 96))[..., 0]))
+    drop(page.driver, tmp_path / "spots.png")
     page.result(1)
     until(lambda: page.script("return page.seen") == "picture")
     assert not page.one(".fitting").is_displayed(), "the first size is one that fits"
