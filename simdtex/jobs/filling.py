@@ -24,7 +24,7 @@ from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.light import Relit, unevenness
+from simdtex.model.light import EXACT, Relit, unevenness
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.model.regularity import autocorrelation, plain, regular
 from simdtex.options import resolve, within_32_bits
@@ -47,9 +47,6 @@ FEW = 16
 
 ENOUGH = 512
 """Rows and columns of a picture that determine the size of its parts; of a larger one every n-th pixel is taken."""
-
-MODERATE = 2.0**53
-"""The largest value of a picture whose trend of light is removed without being asked for."""
 
 TENTH = 0.1
 """The autocorrelation at a lag of the size of a picture's parts."""
@@ -414,7 +411,7 @@ def _may_be_lit(call: Fill, options: Options, known: NDArray[Any]) -> bool:
     The trend is of the whole picture, does not wrap around, and changes pixels.
     """
     whole, tones = call.reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
-    return whole and tones and options.finish != 0 and bool(np.abs(known, dtype=np.float64).max() <= MODERATE)
+    return whole and tones and options.finish != 0 and bool(np.abs(known, dtype=np.float64).max() <= EXACT)
 
 
 def _fewest_levels(pictures: Pictures) -> int:

@@ -340,8 +340,11 @@ def controls(name: str) -> list[dict[str, Any]]:
     """
     options, job = TABLES[name]
     shown = {name: one for name, one in table(options).items() if job in one.shown}
-    words = {name: one for name, one in inputs(job).items() if isinstance(one.kind, Choice) and not one.painter}
-    words = {name: one for name, one in words.items() if one.default is not None}  # None: the picture decides
+    words = {
+        name: one
+        for name, one in inputs(job).items()
+        if isinstance(one.kind, Choice) and not one.painter and one.default is not None  # None: the picture decides
+    }
     made = [_control(name, one, one.default_of(job)) for name, one in (shown | words).items()]
     return [control for control in made if "kind" in control]
 

@@ -39,6 +39,9 @@ BLOCKS, SMOOTH, SHARE = 8, 0.9, 0.2
 deviation of the pixels. Few crops of photographs are, of tissue and fur among them, but for those of a clear sky."""
 
 
+EXACT = 2.0**53
+"""The integers up to which all are numbers of the type of a trend."""
+
 LEFT = 1 / 3
 """Share of the median deviation that a trend leaves of a picture that it explains. It leaves 0.2 of skies and of pages,
 and 0.6 or more of pictures of objects and of textures."""
@@ -103,7 +106,7 @@ def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
     y, x = (_centred(np.arange(side)[part], side) for side, part in zip(shape, every, strict=True))
     known = picture[inside]
     ends = np.stack([known.min(0), known.max(0)])
-    if picture.dtype.kind in "iu" and np.abs(ends.astype(np.float64)).max() > 2.0**53:  # those of floats
+    if picture.dtype.kind in "iu" and np.abs(ends.astype(np.float64)).max() > EXACT:
         raise ValueError("integers beyond 2**53 have no trend; give smaller ones, or leave light out")
     terms, limits = np.zeros((6, len(ends[0]))), np.zeros((2, len(ends[0])))
     for channel, (low, high) in enumerate(ends.T.astype(np.float64).tolist()):
