@@ -51,6 +51,7 @@ class MrfOptions(TypedDict, total=False):
     finish: float | None
     overview: int
     levels: int | None
+    reduction: int | None
     boundary: Literal["torus", "open"]
     edges: Literal["auto", "reflect", "whole"]
     phases: Literal["all", "decimated"]

@@ -17,7 +17,7 @@ import plain
 from numpy import float32
 from plain_multires import within
 from plain_numbers import cumulative, exponential, fma, logarithm, minus_gumbel
-from plain_sample import NOWHERE, UNKNOWN, between, lay, material, stand_ins
+from plain_sample import NOWHERE, UNKNOWN, between, clamped, completed, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 from plain_shown import finished, picture
 
@@ -33,7 +33,7 @@ IN_PHASE, FEW = 128, 16  # candidates of a phase, at most, and on average if its
 DEFAULTS = {
     **{"order": None, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
-    **{"lattice": "auto"},
+    **{"lattice": "auto", "reduction": None},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4, "coarse_chance": 0},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
@@ -42,7 +42,7 @@ DEFAULTS = {
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
     **{"edges": "whole", "search": "exact", "overview": 64},
-    **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "lattice": "none"},
+    **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "lattice": "none", "reduction": 1},
 }
 
 
@@ -74,16 +74,26 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     pictures = [pictures] if one else pictures
     o = options(pictures, **given)
     maps = maps or {}
-    Y = material(pictures, o, shape, mask, known, known_source, guide, maps)
+    sizes = [(pictures, shape, mask, known, known_source, guide)]
+    while 2 ** len(sizes) <= (o.reduction or 1):
+        sizes.append(halved(*sizes[-1]))
+    Ys, lattices = [], None
+    for y, size, *more in sizes:
+        Ys.append(material(y, o, size, *more, maps, lattices))
+        lattices = Ys[-1].waves and [[half(one) for one in Ys[-1].lattices[0]], half(Ys[-1].lattices[1])]
     sides = [y.shape[:2] for y in pictures]
     if "images" in maps:  # each picture is wanted somewhere, as often as the map says
         told = [plane[~np.isnan(plane)].tolist() for plane in maps["images"]]
         o.shares, sides = [max(0.001, sum(one) / max(1, len(one))) for one in told], [min(sides, key=min)]
     levels = number_of_levels(sides, shape, o)  # 1.
-    lay(Y, levels, o)
-    X, level = at_random(Y, shape, seed), None  # 2., 5.
+    X = None
     for number in reversed(range(levels)):  # 6.
-        level = Level(number, levels, Y, shape, seed, o, level)  # 3., 4., 6.1
+        k = min(number, len(sizes) - 1)
+        Y, size = Ys[k], sizes[k][1]
+        if X is None or number < len(sizes) - 1:
+            lay(Y, levels - k if X is None else 1, o)
+            X = at_random(Y, size, seed) if X is None else arranged(X, Y, size)  # 2., 5.
+        level = Level(number, levels, Y, size, seed, o, 2**k)  # 3., 4., 6.1
         place_guides(level, X, Y)
         level.penalty = penalties(level, X)
         cooling = True
@@ -103,6 +113,64 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     if known is not None:
         image = np.where(np.ma.getmaskarray(known), image, np.ma.getdata(known)).astype(image.dtype)
     return image, X.source[..., 1:] if one else X.source[..., [1, 2, 0]], X.t / 1024  # 7.
+
+
+def halved(pictures, shape, mask, known, source, guide):
+    """The same at half the size: means of squares of 2x2, known, usable or a gap as all or any of the four are."""
+
+    def mean(array, rows, cols, kind=None):
+        """Squares beyond the border have its pixels twice."""
+        found = np.zeros((rows, cols, *array.shape[2:]), kind or array.dtype)
+        for i, j in np.ndindex(rows, cols):
+            four = [array[clamped(2 * i + a, len(array)), clamped(2 * j + b, array.shape[1])] for a, b in SQUARE]
+            exact = sum(np.asarray(one, float) / 4 for one in four)
+            found[i, j] = np.rint(exact) if array.dtype.kind in "iu" else exact
+        return found
+
+    def every(array, rows, cols):
+        return mean(array.astype(float), rows, cols) == 1
+
+    gaps = [np.isnan(y).any(-1) if y.dtype.kind == "f" else np.zeros(y.shape[:2], bool) for y in pictures]
+    smaller = [(y.shape[0] // 2, y.shape[1] // 2) for y in pictures]
+    whole = [mean(completed(*pair), *size) for *pair, size in zip(pictures, gaps, smaller, strict=True)]
+    for y, gap, size in zip(whole, gaps, smaller, strict=True):
+        if gap.any():
+            y[~every(~gap, *size)] = np.nan
+    mask = mask and [every(one, *size) for one, size in zip(mask, smaller, strict=True)]
+    rows, cols = (-(-side // 2) for side in shape)
+    if known is not None:
+        missing = ~every(~np.ma.getmaskarray(known), rows, cols)
+        known = np.ma.masked_array(mean(np.ma.getdata(known), rows, cols), missing)
+        source = source[::2, ::2].copy()
+        for s in map(tuple, np.argwhere(source[..., 0] >= 0)):
+            n = source[s][2] if len(source[s]) > 2 else 0
+            source[s][:2] = [min(at // 2, side - 1) for at, side in zip(source[s][:2], smaller[n], strict=True)]
+    if guide is not None:
+        row, col = ([min(2 * i + 1, side - 1) for i in range(-(-side // 2))] for side in shape)
+        guide = [one[1::2, 1::2] for one in guide[0]], guide[1][np.ix_(row, col)], *guide[2:]
+    return whole, (rows, cols), mask, known, source, guide
+
+
+def half(lattice):
+    """A lattice at half the size."""
+    return tuple((y / 2, x / 2) for y, x in lattice)
+
+
+SQUARE = list(product((0, 1), repeat=2))
+
+
+def arranged(X, Y, shape):
+    """Sites of twice the size: a pixel of the square of the pixel that the site at or before each had, at temperature 0."""
+    found = at_random(Y, shape, 0)
+    for s in np.ndindex(*shape):
+        if s in Y.given:
+            continue
+        n, i, j = X.source[s[0] // 2, s[1] // 2].tolist()
+        n, i, j = found.source[s] = max(n, 0), 2 * i + s[0] % 2, 2 * j + s[1] % 2
+        for c in range(Y.matched):
+            found.x[c][s] = Y.planes[n][c][i, j]
+        found.t[s] = 0
+    return found
 
 
 def at_random(Y, shape, seed):
@@ -223,9 +291,12 @@ def number_of_levels(samples, shape, o):
 class Level:
     """One level: its lattice, its neighbourhoods, its candidates and the Gaussian of equation (7)."""
 
-    def __init__(self, number, levels, Y, shape, seed, o, above=None):
-        """Equations (8), (10) and (11); ``above`` is the next coarser level."""
+    def __init__(self, number, levels, Y, shape, seed, o, reduction=1):
+        """Equations (8), (10) and (11) of pictures and an output that are reduced by ``reduction``."""
         self.number, self.spacing, self.width, self.seed, self.o, self.Y = number, 2**number, shape[1], seed, o, Y
+        self.spacing //= reduction
+        if reduction > 1 and o.edges == "auto":
+            self.o = o = SimpleNamespace(**vars(o) | {"edges": "reflect"})
         self.rows, self.cols = plain.grid_size(shape, self.spacing)
         self.sites = list(product(range(self.rows), range(self.cols)))
         torus = o.boundary == "torus"
@@ -239,7 +310,7 @@ class Level:
 
         self.phased = Y.waves is not None and o.search == "coherent"
         radius, step = isqrt(o.order), 1 if o.phases == "all" or self.phased else self.spacing
-        self.step, self.above = step, above
+        self.step = step
         self.places = positions(Y, self.spacing, step, o)
         self.number_of = {place: p for p, place in enumerate(self.places)}
         self.at = [(Y.tops[n] + i, j) for n, i, j in self.places]  # in the canvas
@@ -266,14 +337,14 @@ class Level:
         coarsest, coherent = number == levels - 1, o.search == "coherent"
         self.gibbs = o.relaxation == "gibbs" or coarsest
         self.all = not coherent or (coarsest and not self.phased) or n <= EXHAUSTIVE
-        self.chance = max(o.chance, o.coarse_chance) if self.spacing >= 4 else o.chance
+        self.chance = max(o.chance, o.coarse_chance) if number >= 2 else o.chance
         if self.phased:
             self.chance = max(self.chance, IN_PHASE // 4 ** (levels - 1 - number))
             self.of_phase = self.by_phase()
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate, self.strict = o.balance * differing, 0.5 * differing
-        apart = n // 4**number if self.phased else n  # candidates that lie the spacing apart
+        apart = n // self.spacing**2 if self.phased else n  # candidates that lie the spacing apart
         freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0
         self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
 

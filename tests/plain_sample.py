@@ -23,7 +23,7 @@ UNKNOWN = -1
 COLOCATED = 16  # channels that a variable known where others are not may have, for all that room is made
 
 
-def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None, maps=None):
+def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None, maps=None, lattices=None):
     """Y: the pictures, whole where they have gaps, and everything that is matched, as grey levels."""
     gaps = [np.isnan(y).any(-1) if y.dtype.kind == "f" else np.zeros(y.shape[:2], bool) for y in pictures]
     Y = SimpleNamespace(gaps=gaps, pictures=[completed(*pair) for pair in zip(pictures, gaps, strict=True)])
@@ -42,7 +42,7 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     beside = ([] if guide is None else [labelled(guide, o)]) + [None] * colocated
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
     channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
-    lattices = repeated(pictures, o, shape, known, known_source)
+    lattices = lattices or repeated(pictures, o, shape, known, known_source)
     maps = maps or {}
     heavy = max(1, o.data_weight, N / 4) if known is not None or beside or "region" in maps else 1
     values = round(heavy * (channels * N + len(beside)))

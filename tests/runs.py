@@ -315,6 +315,17 @@ RUNS = {
     "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
     "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
     "more-whole": textures(MORE | {"edges": "whole", "phases": "all", "balance": 2.0}, samples=((16, 15),)),
+    "reduced": textures(MORE | {"levels": 3, "reduction": 2}, samples=((24, 25),), shape=(13, 11), tiles=6),
+    "reduced-lattice": textures(
+        MORE | {"levels": 3, "reduction": 2, "lattice": "5.2,0.3,-0.2,6", "free_sweeps": 1},
+        samples=((21, 20),),
+        shape=(11, 12),
+    ),
+    "reduced-everything": textures(
+        MORE_FEW | OPEN | GIBBS | {"levels": 3, "reduction": 4, "shares": (2.0, 1.0), "schedule": "luby"},
+        **F4 | {"samples": ((26, 28), (25, 23)), "shape": (13, 14), "channels": 2, "masked": 0.02, "gaps": 0.02},
+        **{"known": 0.7, "placed": 0.8, "labels": 0, "silent": 0.1},
+    ),
     "more-gibbs": textures(MORE_FEW | {"relaxation": "gibbs"}, channels=2, shape=(6, 7), **F4),
     "more-density": textures(MORE | DRAWN | {"novelty": 0.4, "finish": 1.5}, channels=2, samples=((10, 9),)),
     # what is given besides
@@ -362,6 +373,7 @@ RUNS = {
         for name, given, more in (
             ("known", {"levels": 3}, {"known": 0.02}),
             ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),
+            ("reduced", {"levels": 3, "reduction": 2}, {"known": 0.4, "placed": 1.0}),
             ("synchronous", {"schedule": "synchronous", "levels": 2}, {"channels": 3, "dtype": np.bool_}),
         )
     },
@@ -398,6 +410,9 @@ RUNS = {
     ),
     # holes, sides and seams
     "fill": arguments(simdtex.fill, GREY, hole, order=1, levels=1),
+    "fill-reduced": arguments(
+        simdtex.fill, GREY, lambda: np.pad(np.ones((6, 7), bool), 4), order=1, levels=3, reduction=4
+    ),
     "fill-colour": arguments(
         simdtex.fill, lambda: texture((14, 15), 3, np.float64), hole, channel_axis=-1, order=2, grow=1, feather=1
     ),

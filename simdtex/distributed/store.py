@@ -50,6 +50,7 @@ from simdtex.checkpoint import read_state, write_state
 from simdtex.distributed.layout import Arrays, Layout, LevelLayout, Maps, further, planned
 from simdtex.io.files import Damaged, write_durable
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
+from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
@@ -79,12 +80,19 @@ class Ready:
         return Planes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
 
 
-def described(plan: Plan) -> dict[str, Any]:
+def described(plan: Input) -> dict[str, Any]:
     """Return a plan as a tree for `simdtex.checkpoint.pack`, without conditioning data of the output."""
     pictures = plan.sample.pictures
     arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
     sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided), "phases": plan.sample.phases}
-    return {"shape": plan.shape, "levels": plan.levels, "options": asdict(plan.options), **arrays, **sample}
+    sizes = {"shape": plan.shape, "levels": plan.levels, "reduction": plan.reduction}
+    return {
+        **sizes,
+        "options": asdict(plan.options),
+        **arrays,
+        **sample,
+        "coarser": plan.coarser and described(plan.coarser),
+    }
 
 
 def restored(tree: dict[str, Any]) -> Plan:
@@ -96,10 +104,20 @@ def restored(tree: dict[str, Any]) -> Plan:
     phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
     sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.neighbourhood)
-    return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"])
+    coarser = tree["coarser"] and restored(tree["coarser"])
+    return Plan(
+        sample,
+        tuple(tree["shape"]),
+        offsets,
+        options,
+        schedule,
+        tree["levels"],
+        reduction=tree["reduction"],
+        coarser=coarser,
+    )
 
 
-FORMAT = 8
+FORMAT = 9
 """Format of the store; all other formats are rejected."""
 
 TALLIES_AT_ONCE = 2**22
@@ -272,7 +290,10 @@ class Store:
         options, given = plan.options, plan.given
         conditions = Conditioning(plan)
         for level in layout.levels:
-            grid = Grid.of(plan.shape, 2**level.number, options.boundary == "torus")
+            part = plan.of(level.number)
+            if part is not conditions.plan:
+                conditions = Conditioning(part)
+            grid = Grid.of(part.shape, 2**level.number // part.reduction, options.boundary == "torus")
             if (here := conditions.at(level.number, grid)) is not None:
                 held = True
                 for name, plane in here._asdict().items():
@@ -284,7 +305,7 @@ class Store:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
         about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command, "light": light}
-        more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
+        more = list(Conditioning(plan).confidences), held, given is not None, scattered, channels, source, maps
         store._keep("run", about, [described(plan), layout.levels[0].side, *more])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store

@@ -183,12 +183,13 @@ class Turns:
         """Return the number of candidates whose use a tile counts."""
         if turn.phase in ("whole", "show"):
             return 0
-        places = self.lattices.places(turn.level)
-        return int((places.everywhere if self.lattices.exhaustive(turn.level) else places.positions).size)
+        lattices = self.lattices.of(turn.level)
+        places = lattices.places(turn.level)
+        return int((places.everywhere if lattices.exhaustive(turn.level) else places.positions).size)
 
     def _complete(self, turn: Turn) -> Turn:
         """Return the turn after a complete one, which becomes the current turn of the store."""
-        store, lattices, levels = self.store, self.lattices, self.work.layout.levels
+        store, lattices, levels = self.store, self.lattices.of(turn.level), self.work.layout.levels
         if turn.phase == "show":
             return turn._replace(phase="done")  # only `finish` notes it
         counts, active, temperature_sum = store.total(turn)
@@ -247,8 +248,9 @@ class Watch(Observer):
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` on a side."""
-        sample, levels = self._run.lattices.sample, self._run.work.layout.levels
+        levels = self._run.work.layout.levels
         number, step = turn.reads, -(-max(level.rows, level.cols) // SHOWN)
+        sample = self._run.lattices.of(min(number, len(levels) - 1)).sample
         if number == len(levels):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         found = []

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.guide import UNKNOWN, Colocated
 from simdtex.model.lattice import Grid
+from simdtex.model.pictures import halved
 from simdtex.model.sample import Sample
 
 
@@ -82,6 +83,13 @@ class Given:
     def colocated(self, samples: tuple[NDArray[Any], ...]) -> Colocated:
         """Return the known variables of sites with unknown ones, as a guide for the unknown ones."""
         return Colocated(samples, self.values, self.known & ~self.whole[..., None])
+
+    def halved(self) -> Given:
+        """Return the given values of an output of half the size: the means of squares of 2x2 sites, all four given."""
+        more = [(0, side % 2) for side in self.known.shape[:2]]
+        values, unknown = (np.pad(one, [*more, (0, 0)], "edge") for one in (self.values, ~self.known))
+        place = None if self.place is None else self.place[::2, ::2]
+        return Given(halved(values), ~halved(unknown), place, self.suggests)
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of a level, with the known values at its sites."""

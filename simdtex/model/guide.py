@@ -8,7 +8,7 @@ and around it, equals that of the site: texture by numbers (Hertzmann et al. 200
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.lattice import sums_around
-from simdtex.model.pictures import unknown_in
+from simdtex.model.pictures import halved, unknown_in
 from simdtex.model.scale import Scale, stretch
 
 UNKNOWN = 2**16 - 1
@@ -43,13 +43,14 @@ class Guide:
 
     ``samples`` (rows, cols, G) have the sizes of the sample's pictures, ``output`` (H, W, G) is NaN where there is no
     guide; ``labels`` says whether its numbers are labels, which are only equal or different; ``weight`` is the variance
-    of the guide in units of the pixels' variance.
+    of the guide in units of the pixels' variance. ``names`` are the labels of each channel, None: those of the samples.
     """
 
     samples: tuple[NDArray[Any], ...]
     output: NDArray[Any]
     labels: bool
     weight: float
+    names: tuple[NDArray[Any], ...] | None = None
 
     @property
     def channels(self) -> int:
@@ -59,7 +60,16 @@ class Guide:
         names = [self._names(channel).size for channel in range(self.output.shape[-1])]
         return sum(1 if count < 3 else count for count in names)
 
+    def halved(self) -> Guide:
+        """Return the guide of pictures and an output of half the size: one of the pixels of each square of 2x2."""
+        row, col = (np.minimum(np.arange(1, side + 1, 2), side - 1) for side in self.output.shape[:2])
+        names = tuple(self._names(channel) for channel in range(self.output.shape[-1])) if self.labels else None
+        samples, output = tuple(one[1::2, 1::2] for one in self.samples), self.output[np.ix_(row, col)]
+        return replace(self, samples=samples, output=output, names=names)
+
     def _names(self, channel: int) -> NDArray[Any]:
+        if self.names:
+            return self.names[channel]
         return np.unique(np.concatenate([np.unique(sample[..., channel]) for sample in self.samples]))
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
@@ -147,6 +157,14 @@ class Surroundings:
     given: NDArray[np.bool_]
     corner: tuple[float, float]
     colours: bool = True
+
+    def halved(self) -> Surroundings:
+        """Return the guide of a picture and an output of half the size."""
+        known, values, given = ~halved(~self.known), self.values, self.given
+        more = [(0, side % 2) for side in given.shape]
+        values, missing = np.pad(values, [*more, (0, 0)], "edge"), np.pad(~given, more, "edge")
+        corner = self.corner[0] / 2, self.corner[1] / 2
+        return Surroundings(halved(self.sample), known, halved(values), ~halved(missing), corner, self.colours)
 
     @property
     def channels(self) -> int:

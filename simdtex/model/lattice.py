@@ -172,9 +172,9 @@ class Grid:
 
     @property
     def above(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """First row and rows, and first column and columns, of the sites that the level above shares with this grid."""
+        """First row and rows, and first column and columns, of the sites of the level above at or before this grid's."""
         (top, rows), (left, cols) = (
-            (-(-first // 2), (first + size + 1) // 2 - -(-first // 2))
+            (first // 2, (first + size + 1) // 2 - first // 2)
             for first, size in zip(self.first, self.shape, strict=True)
         )
         return (top, rows), (left, cols)

@@ -10,7 +10,7 @@ borders of its picture a copy is a mirror image, whose pixels are never taken.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, sqrt
 from typing import Any
 
@@ -87,6 +87,13 @@ class Pictures:
         plane = self.pixels[number][..., variable]
         return plane[self.known[number]] if self.known else plane.ravel()
 
+    def halved(self) -> Pictures:
+        """Return pictures of half the size: the means of squares of 2x2 pixels, known and usable if all four are."""
+        masks = [one and tuple(~halved(~mask) for mask in one) for one in (self.known, self.usable)]
+        known, usable = masks
+        unknown = known and tuple(~mask for mask in known)
+        return replace(self, pixels=tuple(map(halved, self.pixels)), unknown=unknown, usable=usable)
+
     @property
     def channels(self) -> int:
         """Number of channels of working levels: one for a variable, or one for each category if these are 3 or more."""
@@ -135,6 +142,16 @@ def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
             if len(seen) > most:
                 return False
     return True
+
+
+def halved(array: NDArray[Any]) -> NDArray[Any]:
+    """Return the means, in the same type, of the whole squares of 2x2 of an array (rows, cols, ...); of masks any."""
+    rows, cols = (side - side % 2 for side in array.shape[:2])
+    parts = [array[i:rows:2, j:cols:2] for i in (0, 1) for j in (0, 1)]
+    if array.dtype == np.bool_:
+        return np.logical_or.reduce(parts)
+    mean = sum(part.astype(np.float64) / 4 for part in parts)
+    return np.asarray(np.rint(mean) if array.dtype.kind in "iu" else mean).astype(array.dtype)
 
 
 EIGHTHS = 8

@@ -113,6 +113,10 @@ class Lattice(NamedTuple):
         (a, b), (c, d) = self.first, self.second
         return self._replace(origin=(top + i * a + j * c, left + i * b + j * d))
 
+    def halved(self) -> Lattice:
+        """Return the lattice of a picture of half the size."""
+        return Lattice(*((y / 2, x / 2) for y, x in self))
+
     def fitted(self, shape: tuple[int, int]) -> Lattice | None:
         """Return the lattice deformed so that a torus of ``shape`` pixels holds it; None beyond `MOST_STRAIN`."""
         size, basis = np.diag(shape).astype(np.float64), self.basis
@@ -155,6 +159,10 @@ class Phases(NamedTuple):
     pictures: tuple[Lattice, ...]
     output: Lattice
     weight: float = 1.0
+
+    def halved(self) -> Phases:
+        """Return the phases of pictures and an output of half the size."""
+        return Phases(tuple(one.halved() for one in self.pictures), self.output.halved(), self.weight)
 
     def waves(self, spread: float, top: int) -> Waves:
         """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels, summed over channels.

@@ -123,6 +123,8 @@ class Sample:
         no neighbour in another picture.
     phases : Phases, optional
         The guide by the sample's own lattice, which is no channel, see `phases_at`.
+    reduction : int
+        Pixels of the user's sample along a side of the square whose mean a pixel is.
 
     Attributes
     ----------
@@ -158,6 +160,7 @@ class Sample:
         guides: Sequence[AnyGuide] = (),
         apart: int = 0,
         phases: Phases | None = None,
+        reduction: int = 1,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
         self.layout = {
@@ -166,8 +169,9 @@ class Sample:
             "weight": weight,
             "step": step,
             "apart": apart,
+            "reduction": reduction,
         }
-        self.phases = phases
+        self.phases, self.reduction = phases, reduction
         self.scale = Scale(self.pictures, values)
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
@@ -192,7 +196,7 @@ class Sample:
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
         sample.top, sample.unit, sample.direct = count - 1, 1.0, True
-        sample.guides, sample.waves = np.zeros((0, 1, 1), np.uint16), None
+        sample.reduction, sample.guides, sample.waves = 1, np.zeros((0, 1, 1), np.uint16), None
         sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
 
@@ -430,15 +434,21 @@ class Sample:
         With several pictures the result is (row, column, number of the picture), with a volume (layer, row, column).
         """
         place = np.stack(self._coordinates(source), -1)
-        if len(self.boxes) > 1:
-            number = self.picture_of(source).astype(np.int32)
+        number = self.picture_of(source).astype(np.int32) if len(self.boxes) > 1 else None
+        if number is not None:
             place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[number]
+        if self.reduction > 1:
+            place *= self.reduction
+        if number is not None:
             place = np.concatenate([place, number[..., None]], -1)
         return np.where((source < 0)[..., None], np.int32(-1), place) if (source < 0).any() else place
 
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the pixel index of (row, column[, number of the picture]) on a last axis; -1 if the row is below 0."""
         row, col = place[..., -2 if self.layer else 0], place[..., -1 if self.layer else 1]
+        if self.reduction > 1:
+            _, rows, cols = np.array(self.boxes)[place[..., 2] if place.shape[-1] == 3 else 0].T
+            row, col = np.minimum(row // self.reduction, rows.T - 1), np.minimum(col // self.reduction, cols.T - 1)
         if self.layer:
             row = row + (place[..., 0] + self.margin) * self.layer
         elif place.shape[-1] == 3:

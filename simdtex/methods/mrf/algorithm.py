@@ -98,9 +98,10 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
 
     ``above`` are the sites of the level above in the window, on the machine; None at the coarsest level.
     """
-    machine, grid = level.machine, level.setting.grid
+    machine, grid, run = level.machine, level.setting.grid, run.of(level.number)
     everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-    field = start(machine, run.planes, everywhere, grid, run.seed, above)  # 2, 5
+    squares = run.squares(level.number)
+    field = start(machine, run.planes, everywhere, grid, run.seed, above, squares, run.sample.cols)  # 2, 5
     return run.conditions.entered(machine, level.number, grid, field)
 
 

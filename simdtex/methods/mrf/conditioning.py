@@ -87,6 +87,7 @@ class Conditioning(Conditions):
         confidences = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
         super().__init__(confidences)
         self.guides, self.planes = sample.guides, planes
+        self.plan = plan
         self.torus = plan.options.boundary == "torus"
         self._held: dict[int, Held] = {}
 
@@ -95,15 +96,15 @@ class Conditioning(Conditions):
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:
-            self._held = {number: self._whole(Grid.of(self._shape, 2**number, grid.torus))}  # one level is enough
+            self._held = {number: self._whole(Grid.of(self._shape, grid.step, grid.torus))}  # one level is enough
         held = self._held[number]
         return Held(*(grid.cut(plane) for plane in held))
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        if self.planes is None or not number:
+        if self.planes is None or 2**number == self.plan.reduction:
             return None
-        place = between(self.planes.data, Grid.of(self._shape, 2**number, self.torus))
+        place = between(self.planes.data, Grid.of(self._shape, 2**number // self.plan.reduction, self.torus))
         values = self.planes.values[(slice(None), *place.T)].T
         return Data(place, np.ascontiguousarray(values)) if len(place) else None
 

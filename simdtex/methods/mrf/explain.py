@@ -43,7 +43,7 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
 
     ``twin`` is the run's plan on the reference. Cost: about two relaxations by the twins.
     """
-    level = twin.level(moment.level)
+    level, twin = twin.level(moment.level), twin.of(moment.level)
     pixel = np.array([site_number(twin, moment.level, site)], np.int32)
     field, relaxation = moment.field, with_penalty(level, moment.penalty)
     choice, candidates = relaxation.choice, relaxation.proposal.candidates

@@ -23,6 +23,9 @@ class Input:
     output, ``offsets`` (N, 2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1.
     ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels;
     ``soft`` are soft data, and ``remedy`` is the user's remedy if the memory does not suffice.
+
+    A pixel of ``sample`` and a site of X are means over squares of ``reduction`` pixels. ``coarser`` is the input, of
+    half the size, of levels whose spacing is twice the reduction or more; if it is None, they have this input, too.
     """
 
     sample: Sample
@@ -35,3 +38,14 @@ class Input:
     planes: Planes | None = None
     soft: Soft | None = None
     remedy: str = SMALLER
+    reduction: int = 1
+    coarser: Input | None = None
+
+    @property
+    def sizes(self) -> list[Input]:
+        """All inputs, the finest first."""
+        return [self, *(self.coarser.sizes if self.coarser else ())]
+
+    def of(self, number: int) -> Input:
+        """Return the input of a level: this one, or a coarser one."""
+        return self.coarser.of(number) if self.coarser and 2**number > self.reduction else self

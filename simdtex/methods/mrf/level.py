@@ -130,21 +130,42 @@ class Lattices:
     """A plan on a machine: the constants of the run, and its levels.
 
     ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
-    plan. ``planes`` are the sample's working levels on the machine.
+    plan. ``planes`` are the sample's working levels on the machine. ``coarser`` are the levels with a sample of half
+    the size, None without any.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
         self.plan, self.machine, self.seed, self.levels = plan, machine, seed, plan.levels
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
+        self.coarser = Lattices(plan.coarser, machine, seed, conditions) if plan.coarser else None
         self.conditions = conditions or Conditioning(plan)
         self._last: Level | None = None  # without the parts that depend on the window
         self._whole: Level | None = None
         self._in_phase: Any = None  # positions and their phases, which most levels share
 
+    def of(self, number: int) -> Lattices:
+        """Return the lattices that have the sample of a level: these, or coarser ones."""
+        return self.coarser.of(number) if self.coarser and self.plan.of(number) is not self.plan else self
+
+    def spacing(self, number: int) -> int:
+        """Return the number of pixels of the sample from site to site of a level."""
+        return int(2**number // self.plan.reduction)
+
+    def squares(self, number: int) -> NDArray[np.int32] | None:
+        """Return the first pixel of the square of each pixel of the sample of half the size, if the level above has it.
+
+        None if the level above has the same sample.
+        """
+        if not self.coarser or number == self.levels - 1:
+            return None
+        coarser = self.coarser.sample
+        return self.sample.index(coarser.place(np.arange(coarser.rows * coarser.cols, dtype=np.int32)))
+
     def grid(self, number: int) -> Grid:
-        """Return the lattice of a level, equation (10)."""
-        return Grid.of(self.plan.shape, 2**number, self.options.boundary == "torus")
+        """Return the lattice of a level, equation (10), in pixels of the level's sample."""
+        lattices = self.of(number)
+        return Grid.of(lattices.plan.shape, lattices.spacing(number), self.options.boundary == "torus")
 
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
@@ -152,6 +173,9 @@ class Lattices:
         ``window`` is (first row, first column, rows, columns) of a window of the lattice; the arrays of the state then
         hold only the sites of the window. None: the whole lattice.
         """
+        lattices = self.of(number)
+        if lattices is not self:
+            return lattices.level(number, window)
         if self._last is None or self._last.number != number:
             self._last = self._whole = None  # the arrays of one level are enough to keep
             self._last = self._level(number)
@@ -165,7 +189,7 @@ class Lattices:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid, places = self.grid(number), self.places(number)
         coarsest, count = number == self.levels - 1, places.positions.size
-        every, spaced = self.exhaustive(number), count // (4**number if self.phased else 1)
+        every, spaced = self.exhaustive(number), count // (self.spacing(number) ** 2 if self.phased else 1)
         candidates = sample.candidates(machine, places, self.planes, every)
         square = square_of(machine, sample, places, every)
         proposal: AllCandidates | CandidateList = AllCandidates(candidates, square)
@@ -244,7 +268,7 @@ class Lattices:
         if not waves:
             return None
         weight = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
-        step = 1 if self.phases == "all" else 2**number
+        step = 1 if self.phases == "all" else self.spacing(number)
         tolerance = np.float32(round(float(weight) ** 2 * waves.half(step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))
@@ -281,7 +305,7 @@ class Lattices:
 
     def fair_use(self, number: int) -> FairUse:
         """Return the positions of the candidates of a level, and the fair use of each."""
-        step = 2**number if self.phases == "all" else 1
+        step = self.spacing(number) if self.phases == "all" else 1
         places = self.places(number)
         around, kinds = int(self.offsets[:, 1].max()) * step, None
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
@@ -292,7 +316,8 @@ class Lattices:
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
-        return self.sample.places(self.offsets, 2**number, self.phases, self.options.edges)
+        edges = "reflect" if self.options.edges == "auto" and self.plan.reduction > 1 else self.options.edges
+        return self.sample.places(self.offsets, self.spacing(number), self.phases, edges)
 
     @property
     def phased(self) -> bool:

@@ -176,6 +176,24 @@ class Options:
         symbol="M of Algorithm 1",
         slider=(1, 8, 1),
     )
+    reduction: int | None = scales(
+        None,
+        Whole(1),
+        "Reduce sample and output by up to this factor, a power of 2, at the coarse levels: large parts of the sample "
+        "stay whole, and it takes less time",
+        more="At a level whose sites are 2 to `reduction` pixels apart, a pixel is the mean of a square of that side; "
+        "coarser levels decimate the most reduced sample. A level with a larger sample than the level above begins "
+        "with the arrangement of that level, at temperature 0, and has free sweeps only. With 1, all levels are "
+        "decimated.",
+        none="the coarsest sites are 8 pixels of the reduced sample apart, and a cell of a lattice has 20 along each "
+        "vector; 1 with categories, palettes, exact searches, volumes and known values from elsewhere",
+        unit="pixels",
+        symbol="equation (10)",
+        paper=1,
+        jobs={"simulate": 1, "simulate 3-D": 1},
+        slider=(1, 32, 1),
+        shown=(),
+    )
     boundary: str = scales(
         "torus",
         Choice(("torus", "open")),
@@ -358,6 +376,8 @@ class Options:
             raise ValueError('the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
+        if self.reduction and self.reduction & (self.reduction - 1):
+            raise ValueError(f"reduction is {self.reduction}; give a power of 2, as 4 or 8")
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import prod
-from typing import Any
+from math import isqrt, log2, prod
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from simdtex.machine import Machine, memory
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.level import number_of_levels
-from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.options import Options, of_palette
 from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
@@ -29,6 +29,12 @@ from simdtex.options import within_32_bits
 
 LABELS = 64
 """The most labels of a guide; each label is a channel."""
+
+NEAR = 4
+"""The number of levels that share the most reduced sample: the coarsest has a spacing of 8 of its pixels."""
+
+CELL = 20
+"""The fewest pixels of a reduced sample along the vectors of its lattice."""
 
 
 class Plan(Input):
@@ -49,7 +55,7 @@ class Plan(Input):
         copies = 2 if self.schedule.tile else 1
         pixels, channels = prod(self.shape), len(self.sample.working)
         within_32_bits(self.shape, channels * copies, self.remedy)
-        field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
+        field, held = copies * (6 + 2 * channels), sum(one.sample.rows * one.sample.cols for one in self.sizes)
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
         kinds = self.soft.rows if self.soft else 0
         phases = 12 * pixels + 56 * held if self.sample.waves else 0
@@ -110,26 +116,78 @@ def plan(
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
-    levels, sample = sampled(pictures, levels, offsets, values, options, guides, regular)
-    held = planes(given, sample) if given and given.whole.any() else None
-    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, held, soft)
+    scene = Scene(pictures, shape, given, guides, regular)
+    scenes = [scene]
+    for _ in range(halvings(scene, options, levels, soft)):
+        scenes.append(scenes[-1].halved())
+    found: Plan | None = None
+    for number, here in reversed(list(enumerate(scenes))):
+        own, sample = sampled(here, 1 if found else levels - number, offsets, values, options, 2**number)
+        levels = levels if found else own + number
+        held = planes(here.given, sample) if here.given and here.given.whole.any() else None
+        schedule, rest = schedules.get(options.schedule), {"reduction": 2**number, "coarser": found}
+        found = Plan(sample, here.shape, offsets, options, schedule, levels, here.given, held, soft, **rest)
+    assert found
+    return found
+
+
+class Scene(NamedTuple):
+    """The input of a run that has a size: the sample's pictures, the shape of the output, and what belongs to both."""
+
+    pictures: Pictures
+    shape: tuple[int, ...]
+    given: Given | None
+    guides: list[Any]
+    regular: Phases | None
+
+    def halved(self) -> Scene:
+        """Return the input of half the size."""
+        return Scene(
+            self.pictures.halved(),
+            tuple(-(-side // 2) for side in self.shape),
+            self.given and self.given.halved(),
+            [guide.halved() for guide in self.guides],
+            self.regular and self.regular.halved(),
+        )
+
+
+def halvings(scene: Scene, options: Options, levels: int, soft: Soft | None) -> int:
+    """Return how many times the sample is halved for the coarse levels."""
+    side = min(min(one.shape[:2]) for one in scene.pictures.pixels)
+    given, most = scene.given, min(levels - 1, int(log2(max(1, side // (2 * isqrt(options.neighbourhood) + 1)))))
+    loose = given is not None and (given.place is None or given.outside is not None or given.partly)
+    kept = options.categorical or options.pixel == "density" or scene.pictures.pixels[0].dtype == np.bool_
+    never = scene.pictures.deep or kept or loose or soft is not None
+    if options.reduction is None:
+        never = never or options.search == "exact" or options.phases == "all" or of_palette(scene.pictures.pixels)
+        shortest = np.hypot(*scene.regular.output.basis.T).min() if scene.regular else np.inf
+        while most and shortest < CELL * 2**most:
+            most -= 1
+        return 0 if never else max(0, min(most, levels - NEAR))
+    asked = round(log2(options.reduction))
+    if asked and never:
+        raise ValueError(
+            f"reduction={options.reduction} takes means, which categories, densities, volumes, soft data and known "
+            "values that are not from the sample do not allow; leave it out"
+        )
+    if asked > most:
+        raise ValueError(
+            f"reduction={options.reduction} is too much for {levels} levels and this sample; give at most {2**most}"
+        )
+    return asked
 
 
 def sampled(
-    pictures: Pictures,
-    levels: int,
-    offsets: NDArray[np.int32],
-    values: int,
-    options: Options,
-    guides: Sequence[AnyGuide],
-    regular: Phases | None,
+    scene: Scene, levels: int, offsets: NDArray[np.int32], values: int, options: Options, reduction: int
 ) -> tuple[int, Sample]:
     """Return the number of levels and the sample; if ``options.levels`` is None, every level has a candidate."""
     far = int(gaussian_offsets(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
         margin = int(offsets[:, 1].max()) * step
-        sample = Sample(pictures, values, margin, options.structure, step, guides, far, regular)
+        sample = Sample(
+            *(scene.pictures, values, margin, options.structure, step, scene.guides, far, scene.regular, reduction)
+        )
         try:
             for number in range(fewer):
                 sample.places(offsets, 2**number, options.phases, options.edges)

@@ -70,7 +70,7 @@ class Record(Observer):
         self._ended, self._first_left = part.last, self._first_left or left
         self._advance(level.number, state, left, min(1.0, self._done / max(1, state.active or sites)))
         if self._callback:
-            read, sweep = (self._run, level.grid, part.field), state.cooling + state.free + 1
+            read, sweep = (self._run.of(level.number), level.grid, part.field), state.cooling + state.free + 1
             self._callback(
                 Progress(
                     level=level.number,
@@ -118,7 +118,7 @@ class Record(Observer):
                     self.account.step(step.sites)
         if info.ended:
             level, report = self._run.level(info.level), self.reports[-1]
-            self.stages.append(Stage(level.number, picture(self._run, level.grid, state.field)))
+            self.stages.append(Stage(level.number, picture(self._run.of(level.number), level.grid, state.field)))
             if self._listed:
                 evaluations = self._evaluated()
                 report["weighed"] = evaluations / max(1, report["relaxations"])  # none if the whole level is known
@@ -145,7 +145,7 @@ class Record(Observer):
         work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
         self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
         if self.account:
-            self.account.begin(grid, self._slots, self._run.choice(level.number))
+            self.account.begin(grid, self._slots, level.relaxation.choice)
 
     def save(self) -> dict[str, Any]:
         """Return everything received so far, as plain arrays and numbers."""
@@ -163,7 +163,7 @@ class Record(Observer):
         self._skipped, self._evaluations = self._run.machine.spared - saved["skipped"], saved["evaluations"]
         if self.account and self.reports:
             number = self.reports[-1]["level"]
-            self.account.begin(self._run.grid(number), self._slots, self._run.choice(number))
+            self.account.begin(self._run.grid(number), self._slots, self._run.of(number).choice(number))
             self.account.total.update(saved["account"])
 
 
@@ -185,8 +185,9 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
 
 def known_before(run: Lattices) -> dict[str, Any]:
     """Return the statistics that are known before a run begins."""
+    executed = {"levels": run.levels, "reduction": run.plan.sizes[-1].reduction, "schedule": run.plan.schedule.name}
     return {
-        "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
+        "options": vars(run.options) | executed,
         "lattice": run.sample.phases and run.sample.phases.statistics((run.plan.shape[-2], run.plan.shape[-1])),
     }
 
@@ -209,20 +210,22 @@ def sources(run: Lattices, grid: Grid, field: Field) -> NDArray[np.int32]:
     return run.sample.place(grid.latest(run.machine.get(field.source)))
 
 
-def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
+def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
     """Return the expected work of each level, for its cooling and its free sweeps, in evaluated candidates.
 
     Measured at xi = -1: the coarsest level takes about 0.6 |N| sweeps, and every other level relaxes each of its new
     sites about 6 times; a sweep has about 0.6 (|N| + 1) steps.
     """
     work = {}
-    for number in range(run.levels):
-        grid, options = run.grid(number), run.options
+    for number in range(whole.levels):
+        run, grid = whole.of(number), whole.grid(number)
+        options = run.options
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
         each = run.places(number).positions.size
         if not run.exhaustive(number):
             each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
+        sweeps = sweeps if coarsest or run.squares(number) is None else 0.0
         sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
         work[number] = (sweep * sweeps, sweep * options.free_sweeps)
     return work

@@ -118,7 +118,7 @@ class Replay:
         sweep = range(len(self.sweeps))[sweep]
         played = self._play(sweep, sets)
         level = self._sweeps[sweep].level
-        run, grid = self._twin, self._twin.grid(level)
+        run, grid = self._twin.of(level), self._twin.grid(level)
         field = Field(*map(self._run.machine.get, played.field))
         done = np.zeros(grid.shape, np.uint8)
         chosen = [info.sites[begin:end] for info in played.decided for begin, end in info.ranges]
@@ -165,7 +165,7 @@ class Replay:
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
                     return explained(self._twin, moment, (row, col))
-            if row % 2 or col % 2:  # no site of the level above
+            if (row % 2 or col % 2) and self._twin.of(level).squares(level) is None:  # no site of the level above
                 break
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
