@@ -98,7 +98,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
         level.penalty = penalties(level, X)
         cooling = True
 
-        def active(level=level):
+        def active(level=level, X=X):
             if cooling:  # noqa: B023 - as it is by then
                 return [s for s in level.sites if X.t[level.pixel(s)] > 0]
             return [s for s in level.sites if level.pixel(s) not in level.held]
@@ -160,7 +160,7 @@ SQUARE = list(product((0, 1), repeat=2))
 
 
 def arranged(X, Y, shape):
-    """Sites of twice the size: a pixel of the square of the pixel that the site at or before each had, at temperature 0."""
+    """Twice the size: a pixel of the square of the pixel that the site at or before each had, at temperature 0."""
     found = at_random(Y, shape, 0)
     for s in np.ndindex(*shape):
         if s in Y.given:

@@ -172,11 +172,9 @@ class Grid:
 
     @property
     def above(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """First row and rows, and first column and columns, of the sites of the level above at or before this grid's."""
-        (top, rows), (left, cols) = (
-            (first // 2, (first + size + 1) // 2 - first // 2)
-            for first, size in zip(self.first, self.shape, strict=True)
-        )
+        """First row and rows, and first column and columns, of the sites of the level above in or before this grid."""
+        lines = zip(self.first, self.shape, strict=True)
+        (top, rows), (left, cols) = ((first // 2, (first + size + 1) // 2 - first // 2) for first, size in lines)
         return (top, rows), (left, cols)
 
     def lines(self) -> list[NDArray[np.int64]]:

@@ -149,8 +149,10 @@ def halved(array: NDArray[Any]) -> NDArray[Any]:
     rows, cols = (side - side % 2 for side in array.shape[:2])
     parts = [array[i:rows:2, j:cols:2] for i in (0, 1) for j in (0, 1)]
     if array.dtype == np.bool_:
-        return np.logical_or.reduce(parts)
-    mean = sum(part.astype(np.float64) / 4 for part in parts)
+        return np.asarray(np.logical_or.reduce(parts))
+    mean = np.zeros(parts[0].shape)
+    for part in parts:
+        mean += part / 4
     return np.asarray(np.rint(mean) if array.dtype.kind in "iu" else mean).astype(array.dtype)
 
 
