@@ -260,6 +260,11 @@ BAD = [
     ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size, or make it in tiles: --tiles 2048"),
     # the options
     ({"levels": 20}, ValueError, "levels=20 is too many .* give at most"),
+    ({"reduction": 3}, ValueError, "reduction is 3; give a power of 2"),
+    ({"reduction": 4, "levels": 2}, ValueError, "too much for 2 levels and this sample; give at most 2"),
+    ({"sample": SAMPLE // 64, "reduction": 2, "levels": 2, "categorical": True}, ValueError, "takes means, .* leave it out"),
+    ({"reduction": 2, "levels": 2, "pixel": "density"}, ValueError, "takes means, .* leave it out"),
+    ({"reduction": 2, "levels": 2, "known": np.ma.masked_less(SAMPLE[:6, :7], 99)}, ValueError, "not from the sample"),
     ({"schedule": "rows"}, ValueError, "choose one of: coloring"),
     ({"temperature": 1}, TypeError, "unknown option 'temperature' .* choose from: preset, order, structure"),
     ({"method": "magic"}, ValueError, "unknown method 'magic'; choose one of: mrf"),
@@ -288,6 +293,21 @@ def test_the_largest_order_that_is_named_works_and_the_next_does_not(side):
     assert quick(sample, (4, 4), order=largest).shape == (4, 4)
     with pytest.raises(ValueError, match=f"the largest order that fits is {largest}"):
         quick(sample, (4, 4), order=largest + 1)
+
+
+def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
+    """`simdtex.synthesize` itself would take long at these sizes."""
+
+    def reduction(sample, **options):
+        _, work = simdtex.synthesize.prepare(sample, (600, 600), **options)
+        return work.run.sizes[-1].reduction
+
+    large = texture((500, 520))
+    assert [reduction(large[:n, :n], lattice="none") for n in (170, 250, 400)] == [1, 2, 4]
+    assert [reduction(large, lattice=((0, n), (n, 0))) for n in (90, 41, 30)] == [4, 2, 1]
+    paper = {"preset": "paper"}, {"search": "exact"}, {"phases": "all"}, {"categorical": True}
+    assert [reduction(large // 64, **options) for options in ({}, *paper)] == [1] * 5
+    assert reduction(large, reduction=8) == 8
 
 
 @pytest.mark.parametrize("edges", ["whole", "reflect"])
