@@ -92,8 +92,8 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
         Y, size = Ys[k], sizes[k][1]
         if X is None or number < len(sizes) - 1:
             lay(Y, levels - k if X is None else 1, o)
-            X = at_random(Y, size, seed) if X is None else arranged(X, Y, size)  # 2., 5.
-        level = Level(number, levels, Y, size, seed, o, 2**k)  # 3., 4., 6.1
+            X = at_random(Y, size, seed) if X is None else twice(X, Y, size)  # 2., 5.
+        level = Level(number, levels, Y, size, seed, o, 2**k, k < len(sizes) - 1)  # 3., 4., 6.1
         place_guides(level, X, Y)
         level.penalty = penalties(level, X)
         cooling = True
@@ -159,7 +159,7 @@ def half(lattice):
 SQUARE = list(product((0, 1), repeat=2))
 
 
-def arranged(X, Y, shape):
+def twice(X, Y, shape):
     """Twice the size: a pixel of the square of the pixel that the site at or before each had, at temperature 0."""
     found = at_random(Y, shape, 0)
     for s in np.ndindex(*shape):
@@ -291,7 +291,7 @@ def number_of_levels(samples, shape, o):
 class Level:
     """One level: its lattice, its neighbourhoods, its candidates and the Gaussian of equation (7)."""
 
-    def __init__(self, number, levels, Y, shape, seed, o, reduction=1):
+    def __init__(self, number, levels, Y, shape, seed, o, reduction=1, arranged=False):
         """Equations (8), (10) and (11) of pictures and an output that are reduced by ``reduction``."""
         self.number, self.spacing, self.width, self.seed, self.o, self.Y = number, 2**number, shape[1], seed, o, Y
         self.spacing //= reduction
@@ -343,7 +343,7 @@ class Level:
             self.of_phase = self.by_phase()
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
-        self.rate, self.strict = o.balance * differing, 0.5 * differing
+        self.rate, self.strict = (0 if arranged else o.balance * differing), 0.5 * differing
         apart = n // self.spacing**2 if self.phased else n  # candidates that lie the spacing apart
         freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0
         self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)

@@ -199,8 +199,7 @@ class Turns:
         after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
         if turn.phase != "whole" and not lattices.at_equilibrium(after):
             before = store.penalty(turn) if turn.phase == "sweep" else None
-            rate = lattices.options.balance * lattices.typical_distance
-            return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
+            return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), lattices.rate, before))
         if turn.level:
             return store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1))
         return store.save(Turn(number, "show", 0))
