@@ -294,7 +294,7 @@ class Lattices:
 
     @property
     def rate(self) -> float:
-        """lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
+        """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
         return 0.0 if self.coarser else self.options.balance * self.typical_distance
 
     def at_equilibrium(self, state: Counts) -> bool:

@@ -179,8 +179,8 @@ class Options:
     reduction: int | None = scales(
         None,
         Whole(1),
-        "Compare means over squares of up to this many pixels a side, a power of 2, at coarse levels: larger parts of the "
-        "sample stay whole, in less time",
+        "Compare means over squares of up to this many pixels a side, a power of 2, at coarse levels: larger parts of "
+        "the sample stay whole, in less time",
         more="At a level whose sites are 2 to `reduction` pixels apart, a pixel is the mean of a square of that side; "
         "coarser levels decimate the most reduced sample. A level with a larger sample than the level above begins "
         "with the arrangement of that level, at temperature 0, and has free sweeps only. With 1, all levels are "
