@@ -21,18 +21,23 @@ from simdtex.io.image import example
 from simdtex.live.job import Picture
 
 FILE = Path(__file__).parent / "_static" / "recording.js"
-SIDE = 48
+SIDE = 32
 """Rows and columns of the output."""
 
-OPTIONS = {"order": 8, "levels": 3}
+OPTIONS = {
+    **{"relaxation": "gibbs", "pixel": "density", "search": "exact", "order": 8, "levels": 2, "bandwidth": 0.6},
+    **{"lattice": "none", "structure": 0, "coherence": 0, "balance": 0, "novelty": 0, "finish": 0},
+}
+"""The run of the page's lecture, PLAIN of simdtex/live/page/inside.js."""
+
 SEED = 1
-PIXELS = [(24, 24), (11, 13), (13, 35), (35, 12), (37, 38)]
+PIXELS = [(9, 9), (8, 22), (16, 16), (23, 9)]
 LAYERS = ("picture", "temperature", "arrangement", "sets")
 
 
 def sample():
     """The sample of the recorded run."""
-    return example("gravel")[:96, :96]
+    return example("gravel")[:48, :48]
 
 
 def record():
@@ -68,7 +73,7 @@ def record():
     for n, (level, sweep, sets, *_) in enumerate(sweeps):
         for count in range(sets + 1) if n == fine else [sets]:
             moments.append((json.dumps([n, count]), [level, sweep, count]))
-    frames, explained = {}, {}
+    frames, explained, reasons = {}, {}, []
     for key, moment in moments:
         seek = {} if moment is None else dict(zip(("level", "sweep", "sets"), moment, strict=True))
         page.ask("moments", kind="seek", **seek)
@@ -76,13 +81,15 @@ def record():
             frames[f"{layer} {key}"] = shown(layer)
         for pixel in PIXELS:
             found, _ = page.ask("explained", kind="explain", row=pixel[0], col=pixel[1])
-            explained[f"{pixel[0]},{pixel[1]} {key}"] = found
+            if found not in reasons:  # a pixel keeps its value for many moments
+                reasons.append(found)
+            explained[f"{pixel[0]},{pixel[1]} {key}"] = reasons.index(found)
     frames["sample null"] = shown("sample", len(sample()))
     for key, _ in moments[1:]:
         frames[f"sample {key}"] = frames["sample null"]
     page.session.close(10)
     recorded = {"start": start, "inside": inside, "moments": moments, "frames": frames, "explained": explained}
-    return recorded | {"pixels": PIXELS}, b"".join(buffers)
+    return recorded | {"pixels": PIXELS, "reasons": reasons}, b"".join(buffers)
 
 
 def pack(recorded, data):

@@ -264,7 +264,7 @@ def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
         image = replay.at(n, sets).image[..., 0].repeat(2**level, 0).repeat(2**level, 1)
         np.testing.assert_array_equal(seen[..., 0], image[: shape[0], : shape[1]])
         row, col = recorded.PIXELS[0]
-        reason = found["explained"][f"{row},{col} {key}"]["reason"]
+        reason = found["reasons"][found["explained"][f"{row},{col} {key}"]]["reason"]
         try:
             assert reason == replay.explain_pixel(row, col, n, sets).reason
         except ValueError as error:

@@ -13,7 +13,17 @@ from simdtex.model.guide import UNKNOWN
 
 BRICK = data.brick()[:24, :24]
 EXPLAINED = (
-    *("more", "more-levels", "more-whole", "more-gibbs", "paper", "density-colour", "random-scan", "block-exact"),
+    *(
+        "more",
+        "more-levels",
+        "reduced",
+        "more-whole",
+        "more-gibbs",
+        "paper",
+        "density-colour",
+        "random-scan",
+        "block-exact",
+    ),
     *("labels", "grey-guide", "known-open", "gaps", "several", "lattice-exact", "novelty-exact"),
 )
 """Runs of the table: with every search and relaxation, several schedules, and every cost."""
@@ -61,7 +71,11 @@ def consistent(why, coherence=0.5):
     guides = "guide" in found.costs
     x, y, u = (a.astype(np.float64) for a in (near.values, found.around, near.confidence))
     assert (u[near.values == UNKNOWN] == 0).all()
-    d = (((x - y) * u) ** 2).sum(1)  # (12), by channels
+    np.testing.assert_array_equal(why.terms, ((x - y) * u) ** 2)
+    d = why.terms.sum(1)  # (12), by channels
+    assert why.channels.count("guide") == guides * (d.shape[1] - len(why.values))
+    assert (len(why.channels), why.totals.size) == (d.shape[1], why.weighed)
+    np.testing.assert_array_equal(why.totals[found.rank], found.total)
     made = d.shape[1] - guides * (d.shape[1] - len(why.values))
     np.testing.assert_allclose(found.distance, d[:, :made].sum(1), rtol=1e-5)
     if guides:

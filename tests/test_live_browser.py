@@ -638,16 +638,41 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     until(lambda: inside.script("return !page.inside.open"))
 
 
-def test_the_tour_has_five_steps_and_needs_nothing(page):
-    page.button("Tour in five steps").click()
+def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
+    button = page.button("Lecture: why this pixel?")
+    button.click()
     until(lambda: page.one(".tour").is_displayed())
-    for number in range(1, 6):
-        assert page.one(".tour h2").text.startswith(f"{number} of 5")
+    shown(page.driver, width=1280, height=720)
+    box = page.one(".tour")
+    for number in range(1, 7):
+        assert page.one(".tour h2").text.startswith(f"{number} of 6") and page.one(".tour h2").text.endswith("?")
+        asked = page.one(".tour p").text
         assert page.one(".pointed").is_displayed()
+        if number == 3:
+            until(lambda: page.all(".reason .dice"))
+            for place in (".tour", ".panes canvas", ".reason table", ".reason .dice", ".reason > figure canvas"):
+                assert (
+                    page.script("return document.querySelector(arguments[0]).getBoundingClientRect().bottom", place)
+                    <= 720
+                )
+            before = [row.text for row in page.all(".reason tbody tr")]
+            page.script(
+                "const h = arguments[0]; h.value = 2; h.dispatchEvent(new Event('input'))", page.one(".dice input")
+            )
+            assert "candidates count" in page.one(".dice output").text
+            assert [row.text for row in page.all(".reason tbody tr")] != before, "the probabilities follow h"
+            page.button("Draw again").click()
+            assert "The dice say" in page.one(".dice output").text
         assert page.faults() == []
-        page.one(".tour .next").click()
+        box.send_keys(Keys.ENTER)
+        assert page.one(".tour p").text != asked, "the answer"
+        box.send_keys(Keys.ARROW_LEFT, "n")
+        box.send_keys(Keys.ENTER)
     assert not page.one(".tour").is_displayed()
-    assert explained(page)["candidates"], "the tour has explained a pixel"
+    assert page.driver.switch_to.active_element == button
+    why = explained(page)
+    assert why["weighed"] > 1000 and len(why["totals"]) == min(4096, why["weighed"]), "the plain model weighs all"
+    shown(page.driver, width=1400)
 
 
 def test_the_lattice_is_drawn_and_the_fitting_size_taken(page, tmp_path):

@@ -782,6 +782,11 @@ def test_a_pixel_is_explained_as_in_python(page_inside):
     assert taken["costs"]["total"] == why.candidates.total[why.taken]
     np.testing.assert_array_equal(taken["pixels"], why.candidates.pixels[why.taken])
     np.testing.assert_array_equal(found["pixels"], why.neighbours.pixels)
+    assert list(found["channels"]) == ["picture"] * 3 + ["structure"]
+    for one, n in zip(found["candidates"], why.shown(), strict=True):  # what is shown adds up to the distance
+        terms = ((np.array(found["levels"]) - one["values"][1:]) * found["trust"]) ** 2
+        assert terms.sum() == pytest.approx(why.candidates.distance[n], rel=1e-3, abs=1)
+    assert len(found["totals"]) == why.weighed and found["totals"][0] == pytest.approx(why.totals[0], abs=0.1)
     page_inside.say(kind="seek", level=9, sweep=1, sets=0)
     assert "has not relaxed yet" in page_inside.ask("explained", kind="explain", row=5, col=7)[0]["reason"]
     assert "error" not in page_inside.kinds(after)

@@ -42,6 +42,9 @@ SET_COLOURS = np.array([[0, 0, 0], [90, 110, 140], [255, 30, 155]], np.uint8)
 SET_SHARES = (0.0, 0.6, 1.0)
 """Shares of the colours over sites: not relaxed, relaxed earlier in the sweep, relaxed in the last set."""
 
+MOST_TOTALS = 1024
+"""The most total costs of candidates that the page gets, the least ones."""
+
 BARS = 64
 """The most bars of the LCPDF of a channel."""
 
@@ -232,6 +235,7 @@ def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]
             "costs": {name: float(cost[n]) for name, cost in costs.items()},
             **{"probability": float(found.probability[n]), "taken": n == why.taken},
             "pixels": display(found.pixels[n]).tolist(),
+            "values": np.concatenate([found.values[n][None], found.around[n]]).tolist(),
         }
         for n in shown
     ]
@@ -244,6 +248,8 @@ def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]
         **{"site": why.site, "level": why.level, "sweep": why.sweep, "reason": why.reason, "drawn": why.drawn},
         **{"weighed": why.weighed, "bandwidth": why.bandwidth, "density": density},
         **{"temperature": why.temperature, "cooled": why.cooled, "values": why.values.tolist()},
+        **{"channels": why.channels, "levels": near.values.tolist(), "trust": near.confidence.round(4).tolist()},
+        "totals": why.totals[:MOST_TOTALS].astype(np.float64).round(1).tolist(),
         **{"offsets": near.offsets.tolist(), "confidence": near.confidence.max(1).clip(0, 1).tolist()},
         **{"pixels": display(near.pixels).tolist(), "candidates": candidates},
     }

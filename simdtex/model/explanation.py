@@ -121,6 +121,10 @@ class Explanation:
     values : (channels,) uint16 array
         x_s, the working grey levels that the site takes, of all channels but guides: those of the candidate or, with a
         density, its mode, or drawn from the kernel around the candidate's.
+    channels : tuple of C str
+        What each channel of working grey levels is: ``"picture"``, ``"structure"`` or ``"guide"``.
+    totals : (weighed,) float32 array
+        The total costs of all evaluated candidates, in ascending order.
     density : (channels, greys) float64 array or None
         With ``pixel="density"``, the LCPDF of each channel over the legal working grey levels; every row adds up to 1.
     """
@@ -138,7 +142,20 @@ class Explanation:
     candidates: Ranked
     taken: int
     values: NDArray[np.uint16]
+    channels: tuple[str, ...]
+    totals: NDArray[np.float32]
     density: NDArray[np.float64] | None = None
+
+    @property
+    def terms(self) -> NDArray[np.float64]:
+        """The terms of equation (12), ((x_r - y_r)(1 - t_r))^2, of each candidate, neighbour and channel: (n, N, C).
+
+        Those of all neighbours add up to the candidate's ``distance`` and, in channels of guides, to its ``guide``.
+        """
+        near = self.neighbours
+        difference = near.values.astype(np.float64) - self.candidates.around
+        found: NDArray[np.float64] = (difference * near.confidence) ** 2
+        return found
 
     @property
     def reason(self) -> str:

@@ -128,7 +128,7 @@ class Recording {
   }
 
   send(message) {
-    const { start, inside, moments, frames, explained, pixels } = this.recorded;
+    const { start, inside, moments, frames, explained, reasons, pixels } = this.recorded;
     const frame = () => this.emit(frames[`${this.layer} ${this.at}`] ?? frames[`picture ${this.at}`]);
     if (message.kind === "hello") start.forEach((one) => this.emit(one));
     else if (message.kind === "inside" && message.open) this.emit(inside);
@@ -145,7 +145,7 @@ class Recording {
     } else if (message.kind === "explain") {
       const far = ([row, col]) => Math.hypot(row - message.row, col - message.col);
       const [near] = [...pixels].sort((one, other) => far(one) - far(other));
-      this.emit([explained[`${near} ${this.at}`], []]);
+      this.emit([reasons[explained[`${near} ${this.at}`]], []]);
     }
   }
 

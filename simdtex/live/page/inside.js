@@ -18,6 +18,11 @@ const NAMES = {
   total: "total",
 }; // of the terms of a cost
 
+const sum = (numbers) => numbers.reduce((total, one) => total + one, 0);
+
+/** A colour from white, 0, to orange, 1. */
+const heat = (share) => [255 - 30 * share, 255 - 170 * share ** 0.7, 255 - 223 * share ** 0.7];
+
 /** The time line of a run, and why the chosen pixel has its value. */
 class Inside {
   constructor(page) {
@@ -233,6 +238,11 @@ class Inside {
     this.explain();
   }
 
+  /** Another pixel than the chosen one, at random. */
+  another() {
+    return [this.page.view.rows, this.page.view.cols].map((side) => Math.floor(Math.random() * side));
+  }
+
   unpick() {
     this.pixel = null;
     for (const pane of this.page.view.panes) pane.why = null;
@@ -257,14 +267,13 @@ class Inside {
       return;
     }
     const cooled = `Temperature ${why.temperature.toFixed(3)}, after the relaxation ${why.cooled.toFixed(3)}. Bandwidth h = ${why.bandwidth.toFixed(2)} grey levels.`;
-    const white = why.pixels.map((pixel, n) => pixel.map((one) => one * why.confidence[n] + 255 * (1 - why.confidence[n])));
-    const around = make(
-      "figure",
-      {},
-      this.tile(why.offsets, white, null, 2 * TILE),
-      make("figcaption", {}, "Its neighbourhood; white: confidence 1 − t is 0."),
-    );
-    place.replaceChildren(heading, make("p", {}, cooled), bar(around, this.marks(why)), this.table(why), ...this.density(why));
+    const white = (levels) => levels.map((pixel, n) => pixel.map((one) => one * why.confidence[n] + 255 * (1 - why.confidence[n])));
+    const seen = [this.tile(why.offsets, white(why.pixels), null, 2 * TILE)];
+    const structure = this.structure(why);
+    if (structure) seen.push(this.tile(why.offsets, white(why.levels.map(structure)), null, 2 * TILE));
+    const caption = `Its neighbourhood${structure ? ", and the same in the structure channel" : ""}; white: confidence 1 − t is 0.`;
+    const around = make("figure", {}, bar(...seen), make("figcaption", {}, caption));
+    place.replaceChildren(heading, make("p", {}, cooled), make("div", { class: "bar seen" }, around, this.marks(why)), ...this.table(why), ...this.density(why));
   }
 
   /** A neighbourhood as a picture: pixels at offsets, and one in the middle. */
@@ -304,24 +313,88 @@ class Inside {
     return make("figure", {}, canvas, make("figcaption", {}, "Candidates in the sample, by rank; the ring in colour is taken."));
   }
 
-  table({ candidates, offsets, pane }) {
-    const terms = Object.keys(candidates[0].costs);
-    const heads = ["around", "probability", "rank", "row, column", "continues", ...terms.map((name) => NAMES[name] ?? name)];
-    const cells = (one) => {
-      const share = make("span", { class: "share" });
-      share.style.width = `${100 * one.probability}%`;
-      const costs = terms.map((name) => one.costs[name].toFixed(1));
-      const texts = [`${one.rank}${one.taken ? ", taken" : ""}`, one.place.join(", "), one.continues, ...costs];
+  /** A function from working levels to the grey of the structure channel, which has no picture; null without any. */
+  structure({ channels, candidates }) {
+    const hidden = channels.indexOf("structure");
+    const most = Math.max(1, ...candidates.flatMap(({ values }) => values.map((one) => one[hidden])));
+    return hidden < 0 ? null : (levels) => [(255 * Math.min(levels[hidden], most)) / most];
+  }
+
+  /** The candidates, and controls that change their probabilities: h, and another draw. */
+  table(why) {
+    const { candidates, offsets, pane, channels, totals, bandwidth } = why;
+    const structure = this.structure(why);
+    const terms = candidates.map(({ values }) => why.levels.map((x, n) => x.map((level, c) => ((level - values[n + 1][c]) * why.trust[n][c]) ** 2)));
+    const costs = Object.keys(candidates[0].costs);
+    const tiles = ["picture", ...(structure ? ["structure"] : []), "difference"];
+    const heads = [...tiles, "probability", "rank", ...costs.map((name) => NAMES[name] ?? name), "row, column", "continues"];
+    const shown = tiles.length + 3; // columns of the lecture
+    const most = Math.max(1e-9, ...terms.flatMap((each) => each.map(sum)));
+    const rows = candidates.map((one, n) => {
       const [middle, ...around] = one.pixels;
-      const tile = make("td", {}, this.tile(offsets, around, middle));
-      const chance = make("td", { class: "bars" }, make("span", {}, one.probability.toPrecision(3)), share);
-      return make("tr", { class: one.taken ? "taken" : null }, tile, chance, ...texts.map((text) => make("td", {}, `${text}`)));
+      const pictures = [this.tile(offsets, around, middle), this.difference(offsets, terms[n], channels, most)];
+      const [own, ...others] = structure ? one.values.map(structure) : [];
+      if (own) pictures.splice(1, 0, this.tile(offsets, others, own));
+      const [share, text] = [make("span", { class: "share" }), make("span")];
+      const texts = [`${one.rank}${one.taken ? ", taken" : ""}`, ...costs.map((name) => one.costs[name].toFixed(1)), one.place.join(", "), one.continues];
+      const numbers = texts.map((each, place) => make("td", { class: place > 1 ? "more" : null }, `${each}`));
+      const cells = [...pictures.map((tile) => make("td", {}, tile)), make("td", { class: "bars" }, text, share), ...numbers];
+      return { one, share, text, line: make("tr", { class: one.taken ? "taken" : null }, ...cells) };
+    });
+    const set = (probability) => {
+      const greatest = Math.max(...rows.map(({ one }) => probability(one)));
+      for (const { one, share, text } of rows) {
+        text.textContent = probability(one).toPrecision(3);
+        share.style.width = `${(100 * probability(one)) / greatest}%`;
+      }
     };
-    return make(
+    set(({ probability }) => probability);
+    const scrolled = make(
       "div",
       { class: "wide", tabindex: 0, role: "region", "aria-label": `Candidates of result ${this.panes[pane].result}` },
-      make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { scope: "col" }, text)))), make("tbody", {}, ...candidates.map(cells))),
+      make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text, n) => make("th", { scope: "col", class: n < shown ? null : "more" }, text)))), make("tbody", {}, ...rows.map(({ line }) => line))),
     );
+    return [scrolled, this.dice(rows, set, totals, bandwidth)];
+  }
+
+  /** Controls of a site's choice: the bandwidth, which acts on the probabilities at once, and another draw. */
+  dice(rows, set, totals, bandwidth) {
+    let weights = null;
+    const weight = (total, h) => Math.exp((totals[0] - total) / (2 * h * h));
+    const said = make("output", {}, "");
+    const width = make("input", { type: "range", min: -2, max: 2, step: 0.02, value: 0 });
+    const follow = () => {
+      const h = bandwidth * 2 ** Number(width.value);
+      weights = totals.map((total) => weight(total, h));
+      const all = sum(weights);
+      set(({ costs }) => weight(costs.total, h) / all);
+      said.textContent = `h = ${h.toFixed(2)}: ${Math.round(1 / sum(weights.map((one) => (one / all) ** 2)))} candidates count.`;
+    };
+    width.addEventListener("input", follow);
+    const draw = () => {
+      if (!weights) follow();
+      const u = Math.random();
+      let rank = 0;
+      for (let left = u * sum(weights) - weights[0]; left > 0 && rank < weights.length - 1; left -= weights[rank]) rank += 1;
+      said.textContent = `The dice say ${u.toFixed(3)}: the candidate of rank ${rank}.`;
+      for (const { one, line } of rows) line.classList.toggle("again", one.rank === rank);
+    };
+    width.setAttribute("aria-label", "Bandwidth h");
+    return make("div", { class: "bar dice" }, "Bandwidth h", width, button("Draw again", draw), said);
+  }
+
+  /** The terms of equation (12) as a picture; a pixel names its own terms. */
+  difference(offsets, terms, channels, most) {
+    const tile = this.tile(offsets, terms.map((one) => heat(sum(one) / most)), null);
+    const radius = Math.max(...offsets.flat().map(Math.abs));
+    tile.addEventListener("pointermove", ({ offsetX, offsetY }) => {
+      const cell = tile.clientWidth / (2 * radius + 1);
+      const [row, col] = [Math.floor(offsetY / cell) - radius, Math.floor(offsetX / cell) - radius];
+      const n = offsets.findIndex(([i, j]) => i === row && j === col);
+      const each = n < 0 ? [] : terms[n].map((one, c) => `${channels[c]} ${one.toFixed(1)}`);
+      tile.title = each.length ? `Neighbour ${row}, ${col}: (1 − t)² (x − y)² is ${each.join(", ")}.` : "";
+    });
+    return tile;
   }
 
   /** The LCPDF over grey levels, a bar chart for each channel. */
@@ -336,86 +409,130 @@ class Inside {
         context.fillStyle = drawn ? HOLE : "#7d8a8c";
         context.fillRect(4 * n, height - (height * one) / most, 3, (height * one) / most);
       });
-      return make("figure", {}, canvas, make("figcaption", {}, `LCPDF of channel ${channel} over grey levels; the coloured bar has the level drawn, ${values[channel]}.`));
+      return make("figure", {}, canvas, make("figcaption", {}, `LCPDF over grey levels${values.length > 1 ? ` of channel ${channel}` : ""}; drawn: ${values[channel]}.`));
     });
   }
 }
 
-// -- the tour -----------------------------------------------------------------------------------------------------
+// -- the lecture --------------------------------------------------------------------------------------------------
 
-const TOUR = [
-  [".result", "A texture from a sample", "Every pixel of this picture was drawn by what the sample says about its neighbours. Coarse levels come first: they settle the large shapes."],
-  [".lines", "The time line", "Each mark is a sweep, coarsest level first. Drag it, or press Play, and watch the picture settle. The layer Temperature shows what is still uncertain."],
-  [".panes", "Sites that relax together", "› goes on by one set. The coloured sites relax at the same time: no two of them are neighbours, so each still follows the equations. Another schedule has other sets."],
-  [".panes", "Why this pixel", "The outlines are the pixel's neighbourhood, strong where the neighbours are certain. simdtex compares it with every candidate of the sample."],
-  [".reasons", "The choice", "Each line is a candidate: how far its neighbourhood is from the pixel's, equation (12), what is added, and its probability, the LCPDF. One of them is taken. Put another result beside this one to compare two settings."],
-]; // what is pointed at, a title, and a text
+const PLAIN = {
+  ...{ relaxation: "gibbs", pixel: "density", search: "exact", order: 8, levels: 2, bandwidth: 0.6, lattice: "none" },
+  ...{ structure: 0, coherence: 0, balance: 0, novelty: 0, finish: 0 },
+}; // the model of the paper, with a probability for every candidate
+const SIDE = 32; // pixels of its picture; the sample has half as many more
 
-/** Five steps for first-time visitors. */
-class Tour {
+const KEYS = "Enter: on; F: full screen; ← →: a set; ↑ ↓: a sweep; space: play; N: another pixel; Escape: close.";
+
+const LECTURE = [
+  [".panes", "What does the model know about a texture?", "Only these pixels. No edge, colour or shape is described anywhere: every rule that follows is read off the sample."],
+  [".panes", "Which pixels decide about this one?", "Its neighbours, the outlined pixels: a Markov random field. A neighbour counts as far as it is trusted, 1 − t: outlines are strong where temperatures t are low."],
+  [".reasons", "Where in the sample does it look like this?", "Each line is a place of the sample beside the pixel's neighbourhood. Orange is what differs: the terms of equation (12), which add up to the distance. A small distance is a large probability, and one place is drawn. Move h, or draw again."],
+  [".lines", "When is a pixel certain?", "A relaxed pixel gets the mean temperature of its neighbours, less a little: equation (13). Bright is hot. When all pixels are cold, the level is at its equilibrium."],
+  [".lines", "Why are there so few pixels at first?", "Local rules spread large shapes slowly. Every second pixel comes first, so that a neighbourhood reaches twice as far; they stay, and the others are drawn around them."],
+  [".panes", "May all pixels change at the same time?", "Only pixels that are not neighbours: each is drawn given its neighbours, which must not move meanwhile. The coloured pixels are such a set. In 1998, 16,384 processors relaxed one set after another."],
+]; // what is pointed at, a question, and its answer
+
+/** Six questions and answers on a run of the plain model. */
+class Lecture {
   constructor(page) {
     this.page = page;
-    this.title = make("h2", { id: "simdtex-tour" });
-    this.text = make("p");
-    this.forth = button("Next", () => this.go(this.number + 1), { class: "next" });
+    this.title = make("h2", { id: "simdtex-lecture" });
+    this.text = make("p", { role: "status" });
+    this.forth = button("Answer", () => this.on(), { class: "next" });
     this.back = button("Back", () => this.go(this.number - 1));
-    const buttons = bar(this.back, this.forth, button("Close", () => this.close()));
-    this.element = make("section", { class: "tour", role: "dialog", "aria-labelledby": "simdtex-tour", hidden: true, tabindex: -1 }, this.title, this.text, buttons);
-    this.element.addEventListener("keydown", (event) => event.key === "Escape" && this.close());
+    const buttons = bar(this.back, this.forth, button("Full screen (F)", () => this.full()), button("Close", () => this.close()));
+    this.element = make("section", { class: "tour", role: "dialog", "aria-labelledby": "simdtex-lecture", hidden: true, tabindex: -1, title: KEYS }, this.title, this.text, buttons);
+    this.element.addEventListener("keydown", (event) => this.key(event));
   }
 
-  /** Begin, with an example if there is no result. */
+  /** Begin, with an example if there is no picture. */
   async start() {
     const { page } = this;
-    if (!page.results.size) {
-      if (!page.picture) page.give({ name: "brick", maps: new Map() });
-      await page.next("result");
+    this.opener = document.activeElement;
+    if (!page.picture) {
+      page.give({ name: "gravel", maps: new Map() });
+      await page.next("picture");
     }
-    if (page.shown === null) page.send({ kind: "select", result: Math.max(...page.results.keys()) });
-    if (!page.inside.open) {
-      page.inside.element.open = true;
-      await page.next("inside");
-    }
+    const { width, height } = page.picture;
+    const part = [0, 0, ...[width, height].map((side) => Math.min(side, SIDE + SIDE / 2))];
+    page.send({ kind: "make", job: "synth", method: "mrf", width: SIDE, height: SIDE, seed: 1, options: PLAIN, part });
+    let made = page.connection instanceof Recording ? page.results.get(page.shown) : null;
+    while (made?.settings.options.relaxation !== PLAIN.relaxation || made.width !== SIDE) made = await page.next("result");
+    if (page.shown !== made.result) page.send({ kind: "select", result: made.result });
+    if (page.inside.element.open) page.inside.look();
+    page.inside.element.open = true;
+    await page.next("inside");
     this.element.hidden = false;
+    page.root.prepend(this.element);
+    page.root.classList.add("lecture");
+    page.view.fit();
     this.go(0);
     this.element.focus();
   }
 
+  /** Show a question; its answer follows. */
   go(number) {
-    const { inside } = this.page;
-    if (number >= TOUR.length) {
+    if (number >= LECTURE.length) {
       this.close();
       return;
     }
     this.number = number;
-    const [place, title, text] = TOUR[number];
-    this.title.textContent = `${number + 1} of ${TOUR.length}: ${title}`;
-    this.text.textContent = text;
+    const [place, title] = LECTURE[number];
+    this.title.textContent = `${number + 1} of ${LECTURE.length}: ${title}`;
+    this.text.textContent = "What do you expect?";
     this.back.disabled = number === 0;
-    this.forth.textContent = number === TOUR.length - 1 ? "End" : "Next";
-    this.point(place);
+    this.forth.textContent = "Answer";
+    const { inside } = this.page;
     const finest = inside.sweeps.findIndex(([level]) => level === 0);
-    if (number === 1) inside.seek(Math.max(0, finest - 1), null);
-    if (number === 2) {
-      this.page.showLayer("sets");
-      inside.seek(Math.max(0, finest), 1);
+    this.page.showLayer(["sample", , , "temperature", , "sets"][number] ?? "picture");
+    const moments = [[inside.sweeps.length, 0], [finest + 1, null], [finest + 1, null], [finest + 1, null], [finest, 0], [finest + 1, 1]];
+    if (number === 0) inside.unpick();
+    else inside.pixel ??= [9, 9];
+    inside.seek(...moments[number]);
+    this.point(place);
+  }
+
+  /** Show the answer, or the next question. */
+  on() {
+    if (this.forth.textContent !== "Answer") this.go(this.number + 1);
+    else {
+      [, , this.text.textContent] = LECTURE[this.number];
+      this.forth.textContent = this.number === LECTURE.length - 1 ? "End" : "Next";
     }
-    if (number === 3) {
-      this.page.showLayer("picture");
-      inside.seek(inside.sweeps.length - 1, null);
-      inside.pickMiddle();
-    }
+  }
+
+  key(event) {
+    const { inside } = this.page;
+    const keys = {
+      ...{ Escape: () => this.close(), Enter: () => this.on(), f: () => this.full(), n: () => inside.pick(...inside.another()) },
+      ...{ ArrowLeft: () => inside.step(-1), ArrowRight: () => inside.step(1), ArrowUp: () => inside.stepSweep(-1), ArrowDown: () => inside.stepSweep(1) },
+      " ": () => inside.play(),
+    };
+    const act = keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
+    if (!act || event.target.tagName === "BUTTON" && ["Enter", " "].includes(event.key)) return;
+    event.preventDefault();
+    act();
+  }
+
+  /** Fill the screen, in large letters; or leave it. */
+  full() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else this.page.root.requestFullscreen?.();
   }
 
   point(place) {
     this.page.root.querySelector(".pointed")?.classList.remove("pointed");
     const found = place && this.page.root.querySelector(place);
     found?.classList.add("pointed");
-    found?.scrollIntoView({ block: "nearest" });
   }
 
   close() {
+    if (document.fullscreenElement) document.exitFullscreen();
     this.element.hidden = true;
+    this.page.root.classList.remove("lecture");
+    this.page.view.fit();
     this.point(null);
+    this.opener?.focus();
   }
 }

@@ -44,10 +44,10 @@ class Page {
     this.device = make("p", { class: "device" });
     const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
     this.columns = make("div", { class: "columns", hidden: true }, this.resultSection(), side);
-    this.tour = new Tour(this);
-    const tour = button("Tour in five steps", () => this.tour.start());
-    const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, tour, this.status);
-    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns, this.tour.element);
+    this.lecture = new Lecture(this);
+    const lecture = button("Lecture: why this pixel?", () => this.lecture.start());
+    const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, lecture, this.status);
+    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns, this.lecture.element);
     root.replaceChildren(this.root);
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {

@@ -66,6 +66,8 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     rank = np.union1d(rank, np.flatnonzero(is_taken))
     first = ranked[rank]
     neighbours, continued = _neighbours(twin, relaxation, pixel, field)
+    shown, matched, guides = twin.sample.shown, twin.sample.channels, candidates.guides
+    channels = ("picture",) * shown + ("structure",) * (matched - shown) + ("guide",) * guides
     position = candidates.positions[numbers[first]]
     around = position[:, None] + candidates.reach
     return Explanation(
@@ -93,6 +95,8 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
         ),
         taken=int(np.flatnonzero(is_taken[rank])[0]),
         values=relaxed.values[:, 0],
+        channels=channels,
+        totals=np.sort(total),
         density=_density(weights, pixels[: candidates.made], choice) if choice.density else None,
     )
 
