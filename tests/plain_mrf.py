@@ -80,6 +80,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     Ys, lattices = [], None
     for y, size, *more in sizes:
         Ys.append(material(y, o, size, *more, maps, lattices))
+        Ys[-1].own = Ys[0].own  # as certain at every size
         lattices = Ys[-1].waves and [[half(one) for one in Ys[-1].lattices[0]], half(Ys[-1].lattices[1])]
     sides = [y.shape[:2] for y in pictures]
     if "images" in maps:  # each picture is wanted somewhere, as often as the map says

@@ -373,7 +373,7 @@ RUNS = {
         for name, given, more in (
             ("known", {"levels": 3}, {"known": 0.02}),
             ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),
-            ("reduced", {"levels": 3, "reduction": 2}, {"known": 0.4, "placed": 1.0}),
+            ("reduced", {"levels": 3, "reduction": 2}, {"known": 0.6, "placed": 0.6}),
             ("synchronous", {"schedule": "synchronous", "levels": 2}, {"channels": 3, "dtype": np.bool_}),
         )
     },

@@ -308,6 +308,9 @@ def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
     paper = {"preset": "paper"}, {"search": "exact"}, {"phases": "all"}, {"categorical": True}
     assert [reduction(large // 64, **options) for options in ({}, *paper)] == [1] * 5
     assert reduction(large, reduction=8) == 8
+    holes = large.astype(float)
+    holes[::2, ::2] = np.nan  # no square of 2x2 is known
+    assert reduction(holes, lattice="none", order=2) == 1
 
 
 @pytest.mark.parametrize("edges", ["whole", "reflect"])

@@ -85,14 +85,9 @@ def described(plan: Input) -> dict[str, Any]:
     pictures = plan.sample.pictures
     arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
     sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided), "phases": plan.sample.phases}
-    sizes = {"shape": plan.shape, "levels": plan.levels, "reduction": plan.reduction}
-    return {
-        **sizes,
-        "options": asdict(plan.options),
-        **arrays,
-        **sample,
-        "coarser": plan.coarser and described(plan.coarser),
-    }
+    coarser = plan.coarser and described(plan.coarser)
+    about = {"shape": plan.shape, "levels": plan.levels, "reduction": plan.reduction, "coarser": coarser}
+    return {**about, "options": asdict(plan.options), **arrays, **sample}
 
 
 def restored(tree: dict[str, Any]) -> Plan:
@@ -104,17 +99,8 @@ def restored(tree: dict[str, Any]) -> Plan:
     phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
     sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.neighbourhood)
-    coarser = tree["coarser"] and restored(tree["coarser"])
-    return Plan(
-        sample,
-        tuple(tree["shape"]),
-        offsets,
-        options,
-        schedule,
-        tree["levels"],
-        reduction=tree["reduction"],
-        coarser=coarser,
-    )
+    size = {"reduction": tree["reduction"], "coarser": tree["coarser"] and restored(tree["coarser"])}
+    return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
 
 
 FORMAT = 9
@@ -595,6 +581,10 @@ class Stored(Conditions):
             return None
         window = Tile(*grid.first, *grid.shape)
         return self._store.held(self._work.layout.levels[number], window)
+
+    def coarser(self, plan: Input) -> Stored:
+        """Return the conditions of the levels that have a reduced input: the store has those of all levels."""
+        return self
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""

@@ -19,6 +19,7 @@ from simdtex.jobs.inputs import Work, public, trends, with_light
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, of_palette
+from simdtex.methods.mrf.plan import NEAR
 from simdtex.methods.mrf.replay import Instant, Replay, Sweep
 from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
@@ -369,6 +370,8 @@ class Filling:
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
+        square = 2 ** max(0, window.levels - NEAR)  # so that a pixel of a reduced window is one of its reduced sample
+        top, left = (first + (side.start - first) % square for first, side in zip((top, left), at, strict=True))
         near = (slice(top, window.rows.stop + reach), slice(left, window.cols.stop + reach))
         place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
         return WindowSample(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)

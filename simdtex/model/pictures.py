@@ -23,6 +23,10 @@ CATEGORIES = 16
 """Different pixels up to which a sample is taken for a map of categories."""
 
 
+class NothingUsable(ValueError):
+    """No pixel of a sample is a candidate of some level."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pictures:
     """Pictures of one type that a texture is taken from.
@@ -61,7 +65,7 @@ class Pictures:
             object.__setattr__(self, "known", None)
             return
         if any(gap.all() for gap in gaps):
-            raise ValueError("a sample has no known pixel; leave it out")
+            raise NothingUsable("a sample has no known pixel; leave it out")
         object.__setattr__(self, "unknown", tuple(gaps))  # lost in completed pixels; for `replace`
         object.__setattr__(self, "known", tuple(~gap for gap in gaps))
         object.__setattr__(self, "pixels", tuple(completed(*pair) for pair in zip(self.pixels, gaps, strict=True)))

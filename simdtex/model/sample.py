@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.guide import AnyGuide
 from simdtex.model.lattice import in_three_axes
-from simdtex.model.pictures import Pictures
+from simdtex.model.pictures import NothingUsable, Pictures
 from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest, structure
 
@@ -27,10 +27,6 @@ UNSURE = 0.25
 
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
-
-
-class NothingUsable(ValueError):
-    """No pixel of a sample is a candidate of some level."""
 
 
 class Places(NamedTuple):

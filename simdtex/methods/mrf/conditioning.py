@@ -54,6 +54,10 @@ class Conditions(ABC):
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
 
+    @abstractmethod
+    def coarser(self, plan: Input) -> Conditions:
+        """Return the conditions of the levels that have a reduced input."""
+
     def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
         """Return the field at the beginning of a level, with its known sites at temperature 0."""
         held = self.at(number, grid)
@@ -77,15 +81,15 @@ class Conditions(ABC):
 
 
 class Conditioning(Conditions):
-    """Conditioning data and guides of a whole output, in memory."""
+    """Conditioning data and guides of a whole output, in memory; ``confidences`` are those of a larger size of it."""
 
-    def __init__(self, plan: Input) -> None:
+    def __init__(self, plan: Input, confidences: Confidences | None = None) -> None:
         sample, planes, neighbours = plan.sample, plan.planes, len(plan.offsets)
         hard = planes is not None and bool((planes.source < 0)[planes.known].any())
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
-        confidences = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
-        super().__init__(confidences)
+        own = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
+        super().__init__(confidences or own)
         self.guides, self.planes = sample.guides, planes
         self.plan = plan
         self.torus = plan.options.boundary == "torus"
@@ -99,6 +103,10 @@ class Conditioning(Conditions):
             self._held = {number: self._whole(Grid.of(self._shape, grid.step, grid.torus))}  # one level is enough
         held = self._held[number]
         return Held(*(grid.cut(plane) for plane in held))
+
+    def coarser(self, plan: Input) -> Conditioning:
+        """Return the conditions of the levels that have a reduced input, with the same confidences."""
+        return Conditioning(plan, self.confidences)
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""

@@ -138,8 +138,9 @@ class Lattices:
         self.plan, self.machine, self.seed, self.levels = plan, machine, seed, plan.levels
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
-        self.coarser = Lattices(plan.coarser, machine, seed, conditions) if plan.coarser else None
         self.conditions = conditions or Conditioning(plan)
+        coarser = plan.coarser
+        self.coarser = Lattices(coarser, machine, seed, self.conditions.coarser(coarser)) if coarser else None
         self._last: Level | None = None  # without the parts that depend on the window
         self._whole: Level | None = None
         self._in_phase: Any = None  # positions and their phases, which most levels share

@@ -21,9 +21,9 @@ from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import CATEGORIES as MOST
-from simdtex.model.pictures import Pictures, unknown_in
+from simdtex.model.pictures import NothingUsable, Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
-from simdtex.model.sample import NothingUsable, Sample
+from simdtex.model.sample import Sample
 from simdtex.ops.finish import gaussian_offsets
 from simdtex.options import within_32_bits
 
@@ -116,12 +116,31 @@ def plan(
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
-    scene = Scene(pictures, shape, given, guides, regular)
-    scenes = [scene]
-    for _ in range(halvings(scene, options, levels, soft)):
+    scenes = [Scene(pictures, shape, given, guides, regular)]
+    count = halvings(scenes[0], options, levels, soft)
+    while True:  # with as many halvings as leave known pixels
+        try:
+            return reduced(scenes, count, levels, offsets, values, options, soft)
+        except NothingUsable:
+            if not count or options.reduction is not None:
+                raise
+            count -= 1
+
+
+def reduced(
+    scenes: list[Scene],
+    count: int,
+    levels: int,
+    offsets: NDArray[np.int32],
+    values: int,
+    options: Options,
+    soft: Soft | None,
+) -> Plan:
+    """Return the plan of a scene, the first of ``scenes``, that is halved ``count`` times for the coarse levels."""
+    while len(scenes) <= count:
         scenes.append(scenes[-1].halved())
     found: Plan | None = None
-    for number, here in reversed(list(enumerate(scenes))):
+    for number, here in reversed(list(enumerate(scenes[: count + 1]))):
         own, sample = sampled(here, 1 if found else levels - number, offsets, values, options, 2**number)
         levels = levels if found else own + number
         held = planes(here.given, sample) if here.given and here.given.whole.any() else None
