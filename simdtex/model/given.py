@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.guide import UNKNOWN, Colocated
 from simdtex.model.lattice import Grid
-from simdtex.model.pictures import halved
+from simdtex.model.pictures import Pictures, halved
 from simdtex.model.sample import Sample
 
 
@@ -80,9 +80,9 @@ class Given:
         """Whether there are sites with some variables given and others not."""
         return bool((self.known.any(-1) & ~self.whole).any())
 
-    def colocated(self, samples: tuple[NDArray[Any], ...]) -> Colocated:
+    def colocated(self, pictures: Pictures) -> Colocated:
         """Return the known variables of sites with unknown ones, as a guide for the unknown ones."""
-        return Colocated(samples, self.values, self.known & ~self.whole[..., None])
+        return Colocated(pictures, self.values, self.known & ~self.whole[..., None])
 
     def halved(self) -> Given:
         """Return the given values of an output of half the size: the means of squares of 2x2 sites, all four given."""
