@@ -119,7 +119,8 @@ class Colocated:
     @property
     def channels(self) -> int:
         """The number of channels: one for each known variable, or for each of its categories if these are three or more."""
-        categories = [self.pictures.categories(variable) for variable in np.flatnonzero(self.known.any((0, 1)))]
+        axes = tuple(range(self.known.ndim - 1))
+        categories = [self.pictures.categories(variable) for variable in np.flatnonzero(self.known.any(axes))]
         return sum(1 if names is None or len(names) < 3 else len(names) for names in categories)
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
