@@ -142,7 +142,7 @@ static inline int2 put_in_lane(const Level g, const int r, const bool self, cons
     const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
     for (int c = 0; c < C; ++c) {
         const ushort x = values[c * g.area + r];
-        const float uc = CONFIDENCE_OF(c < MADE, x, certain, c < C - KNOWN ? (self ? g.centre : 1.0f) : self ? g.own : g.hard);
+        const float uc = CONFIDENCE_OF(c < MADE, x, certain, c < C - KNOWN ? (self ? g.centre : 1.0f) : self ? g.centre_known : g.hard);
         U(cell, c, lane) = uc;
         XU(cell, c, lane) = (float)x * uc;
     }
@@ -202,7 +202,7 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
 #ifdef OWN
                 certain *= select((float16)1.0f, (float16)g.hard, vload16(0, source + from) < 0);
                 const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
-                const float16 data = in * g.hard + (row[a] < 0 ? 0.0f : g.own) * middle(a, k);
+                const float16 data = in * g.hard + (row[a] < 0 ? 0.0f : g.centre_known) * middle(a, k);
 #endif
                 for (int c = 0; c < C; ++c) {
                     const float16 x = convert_float16(vload16(0, values + c * g.area + from));

@@ -26,6 +26,7 @@ UNKNOWN = 2**16 - 1
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
 """A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
+
 class Planes(NamedTuple):
     """Working levels of a guide: (G, rows, cols) arrays for the pictures of the sample, (G, H, W) for the output."""
 
@@ -118,9 +119,9 @@ class Colocated:
 
     @property
     def channels(self) -> int:
-        """The number of channels: one for each known variable, or for each of its categories if these are three or more."""
-        axes = tuple(range(self.known.ndim - 1))
-        categories = [self.pictures.categories(variable) for variable in np.flatnonzero(self.known.any(axes))]
+        """The number of channels: one for each known variable, or for each category if these are three or more."""
+        known = np.flatnonzero(self.known.reshape(-1, self.known.shape[-1]).any(0)).tolist()
+        categories = [self.pictures.categories(variable) for variable in known]
         return sum(1 if names is None or len(names) < 3 else len(names) for names in categories)
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:

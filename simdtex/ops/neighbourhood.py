@@ -84,10 +84,12 @@ def near(
     x = np.moveaxis(field.values.reshape(channels, -1)[:, r], 0, 1)
     if confidences.own:
         u = np.repeat(u, channels, 1)
-        guides, known = confidences.guides, confidences.known
-        for last, beside, centre in (guides, 1, confidences.centre), (known, confidences.hard, confidences.centre_known):
-            if last:
-                u[:, -last:] = np.where(r < 0, np.float32(0), np.float32(beside))[:, None]
-                u[-1, -last:] = centre
+        guides, known, here = confidences.guides, confidences.known, (r >= 0).astype(np.float32)[:, None]
+        if guides:
+            u[:, -guides:] = here
+            u[-1, -guides:] = confidences.centre
+        if known:
+            u[:, -known:] = here * confidences.hard
+            u[-1, -known:] = confidences.centre_known
         u = np.where(x == UNKNOWN, np.float32(0), u)
     return Near(sites, x, u, touched, source[sites])

@@ -121,7 +121,7 @@ def alike(own: NDArray[np.uint16], wanted: NDArray[np.uint16]) -> Iterator[tuple
     """
     known = wanted != UNKNOWN
     for those in np.unique(known, axis=1).T:
-        parts = [(np.arange(own.shape[1]), np.flatnonzero((known.T == those).all(1)))] if those.any() else []
+        parts = [(np.arange(own.shape[1]), np.flatnonzero((those == known.T).all(1)))] if those.any() else []
         while parts:
             numbers, sites = parts.pop()
             ranges = np.ptp(own[:, numbers], 1) * those
@@ -201,7 +201,7 @@ LEVEL = np.dtype(
         *((name, np.int32) for name in ("plane", "row_stride", "layer_stride", "cols", "runs")),
         *((name, np.float32) for name in ("discount", "scale", "spread")),
         *((name, np.int32) for name in ("radius", "top", "xi")),
-        *((name, np.float32) for name in ("novelty", "centre", "hard", "own")),
+        *((name, np.float32) for name in ("novelty", "centre", "hard", "centre_known")),
     ],
     align=True,
 )
@@ -286,7 +286,7 @@ class Relaxation(NamedTuple):
             **{"discount": costs.discount, "novelty": costs.novelty},
             **{"scale": window.scale, "spread": choice.spread, "top": window.top},
             **{"radius": window.radius if choice.density else -1, "centre": confidences.centre},
-            **{"hard": confidences.hard, "own": confidences.centre_known, "chance": self.proposal.chance},
+            **{"hard": confidences.hard, "centre_known": confidences.centre_known, "chance": self.proposal.chance},
         }
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}
