@@ -142,7 +142,8 @@ static inline int2 put_in_lane(const Level g, const int r, const bool self, cons
     const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
     for (int c = 0; c < C; ++c) {
         const ushort x = values[c * g.area + r];
-        const float uc = CONFIDENCE_OF(c < MADE, x, certain, c < C - KNOWN ? (self ? g.centre : 1.0f) : self ? g.centre_known : g.hard);
+        const float guide = self ? g.centre : 1.0f, data = self ? g.centre_known : g.hard;
+        const float uc = CONFIDENCE_OF(c < MADE, x, certain, c < C - KNOWN ? guide : data);
         U(cell, c, lane) = uc;
         XU(cell, c, lane) = (float)x * uc;
     }
