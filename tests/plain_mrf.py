@@ -28,6 +28,7 @@ UNIT = 16  # candidates, four of which share their draws
 CATEGORIES = 16  # different pixels of a map of categories, at most
 EXHAUSTIVE = 64  # candidates of a level that are all evaluated, at most
 SUGGESTING = 12  # nearest neighbours that suggest a candidate
+ALIKE = 64  # candidates with about the same known values
 IN_PHASE, FEW = 128, 16  # candidates of a phase, at most, and on average if its neighbours' are added
 
 DEFAULTS = {
@@ -228,7 +229,9 @@ def relaxed(level, X, old, s, turn):
     itself = []
     if level.Y.guides:  # at the site itself these alone count
         x, certain, _, _ = look(level, X, level.pixel(s))
-        itself = [(x, [0] * level.Y.matched + [level.Y.centre * u for u in certain[level.Y.matched :]])]
+        own = [level.Y.centre] * (len(level.Y.guides) - level.Y.told) + [level.Y.own_known] * level.Y.told
+        own = [o if u else 0 for o, u in zip(own, certain[level.Y.matched :], strict=True)]
+        itself = [(x, [0] * level.Y.matched + own)]
     d = distances(level, near + itself, numbers)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
     d = d + level.penalty[numbers]
@@ -257,12 +260,13 @@ def relaxed(level, X, old, s, turn):
 def look(level, X, at):
     """Grey levels of a pixel, how certain each of them is, its temperature and its source.
 
-    A pixel is as certain as it is cold, and counts for more where it is from nowhere; a guide is certain everywhere.
+    A pixel is as certain as it is cold, and counts for more where it is from nowhere; a guide is certain everywhere,
+    and a variable that is known where others are not counts for more, too.
     """
     Y, t, source = level.Y, int(X.t[at]), tuple(X.source[at].tolist())
     x = [int(plane[at]) for plane in X.x]
     certain = (1024 - t) / 1024 * (Y.hard if Y.own and source == NOWHERE else 1)
-    u = [certain] * Y.matched + [1] * len(Y.guides)
+    u = [certain] * Y.matched + [1] * (len(Y.guides) - Y.told) + [Y.hard] * Y.told
     return x, [0 if value == UNKNOWN else v for value, v in zip(x, u, strict=True)], t, source
 
 
@@ -501,14 +505,28 @@ def candidates_of(level, X, s, near, turn):
     draws, those = max(level.chance, not found), range(len(level.places))
     if level.phased:
         those = level.of_phase[phase(level.Y.lattices[1], level.divisions, *level.pixel(s))]
+    told = [(c, int(X.x[c][level.pixel(s)])) for c in range(-level.Y.told, 0)]
+    told = [(c, x) for c, x in told if x != UNKNOWN]
+    those = alike(level.around[-1], told) if told else those
     for k in range(draws):
         word = words(level.seed, level.number, turn, level.index(s), random.SEARCH, k // 4)[k % 4]
         found.append(those[word * len(those) >> 32])
-    if level.phased and len(those) <= draws:
+    if (level.phased or level.Y.told) and len(those) <= draws:
         found[-draws:] = those
     found = list(dict.fromkeys(found))
     charged = [(found.index(p), n) for p, n in charged if p in found]
     return found, [k < favoured for k in range(len(found))], charged
+
+
+def alike(own, told):
+    """Candidates with about the known values: halves at the median of what varies most among them, down to 64."""
+    those = list(range(len(own[0])))
+    while len(those) > ALIKE and any(np.ptp(own[c][those]) for c, _ in told):
+        c, x = max(told, key=lambda one: np.ptp(own[one[0]][those]))
+        y = sorted(own[c][those].tolist())
+        middle = max(y[len(y) // 2], y[0] + 1)
+        those = [p for p in those if (own[c][p] < middle) == (x < middle)]
+    return those
 
 
 def distances(level, near, numbers):

@@ -20,7 +20,6 @@ from simdtex.model.regularity import phases as engine_phases
 
 NOWHERE = (-1, -1, -1)
 UNKNOWN = -1
-COLOCATED = 16  # channels that a variable known where others are not may have, for all that room is made
 
 
 def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None, maps=None, lattices=None):
@@ -41,11 +40,14 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     colocated = known is not None and bool(partly.any())
     beside = ([] if guide is None else [labelled(guide, o)]) + [None] * colocated
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
-    channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
+    alone = [c for v, c in enumerate(Y.categories) if colocated and partly[..., v].any()]
+    Y.told = sum(1 if c is None else one_hot(c) for c in alone)  # channels of variables known where others are not
+    channels += bool(o.structure) + Y.told + sum(channels_of(g) for g in beside if g is not None)
     lattices = lattices or repeated(pictures, o, shape, known, known_source)
     maps = maps or {}
     heavy = max(1, o.data_weight, N / 4) if known is not None or beside or "region" in maps else 1
-    values = round(heavy * (channels * N + len(beside)))
+    Y.own_known = round(4 * sqrt(N * max(1, o.data_weight, N / 4)))  # how certain such a variable is at the site itself
+    values = round(heavy * (channels * N + len(beside))) + Y.told * Y.own_known**2
     Y.height = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
 
     Y.direct = not o.weights and not any(Y.categories)  # the channels of grey levels are those of the pixels

@@ -104,6 +104,35 @@ def test_a_table_of_several_variables(tmp_path, axis):
     )
 
 
+def smooth(shape, seed):
+    """A Gaussian random field that wraps around."""
+    waves = np.meshgrid(*(np.fft.fftfreq(n) for n in shape), indexing="ij")
+    noise = np.fft.fftn(np.random.default_rng(seed).normal(size=shape))
+    field = np.fft.ifftn(noise * np.exp(-450 * sum(w**2 for w in waves))).real
+    return (field / field.std()).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("search", "sample", "shape", "share"),
+    [
+        ("coherent", (80, 80), (64, 64), 0.03),
+        pytest.param("exact", (80, 80), (64, 64), 0.03, marks=pytest.mark.slow),
+        ("coherent", (12, 32, 32), (8, 24, 24), 0.1),
+    ],
+)
+def test_a_variable_known_alone_decides_on_the_others(search, sample, shape, share):
+    """Facies are where porosity is positive; it is known in few cells, and the facies there must agree."""
+    porosity, truth = smooth(sample, 1), smooth(shape, 2)
+    truth = np.clip(truth, porosity.min(), porosity.max())
+    there = np.random.default_rng(3).random(shape) < 0.03
+    known = np.stack([np.where(there, truth, np.nan), np.full(shape, np.nan)], -1)
+    training = np.stack([porosity, porosity > 0], -1).astype(np.float32)
+    how = {"channel_axis": -1, "categorical": (1,), "search": search, "rng": 1}
+    found = simdtex.simulate(training, 1, shape=shape, known=known, **how).values[0]
+    assert np.array_equal(found[there, 0], truth[there])
+    assert ((found[there, 1] > 0) != (truth[there] > 0)).mean() <= share
+
+
 @pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32, np.float64])
 def test_dimensions_coordinates_and_type(dtype):
     found = simulate(texture((16, 20), dtype=dtype), n=2, first=4)

@@ -24,6 +24,7 @@ typedef struct {
     float novelty;                // what a candidate costs for each neighbour that it continues
     float centre;                 // confidence of a guide at the site itself
     float hard;                   // confidence of hard data
+    float centre_known;           // confidence of a known variable at the site itself
 } Level;
 
 #endif

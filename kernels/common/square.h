@@ -142,7 +142,8 @@ static inline int2 put_in_lane(const Level g, const int r, const bool self, cons
     const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
     for (int c = 0; c < C; ++c) {
         const ushort x = values[c * g.area + r];
-        const float uc = CONFIDENCE_OF(c < MADE, x, certain, self ? g.centre : 1.0f);
+        const float guide = self ? g.centre : 1.0f, data = self ? g.centre_known : g.hard;
+        const float uc = CONFIDENCE_OF(c < MADE, x, certain, c < C - KNOWN ? guide : data);
         U(cell, c, lane) = uc;
         XU(cell, c, lane) = (float)x * uc;
     }
@@ -202,10 +203,11 @@ static inline int2 gather(const Level g, const int site, const int i, const int 
 #ifdef OWN
                 certain *= select((float16)1.0f, (float16)g.hard, vload16(0, source + from) < 0);
                 const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
+                const float16 data = in * g.hard + (row[a] < 0 ? 0.0f : g.centre_known) * middle(a, k);
 #endif
                 for (int c = 0; c < C; ++c) {
                     const float16 x = convert_float16(vload16(0, values + c * g.area + from));
-                    const float16 uc = CONFIDENCES_OF(c < MADE, x, certain, guide);
+                    const float16 uc = CONFIDENCES_OF(c < MADE, x, certain, c < C - KNOWN ? guide : data);
                     u[cell * CONFIDENCES + CONFIDENT(c)] = uc;
                     xu[cell * C + c] = x * uc;
                 }

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.guide import UNKNOWN, Colocated
 from simdtex.model.lattice import Grid
-from simdtex.model.pictures import halved
+from simdtex.model.pictures import Pictures, halved
 from simdtex.model.sample import Sample
 
 
@@ -80,9 +80,9 @@ class Given:
         """Whether there are sites with some variables given and others not."""
         return bool((self.known.any(-1) & ~self.whole).any())
 
-    def colocated(self, samples: tuple[NDArray[Any], ...]) -> Colocated:
+    def colocated(self, pictures: Pictures) -> Colocated:
         """Return the known variables of sites with unknown ones, as a guide for the unknown ones."""
-        return Colocated(samples, self.values, self.known & ~self.whole[..., None])
+        return Colocated(pictures, self.values, self.known & ~self.whole[..., None])
 
     def halved(self) -> Given:
         """Return the given values of an output of half the size: the means of squares of 2x2 sites, all four given."""
@@ -114,21 +114,16 @@ NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     """Return the sites of a level's lattice that receive values from between the sites, in ascending order.
 
-    ``known`` (H, W) is the mask of values, and the results are pixel indices. A value moves if none of the four sites
-    around it is known.
+    ``known`` (H, W) or (D, H, W) is the mask of values, and the results are pixel indices. A value moves if none of the
+    sites around it is known.
     """
-    step, (height, width) = grid.step, known.shape
-    row, col = between(known, grid).T.astype(np.int64)
-
-    def at(i: NDArray[np.intp], n: int) -> NDArray[np.intp]:
-        return i % n if grid.torus else np.minimum(i, n - 1)
-
-    i, j = (row + step // 2) // step, (col + step // 2) // step
+    step, place = grid.step, between(known, grid).astype(np.int64)
+    nearest = (place + step // 2) // step
     if not grid.torus:
-        i, j = np.minimum(i, grid.rows - 1), np.minimum(j, grid.cols - 1)
-    apart = (np.minimum(i * step, height) - row) ** 2 + (np.minimum(j * step, width) - col) ** 2
-    site = at(i, grid.rows) * step * width + at(j, grid.cols) * step
-    datum = row * width + col
+        nearest = np.minimum(nearest, np.array(grid.shape) - 1)
+    apart = ((np.minimum(nearest * step, known.shape) - place) ** 2).sum(1)
+    site = np.ravel_multi_index(tuple((nearest % grid.shape * step).T), known.shape)
+    datum = np.ravel_multi_index(tuple(place.T), known.shape)
     order = np.lexsort((datum, apart, site))
     site, datum = site[order], datum[order]
     first = np.ones(site.size, bool)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.lattice import sums_around
-from simdtex.model.pictures import halved, unknown_in
+from simdtex.model.pictures import Pictures, halved, unknown_in
 from simdtex.model.scale import Scale, stretch
 
 UNKNOWN = 2**16 - 1
@@ -25,9 +25,6 @@ UNKNOWN = 2**16 - 1
 
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
 """A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
-
-MOST_CATEGORIES = 16
-"""The most channels of working levels of a variable: one for each category."""
 
 
 class Planes(NamedTuple):
@@ -112,18 +109,20 @@ class Guide:
 class Colocated:
     """A guide of the known variables at sites whose other variables are unknown.
 
-    ``samples`` (rows, cols, C) are the sample's pictures, ``values`` (H, W, C) of the sample's type, and ``known`` (H,
-    W, C) is True for given values.
+    ``pictures`` (rows, cols, C) are the sample's, ``values`` (H, W, C) of the sample's type, and ``known`` (H, W, C) is
+    True for given values.
     """
 
-    samples: tuple[NDArray[Any], ...]
+    pictures: Pictures
     values: NDArray[Any]
     known: NDArray[np.bool_]
 
     @property
     def channels(self) -> int:
-        """The largest number of channels: those of all variables, each with its categories."""
-        return int(self.known.shape[-1]) * MOST_CATEGORIES
+        """The number of channels: one for each known variable, or for each category if these are three or more."""
+        known = np.flatnonzero(self.known.reshape(-1, self.known.shape[-1]).any(0)).tolist()
+        categories = [self.pictures.categories(variable) for variable in known]
+        return sum(1 if names is None or len(names) < 3 else len(names) for names in categories)
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """Return the channels of the known variables."""
@@ -132,7 +131,7 @@ class Colocated:
         output = scale.levels(self.values)[those]
         for plane, channel in zip(output, those, strict=True):
             plane[~self.known[..., owner[channel]]] = UNKNOWN
-        return Planes([scale.levels(sample)[those] for sample in self.samples], output)
+        return Planes([scale.levels(sample)[those] for sample in self.pictures.pixels], output)
 
 
 AROUND = 4

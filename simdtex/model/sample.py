@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.model.guide import AnyGuide
+from simdtex.model.guide import AnyGuide, Colocated
 from simdtex.model.lattice import in_three_axes
 from simdtex.model.pictures import NothingUsable, Pictures
 from simdtex.model.regularity import WAVES, Phases
@@ -130,6 +130,8 @@ class Sample:
         Number of matched channels: those, and the structure channel.
     guides : (G, H, W) uint16 array
         Working levels of the output's guides.
+    known_variables : int
+        Number of the last guide channels that are variables known at sites whose other variables are unknown.
     waves : Waves or None
         The phases in working levels.
     guided : list of (G, rows, cols) uint16 arrays
@@ -181,6 +183,8 @@ class Sample:
         for guide in guiding:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
+        told = (len(planes.output) for one, planes in zip(guides, guiding, strict=True) if isinstance(one, Colocated))
+        self.known_variables = sum(told)
         self.waves = phases and phases.waves(spread * self.shown, highest(values))
         self._lay(levels, margin, step, apart)
         self.channels = channels

@@ -30,18 +30,22 @@ class Confidences(NamedTuple):
 
     ``guides``, the number of guide channels, which are the last; ``own``, whether each value has its own confidence, as
     for guides and unknown values; ``centre``, the confidence of a guide at the site itself; ``hard``, that of hard
-    data, which are not taken from the sample.
+    data, which are not taken from the sample; ``known``, the number of guide channels that are known variables, which
+    are the last and as certain as hard data; ``centre_known``, the confidence of these at the site itself.
     """
 
     guides: int = 0
     own: bool = False
     centre: np.float32 = np.float32(1)
     hard: np.float32 = np.float32(1)
+    known: int = 0
+    centre_known: np.float32 = np.float32(1)
 
     @property
     def defines(self) -> dict[str, int]:
         """-D constants of kernels."""
-        return ({"G": self.guides} if self.guides else {}) | ({"OWN": 1} if self.own else {})
+        counts = {"G": self.guides, "KNOWN": self.known, "OWN": int(self.own)}
+        return {name: count for name, count in counts.items() if count}
 
 
 USUAL = Confidences()
@@ -80,8 +84,12 @@ def near(
     x = np.moveaxis(field.values.reshape(channels, -1)[:, r], 0, 1)
     if confidences.own:
         u = np.repeat(u, channels, 1)
-        if confidences.guides:
-            u[:, -confidences.guides :] = (r >= 0)[:, None]
-            u[-1, -confidences.guides :] = confidences.centre
+        guides, known, here = confidences.guides, confidences.known, (r >= 0).astype(np.float32)[:, None]
+        if guides:
+            u[:, -guides:] = here
+            u[-1, -guides:] = confidences.centre
+        if known:
+            u[:, -known:] = here * confidences.hard
+            u[-1, -known:] = confidences.centre_known
         u = np.where(x == UNKNOWN, np.float32(0), u)
     return Near(sites, x, u, touched, source[sites])

@@ -9,6 +9,7 @@ for the mode of a density ``kernels/lcpdf.cl``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import prod
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
@@ -33,6 +35,9 @@ EXHAUSTIVE = 64
 
 SUGGESTING = 12
 """Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/relax.cl."""
+
+ALIKE = 64
+"""The most candidates that count as alike in known variables, unless they are equal in these."""
 
 IN_PHASE = 128
 """The most candidates of a phase."""
@@ -73,7 +78,7 @@ class AllCandidates(NamedTuple):
 
 
 class InPhase(NamedTuple):
-    """The candidates of each phase of a regular sample.
+    """The candidates of each phase of a regular sample, or those that are alike in the variables known at a site.
 
     ``begin`` (phases + 1,) int32: those of phase f are ``numbers[begin[f]]`` .. ``numbers[begin[f + 1] - 1]``, int32;
     ``sites`` (H, W) int32, the phase of each site.
@@ -106,6 +111,27 @@ def in_phase(of: NDArray[np.int32], divisions: tuple[int, int]) -> tuple[NDArray
     place = np.arange(begin[-1]) - np.repeat(begin[:-1], kept)
     chosen = np.repeat(first, kept) + place * np.repeat(many, kept) // np.repeat(np.maximum(kept, 1), kept)
     return begin.astype(np.int32), numbers[order[chosen]]
+
+
+def alike(own: NDArray[np.uint16], wanted: NDArray[np.uint16]) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield the numbers of some candidates that are alike in known variables, and the sites with about their values.
+
+    ``own`` (K, n) are the levels of the candidates, ``wanted`` (K, sites) those of the sites, `UNKNOWN` if unknown. The
+    candidates are halved at the median of the variable with the largest range, until they are no more than `ALIKE`.
+    """
+    known = wanted != UNKNOWN
+    for those in np.unique(known, axis=1).T:
+        parts = [(np.arange(own.shape[1]), np.flatnonzero((those == known.T).all(1)))] if those.any() else []
+        while parts:
+            numbers, sites = parts.pop()
+            ranges = np.ptp(own[:, numbers], 1) * those
+            if numbers.size <= ALIKE or not ranges.any():
+                yield numbers, sites
+                continue
+            y, x = own[ranges.argmax(), numbers], wanted[ranges.argmax(), sites]
+            middle = max(np.partition(y, y.size // 2)[y.size // 2], y.min() + 1)
+            halves = ((numbers[low], sites[at]) for low, at in ((y < middle, x < middle), (y >= middle, x >= middle)))
+            parts += [half for half in halves if half[1].size]
 
 
 class CandidateList(NamedTuple):
@@ -175,7 +201,7 @@ LEVEL = np.dtype(
         *((name, np.int32) for name in ("plane", "row_stride", "layer_stride", "cols", "runs")),
         *((name, np.float32) for name in ("discount", "scale", "spread")),
         *((name, np.int32) for name in ("radius", "top", "xi")),
-        *((name, np.float32) for name in ("novelty", "centre", "hard")),
+        *((name, np.float32) for name in ("novelty", "centre", "hard", "centre_known")),
     ],
     align=True,
 )
@@ -260,7 +286,7 @@ class Relaxation(NamedTuple):
             **{"discount": costs.discount, "novelty": costs.novelty},
             **{"scale": window.scale, "spread": choice.spread, "top": window.top},
             **{"radius": window.radius if choice.density else -1, "centre": confidences.centre},
-            **{"hard": confidences.hard, "chance": self.proposal.chance},
+            **{"hard": confidences.hard, "centre_known": confidences.centre_known, "chance": self.proposal.chance},
         }
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}

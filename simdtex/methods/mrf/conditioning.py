@@ -12,10 +12,21 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.input import Input
+from simdtex.methods.mrf.options import Options
 from simdtex.model.given import NO_STAND_IN, Stand, between, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Confidences, Field
+
+
+def heaviest(options: Options, neighbours: int) -> float:
+    """Return the largest square of a confidence, except for that of a known variable at its own site."""
+    return max(1.0, options.data_weight, neighbours / 4)
+
+
+def centre_known(options: Options, neighbours: int) -> int:
+    """Return the confidence of a known variable at its own site, which counts more than all neighbours together."""
+    return round(4 * sqrt(neighbours * heaviest(options, neighbours)))
 
 
 class Held(NamedTuple):
@@ -88,7 +99,9 @@ class Conditioning(Conditions):
         hard = planes is not None and bool((planes.source < 0)[planes.known].any())
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
-        own = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
+        guides, known = len(sample.guides), sample.known_variables
+        here = np.float32(centre_known(plan.options, neighbours))
+        own = Confidences(guides, guides > 0 or hard, centre, weight, known, here)
         super().__init__(confidences or own)
         self.guides, self.planes = sample.guides, planes
         self.plan = plan

@@ -23,7 +23,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import EXHAUSTIVE, IN_PHASE, AllCandidates, CandidateList, InPhase, Relaxation, in_phase
+from simdtex.ops.relax import EXHAUSTIVE, IN_PHASE, AllCandidates, CandidateList, InPhase, Relaxation, alike, in_phase
 from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import TAIL, square_of
 from simdtex.ops.use import FairUse
@@ -237,6 +237,8 @@ class Lattices:
         proposal = level.proposal
         if isinstance(proposal, CandidateList) and proposal.phases and waves:
             proposal = proposal._replace(phases=proposal.phases._replace(sites=machine.put(waves.phase_at(grid))))
+        if isinstance(proposal, CandidateList) and self.conditions.confidences.known:
+            proposal = proposal._replace(phases=self._alike(number, proposal, grid))
         return replace(
             level,
             setting=level.setting._replace(grid=grid),
@@ -248,6 +250,22 @@ class Lattices:
             movable=self.conditions.movable(machine, number, grid),
             lists={},
         )
+
+    def _alike(self, number: int, proposal: CandidateList, grid: Grid) -> InPhase:
+        """Return the phases of a proposal, and more of them: candidates alike in the variables known at some sites."""
+        machine, known, held = self.machine, self.conditions.confidences.known, self.conditions.at(number, grid)
+        assert held
+        size = proposal.candidates.size
+        begin, numbers, phase = np.array([0, size]), np.arange(size), np.zeros(grid.shape, np.int32)
+        if proposal.phases:
+            begin, numbers, phase = (np.array(machine.get(one)) for one in proposal.phases)
+        own = self.sample.working[-known:, machine.get(proposal.candidates.positions)]
+        found = list(alike(own, held.values[-known:].reshape(known, -1)))
+        for k, (_, sites) in enumerate(found):
+            phase.flat[sites] = begin.size - 1 + k
+        begin = np.append(begin, begin[-1] + np.cumsum([len(those) for those, _ in found]))
+        numbers = np.concatenate([numbers, *(those for those, _ in found)])
+        return InPhase(*(machine.put(one.astype(np.int32)) for one in (begin, numbers, phase)))
 
     def _kinds(self, candidates: Candidates) -> Kinds | None:
         """Return the kinds of candidates that soft data know; None without soft data."""

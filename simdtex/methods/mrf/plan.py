@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.machine import Machine, memory
 from simdtex.methods.mrf.algorithm import Run
+from simdtex.methods.mrf.conditioning import centre_known, heaviest
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.level import number_of_levels
 from simdtex.methods.mrf.options import Options, of_palette
@@ -108,14 +109,16 @@ def plan(
     if given and given.partly:
         if options.pixel == "density":
             raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
-        guides.append(given.colocated(pictures.pixels))
+        guides.append(given.colocated(pictures))
     known = (given.values, given.data, given.place) if given and given.data.any() else None
     lattice = parse_lattice(options.lattice)
     torus = options.boundary == "torus"
     regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), torus, lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
-    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
+    heavy = heaviest(options, len(offsets)) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
+    if given and given.partly:
+        values += guides[-1].channels * centre_known(options, len(offsets)) ** 2
     scenes = [Scene(pictures, shape, given, guides, regular)]
     count = halvings(scenes[0], options, levels, soft)
     while True:  # with as many halvings as leave known pixels
