@@ -80,6 +80,7 @@ class Inside {
     if (!this.element.open) return;
     this.status.textContent = this.page.shown === null ? "Look inside when there is a result." : "The run is repeated …";
     this.beside = beside;
+    this.page.view.split(beside !== null);
     if (this.page.shown !== null) this.page.send({ kind: "inside", open: true, beside });
   }
 
@@ -98,6 +99,7 @@ class Inside {
   /** Show why there is nothing to look into. */
   failed(text) {
     this.waiting = false;
+    if (!this.page.view.panes[1].frame) this.page.view.split(false);
     if (this.element.open && this.body.hidden) this.status.textContent = text;
   }
 
@@ -364,17 +366,23 @@ class Tour {
     this.element.addEventListener("keydown", (event) => event.key === "Escape" && this.close());
   }
 
-  /** Begin, with an example if there is no result. */
-  async start() {
+  /** Begin, with an example if there is no result; an error of a run or of a look inside ends it. */
+  async start(opener) {
     const { page } = this;
+    this.opener = opener;
+    const done = (kind) => Promise.race([page.next(kind), page.next("error")]);
     if (!page.results.size) {
       if (!page.picture) page.give({ name: "brick", maps: new Map() });
-      await page.next("result");
+      else if (!page.running) page.make();
+      await done("result");
+      if (!page.results.size) return;
     }
     if (page.shown === null) page.send({ kind: "select", result: Math.max(...page.results.keys()) });
     if (!page.inside.open) {
-      page.inside.element.open = true;
-      await page.next("inside");
+      if (page.inside.element.open) page.inside.look();
+      else page.inside.element.open = true;
+      await done("inside");
+      if (!page.inside.open) return;
     }
     this.element.hidden = false;
     this.go(0);
@@ -417,5 +425,6 @@ class Tour {
   close() {
     this.element.hidden = true;
     this.point(null);
+    this.opener.focus();
   }
 }
