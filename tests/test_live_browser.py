@@ -657,7 +657,7 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
 def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
     inside.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
     inside.result(4)
-    until(lambda: "method mrf" in inside.one(".inside > [role=status]").text)
+    until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
     assert not inside.one(".lines").is_displayed()
     inside.all(".strip button")[1].click()
     until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 2)
