@@ -177,6 +177,8 @@ class Option:
         The slider on the live page. A number without a slider has no control.
     label : str
         The name on the live page; by default that of the field.
+    hint : str
+        The ``help`` on the live page, if the page offers less than the command line.
     """
 
     default: Any
@@ -192,6 +194,7 @@ class Option:
     unit: str = ""
     slider: tuple[float, float, float] | None = None
     label: str = ""
+    hint: str = ""
 
     def default_of(self, job: str) -> Any:
         """Return the default value in a job; ``"simulate 3-D"`` falls back on ``"simulate"``."""

@@ -149,7 +149,7 @@ class Output:
         ``cols``) in pixels.
         ``lattice`` of ``mrf`` is None unless the sample repeats. It has the two ``vectors`` of the output's lattice,
         (row, column) in pixels, the ``deformation`` that fits the sample's lattice to the output, 0 if none, and
-        ``fitting``, the rows and columns of an output that needs less deformation.
+        ``fitting``, the rows and columns of an output that needs less deformation, None if this one needs the least.
         ``light`` has the value of the option ``light`` and, but for ``fill``, how uneven the light of the sample is:
         ``smooth`` and ``share``, see `simdtex.model.light.unevenness`.
     fit : (rows, cols, classes) float32 array or None

@@ -462,6 +462,34 @@ def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wal
     assert len(page.script("return [...heights]")) == 1
 
 
+def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("page.newSeed(); page.pause()")
+    until(lambda: page.status == "Running.")
+    page.all(".strip button")[0].click()
+    until(lambda: page.status == "Result 1 is shown.")
+    page.script("page.send({kind: 'resume'})")
+    until(lambda: page.status == "Result 2 is ready; result 1 is shown.")
+    page.script("page.columns.style.paddingBottom = '2000px'; scrollTo(0, 1e6); page.options.mrf.values = {finish: 99}")
+    page.script("page.make()")
+    until(lambda: page.alert.startswith("Finish is 99; "))
+    box = page.script("return page.alert.getBoundingClientRect().toJSON()")
+    assert page.script("return scrollY") > 300 and 0 <= box["top"] < box["bottom"] <= 1000
+    strokes = "[{label: 1, width: 20, points: [[30, 30]]}]"
+    page.script(f"page.guide = {{sample: {strokes}, output: {strokes}}}; page.tool.value = '1'; scrollTo(0, 0)")
+    page.script("page.options.mrf.values = {}; page.make()")
+    until(lambda: page.script("return page.view.panes[0].frame.of === 3 && !page.view.drawing"))
+    over = page.canvas()
+    page.script("page.tool.value = ''; page.view.draw()")
+    until(lambda: page.script("return !page.view.drawing"))
+    covered = (over != page.canvas()).any(-1).sum() / page.script("return page.view.unit") ** 2
+    assert 0 < covered < 0.25 * np.pi * 10**2, "only an outline hides the result"
+    page.script("page.job.value = 'fill'")
+    drop(page.driver, wall)
+    until(lambda: page.status == "Ready.")
+
+
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.script("page.auto.checked = false")
     file = tmp_path / "moving.gif"
@@ -629,7 +657,7 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
 def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
     inside.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
     inside.result(4)
-    until(lambda: "method mrf" in inside.one(".inside > [role=status]").text)
+    until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
     assert not inside.one(".lines").is_displayed()
     inside.all(".strip button")[1].click()
     until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 2)
@@ -638,7 +666,28 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     until(lambda: inside.script("return !page.inside.open"))
 
 
+def test_the_pane_beside_says_that_it_is_being_computed_and_tables_are_not_clipped(inside):
+    pane = inside.one("canvas.beside")
+    inside.script("page.connection.send = () => {}; page.inside.look(2)")
+    words = "const c = arguments[0]; return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(Boolean)"
+    until(lambda: pane.is_displayed() and inside.script(words, pane), 5)
+    inside.script("page.inside.failed('')")
+    assert not pane.is_displayed()
+    inside.script("delete page.connection.send; page.inside.pixel = [20, 30]; page.inside.look(2)")
+    until(lambda: len(inside.all(".wide")) == 2)
+    for table in inside.all(".wide"):
+        assert inside.script("return arguments[0].scrollWidth - arguments[0].clientWidth", table) <= 0
+
+
+CHANCES = "return [...document.querySelectorAll('.reason .bars')].map((one) => one.textContent);"
+WIDER = "const h = document.querySelector('.dice input'); h.value = 2; h.dispatchEvent(new Event('input'));"
+
+
 def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
+    page.button("grass").click()
+    page.result(1)
+    page.script("page.method.value = 'multires'; page.showJob(); page.make(); page.inside.element.open = true")
+    page.result(2)
     button = page.button("Lecture: why this pixel?")
     button.click()
     until(lambda: page.one(".tour").is_displayed())
@@ -655,14 +704,11 @@ def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
                     page.script("return document.querySelector(arguments[0]).getBoundingClientRect().bottom", place)
                     <= 720
                 )
-            before = [row.text for row in page.all(".reason tbody tr")]
-            page.script(
-                "const h = arguments[0]; h.value = 2; h.dispatchEvent(new Event('input'))", page.one(".dice input")
-            )
-            assert "candidates count" in page.one(".dice output").text
-            assert [row.text for row in page.all(".reason tbody tr")] != before, "the probabilities follow h"
-            page.button("Draw again").click()
-            assert "The dice say" in page.one(".dice output").text
+            before = page.script(CHANCES)
+            until(lambda before=before: page.script(f"{WIDER} {CHANCES}") != before, 10)  # an explanation may follow
+            assert "candidates count" in page.script("return document.querySelector('.dice output').value")
+            page.script("document.querySelector('.dice button').click()")
+            until(lambda: "The dice say" in page.script("return document.querySelector('.dice output').value"), 10)
         assert page.faults() == []
         box.send_keys(Keys.ENTER)
         assert page.one(".tour p").text != asked, "the answer"
@@ -681,6 +727,10 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page, tmp_path):
     page.result(1)
     until(lambda: page.script("return page.seen") == "picture")
     assert not page.one(".fitting").is_displayed(), "the first size is one that fits"
+    zooms = "return [...document.querySelectorAll('.result .bar .bar button')].map((one) => one.offsetLeft)"
+    places = page.script(zooms)
+    page.script("page.latticeField.hidden = true; page.zoomOutput.textContent = '5 %'")
+    assert page.script(zooms) == places
     page.script("page.width.value = page.height.value = 170; page.make()")
     page.result(2)
     rows, cols = page.script("return page.results.get(2).lattice.fitting")

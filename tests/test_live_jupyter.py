@@ -8,7 +8,7 @@ import urllib.request
 from importlib.util import find_spec
 
 import pytest
-from browsing import browser, missing, until
+from browsing import browser, missing, shown, until
 
 LACKS = missing() or ("" if find_spec("jupyterlab") else "JupyterLab is not installed (pip install 'jupyterlab>=4.2')")
 pytestmark = [
@@ -137,8 +137,29 @@ def test_keys_of_the_widget_are_no_commands_of_the_notebook(notebook, kind):
     assert notebook.switch_to.active_element == control
 
 
+def test_a_click_on_a_heading_leaves_no_key_to_the_notebook(notebook):
+    visible(notebook, "h2")[0].click()
+    assert press(notebook, "dd") == 3
+
+
+@pytest.mark.parametrize(("theme", "paper"), [("Dark", "rgb(25, 24, 23)"), ("Light", "rgb(251, 250, 247)")])
+def test_the_widget_has_the_theme_of_the_notebook(notebook, theme, paper):
+    shown(notebook, width=1400, dark=theme == "Light")  # the system has the other one
+    notebook.execute_script(f"jupyterapp.commands.execute('apputils:change-theme', {{theme: 'JupyterLab {theme}'}})")
+    colour = "return getComputedStyle(document.querySelector('.simdtex')).backgroundColor"
+    until(lambda: notebook.execute_script(colour) == paper)
+
+
 def test_the_same_keys_delete_a_cell_that_has_the_focus(notebook):
     """Else the test above would prove nothing."""
     cells(notebook)[2].find_element(By.CSS_SELECTOR, ".jp-InputPrompt").click()
     press(notebook, "dd")
     until(lambda: len(cells(notebook)) == 2)
+
+
+def test_a_widget_whose_kernel_was_started_anew_says_so(notebook):
+    kernel = "window.jupyterapp.shell.currentWidget.sessionContext.session.kernel"
+    notebook.execute_async_script(f"{kernel}.restart().finally(arguments[0])")
+    until(lambda: [one.text for one in visible(notebook, "[role=status]")][:1] == ["Not connected."])
+    assert "no longer connected. Run its cell again." in visible(notebook, "[role=alert]")[0].text
+    assert not visible(notebook, ":is(button, input, select):not(:disabled)")

@@ -437,12 +437,12 @@ WRONG = [
     ("unknown example '../x'; choose one of: brick, grass, gravel", {"kind": "example", "name": "../x"}),
     ("no file came with that; give the picture again", {"kind": "open", "name": "a.png"}),
     ("result 5 is no longer kept; make it again with its command line", {"kind": "select", "result": 5}),
-    ("width is 0; give 1 or more", asked(width=0)),
-    ("width must be an integer, not 'big'", asked(width="big")),
+    ("Result width is 0; give 1 or more", asked(width=0)),
+    ("Result width must be an integer, not 'big'", asked(width="big")),
     ("unknown job 'rm'; choose one of: synth, extend, fill, classify", asked(job="rm")),
     ("unknown method 'os'; choose one of: mrf, multires, pyramid", asked(method="os")),
     ("there is no control for 'array'; choose one of: ", asked(options={"array": "4x4"})),
-    ("balance is -1; give a number of at least 0", asked(options={"balance": -1})),
+    ("Balance is -1; give a number of at least 0", asked(options={"balance": -1})),
     ("options must be names and values, not 3", asked() | {"options": 3}),
     ("the part reaches beyond the picture of 48x40; choose one within it", asked(part=[40, 0, 20, 20])),
     ("a part of the picture is four numbers: left, top, width and height", asked(part=[1, 2])),
@@ -452,6 +452,14 @@ WRONG = [
         "there is no control for 'order'; choose one of: exemplars, ",
         asked(job="classify", guide=GUIDE, options={"order": 4}),
     ),
+    (
+        'the mode of a density is of all candidates; give Search "exact", or Relaxation "gibbs"',
+        asked(options={"pixel": "density", "search": "coherent"}),
+    ),
+    (
+        "Finish 3 takes means, and of categories there are none; set it",
+        asked(options={"finish": 3, "categorical": True}),
+    ),
     ("label 1 is on the output and not on the sample;", asked(guide={"output": [stroke((1, 1))]})),
     ("there is no hole to fill; paint over what is to be replaced", hole()),
     ("the hole covers the whole picture; leave some of it", hole(stroke((20, 20), width=200))),
@@ -460,7 +468,7 @@ WRONG = [
     (POINT, hole({"label": 1, "width": 4, "points": [["a", 1]]})),
     (POINT, hole(stroke((1e30, 0)))),
     ("there are more than 65536 points; paint with a wider brush", hole(stroke(*[(1, 1)] * 70000))),
-    ("width is 0; give 1 or more", {"kind": "view", "width": 0}),
+    ("Result width is 0; give 1 or more", {"kind": "view", "width": 0}),
     ("step is 1000000; give ", {"kind": "view", "step": 10**6}),
     ("a window has at most 4194304 pixels; make it smaller", {"kind": "view", "width": 4096, "height": 4096}),
     ("the layer must be a name", {"kind": "view", "layer": 3}),
@@ -601,7 +609,7 @@ def test_the_present_run_comes_back_with_its_picture(opened):
 def test_after_a_refusal_no_result_is_shown_as_its(opened):
     opened.result()
     after = len(opened.got)
-    assert opened.error(**asked(options={"finish": 99})).startswith("finish is 99")
+    assert opened.error(**asked(options={"finish": 99})).startswith("Finish is 99")
     assert opened.wait("error", after=after)[0]["job"] == "synth"
     assert opened.wait("selected", after=after)[0]["result"] is None
     after = len(opened.got)
@@ -833,7 +841,7 @@ def test_a_seamless_picture_is_looked_into(page_inside):
 @pytest.mark.parametrize("message", [{"method": "pyramid"}, {"method": "multires"}])
 def test_other_methods_are_refused(page_inside, message):
     page_inside.result(width=20, height=18, **message)
-    assert "method mrf" in page_inside.error(kind="inside", open=True)
+    assert 'method "Markov random field"' in page_inside.error(kind="inside", open=True)
 
 
 def test_what_cannot_be_looked_into(page_inside):
@@ -936,10 +944,11 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
     for control in found:
         one = own[control["name"]]
         assert f"--{control['name'].replace('_', '-')}" in flags
-        assert control["hint"].startswith(one.help) and control["group"] == one.group and control["label"]
+        assert control["hint"].startswith(one.hint or one.help) and control["group"] == one.group and control["label"]
         assert control["default"] == one.default_of(command)
         if control["kind"] == "words":
             assert [word for word, _ in control["valid"]] == list(one.kind.valid)
+            assert "[" not in control["hint"] and "DY" not in control["hint"], "a choice takes no text"
         elif control["kind"] != "switch":
             least, most, step = control["span"]
             assert control["least"] == (one.kind.least if one.kind.least > -inf else None)

@@ -154,7 +154,8 @@ class Job:
     def replay(self, machine: Machine) -> Replay | HoleReplay:
         """Return the replay of the run; raise ValueError if it is not one run of ``mrf``."""
         if self.method != "mrf":
-            raise ValueError("only runs of the method mrf can be looked into")
+            name = METHODS["mrf"].partition(":")[0]
+            raise ValueError(f'only runs of the method "{name}" can be looked into; make a result by it first')
         call, work = FUNCTIONS[self.kind].prepare(self.sample, **self._keywords)
         return (HoleReplay if self.kind == "fill" else Replay)(work.run, machine, call.rng)
 
@@ -349,9 +350,21 @@ def controls(name: str) -> list[dict[str, Any]]:
     return [control for control in made if "kind" in control]
 
 
+def told(sentence: str) -> str:
+    """Return a message of the package with the labels of the page: ``Search "exact"`` for ``search="exact"``."""
+    labels = {control["name"]: control["label"] for name in TABLES for control in controls(name)}
+    labels |= {"seed": "Seed", "width": "Result width", "height": "Result height"}
+    names = "|".join(labels)
+    named = re.sub(rf"\b({names})=", lambda one: f"{labels[one[1]]} ", sentence)
+    named = re.sub(rf"^({names})(?= is | must )", lambda one: labels[one[1]], named)
+    left = names if named == sentence else f"{names}|it"
+    return re.sub(rf"leave ({left}) out", lambda one: f"set {labels.get(one[1], 'it')} to its default", named)
+
+
 def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
     """Return the control of an option; without ``kind`` if it has none."""
-    hint = f"{one.help}. Empty: {one.none}." if one.none else f"{one.help}."
+    hint = f"{one.hint or one.help}."
+    hint = f"{hint} Empty: {one.none}." if one.none else hint
     label = one.label or name.replace("_", " ").capitalize()
     control = {"name": name, "group": one.group, "label": label, "hint": hint, "default": default}
     kind = one.kind

@@ -27,7 +27,7 @@ from simdtex.checkpoint import Checkpointing, pack
 from simdtex.io.image import EXAMPLES, example, read_bytes
 from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
-from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem
+from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
 from simdtex.live.results import THUMBNAIL, Inside, Result, Results
 from simdtex.machine import Machine
 from simdtex.methods import mrf
@@ -237,7 +237,7 @@ class Session:
         except Exception:
             log.exception("a request of the live page failed")
             sentence = "this is an error in simdtex itself; the terminal says more"
-        self.send({"kind": kind, "text": sentence, "job": job}, [])
+        self.send({"kind": kind, "text": told(sentence), "job": job}, [])
         if job:
             self._refused = sentence
             if job not in ("fill", "classify"):  # these use the result or the picture that is shown

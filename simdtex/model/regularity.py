@@ -172,11 +172,12 @@ class Phases(NamedTuple):
         return Waves(*self, min(sqrt(2 * self.weight * spread / WAVES), top / 2))
 
     def statistics(self, shape: tuple[int, int]) -> dict[str, Any]:
-        """Return the vectors of the output's lattice, the deformation to it, and a size that needs less deformation."""
+        """Return the vectors of the output's lattice, the deformation to it, and a size that fits better or None."""
         sample = self.pictures[0]
+        fitting = sample.fitting(shape)
         vectors = [list(self.output.first), list(self.output.second)]
         deformation = sample.deformation(self.output.basis)
-        return {"vectors": vectors, "deformation": deformation, "fitting": list(sample.fitting(shape))}
+        return {"vectors": vectors, "deformation": deformation, "fitting": None if fitting == shape else list(fitting)}
 
 
 class Waves(NamedTuple):
@@ -296,17 +297,14 @@ def phases(
 
 
 def lattice_sentence(lattice: dict[str, Any] | None) -> str:
-    """Return a sentence on the deformation of a regular sample and a size that fits better; "" if it is 1 % or less.
+    """Return a sentence on the deformation of a regular sample and any size that fits better; "" if it is 1 % or less.
 
     ``lattice`` is the entry of `simdtex.run.Output.statistics`.
     """
     if not lattice or lattice["deformation"] <= NOTICED:
         return ""
-    rows, cols = lattice["fitting"]
-    return (
-        f"The sample's pattern is deformed by {lattice['deformation']:.0%} to fit this size; "
-        f"{cols}x{rows} pixels fit it better."
-    )
+    better = "; {1}x{0} pixels fit it better".format(*lattice["fitting"]) if lattice["fitting"] else ""
+    return f"The sample's pattern is deformed by {lattice['deformation']:.0%} to fit this size{better}."
 
 
 def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArray[np.int64]], list[NDArray[np.bool_]]]:

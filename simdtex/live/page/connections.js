@@ -88,10 +88,15 @@ class Kernel {
     this.onmessage = this.onstate = () => {};
     this.received = (message, buffers) =>
       this.onmessage(message, (buffers ?? []).map((one) => new Uint8Array(one.buffer, one.byteOffset, one.byteLength)));
+    this.ended = () => {
+      this.send = () => {};
+      this.onstate("ended", "");
+    };
   }
 
   open() {
     this.model.on("msg:custom", this.received);
+    this.model.on("comm_live_update", this.ended); // as JupyterLab starts the kernel anew
     this.onstate("open", "");
   }
 
@@ -101,6 +106,7 @@ class Kernel {
 
   close() {
     this.model.off("msg:custom", this.received);
+    this.model.off("comm_live_update", this.ended);
   }
 }
 

@@ -2,7 +2,7 @@
 
 // -- a look inside a run ------------------------------------------------------------------------------------------
 
-const TILE = 66; // pixels to a side of the picture of a neighbourhood, about
+const TILE = 54; // pixels to a side of the picture of a neighbourhood, about
 const FRAMES = 12; // of a sweep while the time line plays, at most
 const PACE = 70; // milliseconds between two of them, at least
 const HOW = "Click a pixel of the result, or press Enter in the view and move with the arrow keys.";
@@ -85,6 +85,7 @@ class Inside {
     if (!this.element.open) return;
     this.status.textContent = this.page.shown === null ? "Look inside when there is a result." : "The run is repeated …";
     this.beside = beside;
+    this.page.view.split(beside !== null);
     if (this.page.shown !== null) this.page.send({ kind: "inside", open: true, beside });
   }
 
@@ -103,6 +104,7 @@ class Inside {
   /** Show why there is nothing to look into. */
   failed(text) {
     this.waiting = false;
+    if (!this.page.view.panes[1].frame) this.page.view.split(false);
     if (this.element.open && this.body.hidden) this.status.textContent = text;
   }
 
@@ -446,23 +448,29 @@ class Lecture {
     this.element.addEventListener("keydown", (event) => this.key(event));
   }
 
-  /** Begin, with an example if there is no picture. */
-  async start() {
+  /** Begin, with an example if there is no picture; an error of a run or of a look inside ends it. */
+  async start(opener) {
     const { page } = this;
-    this.opener = document.activeElement;
+    this.opener = opener;
+    const done = (kind) => Promise.race([page.next(kind), page.next("error")]);
     if (!page.picture) {
       page.give({ name: "gravel", maps: new Map() });
-      await page.next("picture");
+      await done("picture");
+      if (!page.picture) return;
     }
     const { width, height } = page.picture;
     const part = [0, 0, ...[width, height].map((side) => Math.min(side, SIDE + SIDE / 2))];
     page.send({ kind: "make", job: "synth", method: "mrf", width: SIDE, height: SIDE, seed: 1, options: PLAIN, part });
     let made = page.connection instanceof Recording ? page.results.get(page.shown) : null;
-    while (made?.settings.options.relaxation !== PLAIN.relaxation || made.width !== SIDE) made = await page.next("result");
+    while (made?.settings.options.relaxation !== PLAIN.relaxation || made.width !== SIDE) {
+      made = await done("result");
+      if (made.kind === "error") return;
+    }
     if (page.shown !== made.result) page.send({ kind: "select", result: made.result });
     if (page.inside.element.open) page.inside.look();
     page.inside.element.open = true;
-    await page.next("inside");
+    await done("inside");
+    if (!page.inside.open) return;
     this.element.hidden = false;
     page.root.prepend(this.element);
     page.root.classList.add("lecture");
@@ -533,6 +541,6 @@ class Lecture {
     this.page.root.classList.remove("lecture");
     this.page.view.fit();
     this.point(null);
-    this.opener?.focus();
+    this.opener.focus();
   }
 }

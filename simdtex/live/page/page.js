@@ -45,9 +45,9 @@ class Page {
     const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
     this.columns = make("div", { class: "columns", hidden: true }, this.resultSection(), side);
     this.lecture = new Lecture(this);
-    const lecture = button("Lecture: why this pixel?", () => this.lecture.start());
+    const lecture = button("Lecture: why this pixel?", (event) => this.lecture.start(event.currentTarget));
     const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, lecture, this.status);
-    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns, this.lecture.element);
+    this.root = make("main", { class: "simdtex", tabindex: -1 }, header, this.alert, this.startSection(), this.columns, this.lecture.element);
     root.replaceChildren(this.root);
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {
@@ -170,6 +170,7 @@ class Page {
     this.hole = [];
     this.mark(this.shown, false);
     this.shown = null;
+    this.say("Ready.");
     if (this.again) this.restore(this.again);
     else {
       [this.width.value, this.height.value] = message.size;
@@ -272,7 +273,8 @@ class Page {
     this.fitting = button("", () => this.useFitting(), { hidden: true, class: "fitting" });
     this.latticeField = labelled("Lattice", this.latticeShown);
     const tiled = labelled("Tiled 3 × 3", this.tiling);
-    const shown = bar(labelled("Layer", this.layerChoice), tiled, this.latticeField, this.fitting, bar(...zoom));
+    const layer = labelled("Layer", this.layerChoice);
+    const shown = bar(bar(...zoom), layer, tiled, this.latticeField, this.fitting); // what changes its width comes last
     this.scale = make("span", { class: "scale", "aria-hidden": "true" });
     this.meaning = make("span");
     this.legend = make("p", { class: "legend", hidden: true }, this.scale, this.meaning);
@@ -413,7 +415,7 @@ class Page {
     this.currentItem.before(message.item);
     this.strip.scrollTo(this.strip.scrollWidth, this.strip.scrollHeight);
     const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
-    this.say(`Result ${result} is ready.${gone}`);
+    this.say(`Result ${result} is ready${this.shown === null ? "" : `; result ${this.shown} is shown`}.${gone}`);
     if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
   }
 
@@ -424,8 +426,10 @@ class Page {
     if (!found) {
       this.doing.textContent = "";
       this.view.canvas.setAttribute("aria-label", "The run, or the sample.");
+      if (this.running) this.say(this.paused ? "Paused." : "Running.");
       return;
     }
+    if (!this.status.textContent.startsWith(`Result ${result} is ready`)) this.say(`Result ${result} is shown.`);
     if (!settings && found.settings.job === "fill") this.hole = [];
     const { width, height, seconds, note } = found;
     const size = `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${found.settings.seed}`;
@@ -633,7 +637,8 @@ class Page {
     if (!this.paintable) return [];
     if (this.job.value === "fill") return this.tool.value ? [{ strokes: this.hole, colour: () => HOLE }] : [];
     const colour = (label) => this.colours[label];
-    return this.seen === "sample" || this.tool.value ? [{ strokes: this.labelStrokes, colour }] : [];
+    const hollow = this.seen === "picture" && Boolean(this.results.get(this.shown)?.settings.guide); // else it is hidden
+    return this.seen === "sample" || this.tool.value ? [{ strokes: this.labelStrokes, colour, hollow }] : [];
   }
 
   undo() {
@@ -831,8 +836,8 @@ class Page {
 
   /** Say what is wrong; with a `job`, that could not be done. */
   on_error({ text, job }) {
-    this.warn(text);
-    this.inside.failed(text);
+    this.warn(sentence(text));
+    this.inside.failed(sentence(text));
     if (!job) return;
     this.refused = true;
     this.say("Nothing was made.");
@@ -846,8 +851,13 @@ class Page {
       return;
     }
     this.setRunning(false);
-    this.warn(`${reason ? `${reason}.` : "The connection to simdtex is lost."} The page tries to connect again.`);
     this.say("Not connected.");
+    if (state === "ended") {
+      this.warn("The kernel was started anew, and this widget is no longer connected. Run its cell again.");
+      for (const one of this.root.querySelectorAll("button, input, select")) one.disabled = true;
+      return;
+    }
+    this.warn(`${reason ? `${reason}.` : "The connection to simdtex is lost."} The page tries to connect again.`);
   }
 
   say(text) {

@@ -109,7 +109,7 @@ class View {
   /** Show a second pane, or no more. */
   split(beside) {
     this.panes[1].canvas.hidden = !beside;
-    if (!beside) this.panes[1].frame = null;
+    this.panes[1].frame = null;
     this.draw();
   }
 
@@ -126,6 +126,10 @@ class View {
     const context = canvas.getContext("2d");
     context.clearRect(0, 0, canvas.width, canvas.height);
     const { unit } = this;
+    if (!frame && canvas !== this.canvas) {
+      context.font = `${16 * (window.devicePixelRatio || 1)}px sans-serif`;
+      lettered(context, "It is being computed …", 12, canvas.height / 2);
+    }
     if (!frame) return;
     context.imageSmoothingEnabled = unit < 3 && Math.abs(unit - Math.round(unit)) > 1e-6;
     if (frame.picture) {
@@ -133,7 +137,7 @@ class View {
       const [x, y] = [(frame.left - this.left) * unit, (frame.top - this.top) * unit].map(Math.round);
       context.drawImage(frame.picture, x, y, frame.width * size, frame.height * size);
     }
-    for (const { strokes, colour } of this.page.visibleStrokes()) this.strokes(context, strokes, colour);
+    for (const one of this.page.visibleStrokes()) this.strokes(context, one);
     if (this.page.lattice && !["sample", "use"].includes(frame.layer)) this.lattice(context, this.page.lattice);
     if (why) this.mark(context, frame, why);
     const { cursor } = this;
@@ -204,7 +208,8 @@ class View {
     context.restore();
   }
 
-  strokes(context, strokes, colour) {
+  /** Draw strokes of the brush, only their outlines if they are `hollow`. */
+  strokes(context, { strokes, colour, hollow }) {
     const layer = document.createElement("canvas"); // of its own, so that strokes over one another are not darker
     [layer.width, layer.height] = [this.canvas.width, this.canvas.height];
     const on = layer.getContext("2d");
@@ -214,12 +219,17 @@ class View {
       on.strokeStyle = colour(stroke.label);
       on.lineWidth = Math.max(1, stroke.width * this.unit);
       on.beginPath();
-      const points = stroke.points.length > 1 ? stroke.points : [stroke.points[0], stroke.points[0]];
+      const [[x, y]] = stroke.points;
+      const points = stroke.points.length > 1 ? stroke.points : [[x, y], [x + 0.01, y]]; // a line without a length is not drawn
       points.forEach(([x, y], index) => {
         const at = [(x + 0.5 - this.left) * this.unit, (y + 0.5 - this.top) * this.unit];
         if (index) on.lineTo(...at);
         else on.moveTo(...at);
       });
+      on.stroke();
+      if (!hollow || stroke.width * this.unit <= 4) continue;
+      on.globalCompositeOperation = "destination-out";
+      on.lineWidth -= 4;
       on.stroke();
     }
     context.globalAlpha = 0.6;

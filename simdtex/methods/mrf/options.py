@@ -110,6 +110,7 @@ class Options:
         "within a cell is then a guide, as in `guide`, of weight 1, and random candidates are of a site's own place in "
         "the cell unless the search is exact. On a torus the lattice is deformed to fit, by 15 % "
         'at most. With categories, and with ``pixel="density"``, there is no lattice.',
+        hint="Keep a regular texture on the lattice of the sample (auto), or not (none)",
         paper="none",
         group="Appearance",
         shown=DATA,
@@ -298,6 +299,7 @@ class Options:
         "Relax sites by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
         "random-subset[:P], raster, random-scan or block[:ROWSxCOLS]",
         more='Type checkers require ``simdtex.schedules.get("block:8x8")`` for a name with a parameter.',
+        hint="Relax sites by this schedule",
         symbol="equation (14)",
     )
     array: str | None = parallel(
