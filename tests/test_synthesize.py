@@ -260,7 +260,6 @@ BAD = [
     ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size, or make it in tiles: --tiles 2048"),
     # the options
     ({"levels": 20}, ValueError, "levels=20 is too many .* give at most"),
-    ({"reduction": 3}, ValueError, "reduction is 3; give a power of 2"),
     ({"reduction": 4, "levels": 2}, ValueError, "too much for 2 levels and this sample; give at most 2"),
     ({"sample": SAMPLE // 64, "reduction": 2, "levels": 2, "categorical": True}, ValueError, "takes means, .* leave"),
     ({"reduction": 2, "levels": 2, "pixel": "density"}, ValueError, "takes means, .* leave it out"),
@@ -307,7 +306,7 @@ def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
     assert [reduction(large, lattice=((0, n), (n, 0))) for n in (90, 41, 30)] == [4, 2, 1]
     paper = {"preset": "paper"}, {"search": "exact"}, {"phases": "all"}, {"categorical": True}
     assert [reduction(large // 64, **options) for options in ({}, *paper)] == [1] * 5
-    assert reduction(large, reduction=8) == 8
+    assert reduction(large, reduction=8) == reduction(large, reduction=15) == 8
     holes = large.astype(float)
     holes[::2, ::2] = np.nan  # no square of 2x2 is known
     assert reduction(holes, lattice="none", order=2) == 1

@@ -180,12 +180,12 @@ class Options:
     reduction: int | None = scales(
         None,
         Whole(1),
-        "Compare means over squares of up to this many pixels a side, a power of 2, at coarse levels: larger parts of "
-        "the sample stay whole, in less time",
-        more="At a level whose sites are 2 to `reduction` pixels apart, a pixel is the mean of a square of that side; "
-        "coarser levels decimate the most reduced sample. A level with a larger sample than the level above begins "
-        "with the arrangement of that level, at temperature 0, and has free sweeps only. With 1, all levels are "
-        "decimated.",
+        "Compare means over squares of up to this many pixels a side at coarse levels: larger parts of the sample stay "
+        "whole, in less time",
+        more="At a level whose sites are 2 to `reduction` pixels apart, a pixel is the mean of a square of that side, "
+        "a power of 2; coarser levels decimate the most reduced sample. A level with a larger sample than the level "
+        "above begins with the arrangement of that level, at temperature 0, and has free sweeps only. With 1, all "
+        "levels are decimated.",
         none="the coarsest sites are 8 pixels of the reduced sample apart, and a cell of a lattice has 20 along each "
         "vector; 1 with categories, palettes, exact searches, volumes and known values from elsewhere",
         unit="pixels",
@@ -378,8 +378,6 @@ class Options:
             raise ValueError('the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
-        if self.reduction and self.reduction & (self.reduction - 1):
-            raise ValueError(f"reduction is {self.reduction}; give a power of 2, as 4 or 8")
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 

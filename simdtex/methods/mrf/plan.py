@@ -186,7 +186,7 @@ def halvings(scene: Scene, options: Options, levels: int, soft: Soft | None) -> 
         while most and shortest < CELL * 2**most:
             most -= 1
         return 0 if never else max(0, min(most, levels - NEAR))
-    asked = round(log2(options.reduction))
+    asked = options.reduction.bit_length() - 1
     if asked and never:
         raise ValueError(
             f"reduction={options.reduction} takes means, which categories, densities, volumes, soft data and known "
