@@ -717,7 +717,8 @@ def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
     assert not page.one(".tour").is_displayed()
     assert page.driver.switch_to.active_element == button
     why = explained(page)
-    assert why["weighed"] > 1000 and len(why["totals"]) == 1024, "the plain model weighs all"
+    assert why["weighed"] in (44 * 44, 24 * 24), "all candidates of a level, at a pixel at random"
+    assert len(why["totals"]) == min(1024, why["weighed"])
     shown(page.driver, width=1400)
 
 
@@ -761,10 +762,16 @@ def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     until(lambda: page.all(".reason p") and page.one(".moment").text == "The result.")
     until(lambda: page.script("return document.querySelector('canvas.view').width") and page.canvas()[..., 3].any())
     before = page.canvas()
-    page.one("[aria-label='A sweep back']").click()
-    level, sweep, sets = moments[-1][1]
-    until(lambda: page.one(".moment").text.startswith(f"Level {level}, sweep {sweep} of {sweep}, set {sets} of {sets}"))
+    back, (level, last, sets) = page.one("[aria-label='A sweep back']"), moments[-1][1]
+    for sweep in (last, last - 1):  # the end of the last one is the result
+        back.click()
+        said = f"Level {level}, sweep {sweep} of {last}, set {sets} of {sets}"
+        until(lambda said=said: page.one(".moment").text.startswith(said))
     until(lambda: (page.canvas() != before).any())
     ActionChains(page.driver).move_to_element(page.one("canvas.view")).click().perform()
     until(lambda: page.all(".reason tr.taken"))
+    page.button("Lecture: why this pixel?").click()
+    until(lambda: page.one(".tour").is_displayed())
+    page.one(".tour").send_keys(*[Keys.ENTER] * 5)
+    until(lambda: page.one(".tour h2").text.startswith("3 of 6") and page.all(".reason tr.taken"))
     assert page.faults() == []
