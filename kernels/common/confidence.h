@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Confidences. The last G of C channels are guides: they are matched and never made. With -D OWN
 // every channel has a confidence of its own: a guide's is 1 whatever the temperature, and `centre` at the site itself;
-// what nobody knows has 0. The last KNOWN guides are known variables, with the confidence of hard data, and
+// an unknown value has 0. The last KNOWN guides are known variables, with the confidence of hard data, and
 // `centre_known` at the site itself.
 #ifndef SIMDTEX_CONFIDENCE_H
 #define SIMDTEX_CONFIDENCE_H
@@ -12,7 +12,7 @@
 #ifndef KNOWN
 #define KNOWN 0
 #endif
-#define UNKNOWN 0xffff // the grey level of what nobody knows
+#define UNKNOWN 0xffff // the grey level of an unknown value
 #define MADE (C - G)
 
 // The confidence of a site of confidence u: hard data, which are from nowhere in the sample, count more. The confidence of
