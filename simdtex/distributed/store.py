@@ -273,14 +273,13 @@ class Store:
         store, held, scattered = Store(where), False, {}
         store._files.name = secrets.token_hex(8)
         store.root.create_group("work")
-        options, given = plan.options, plan.given
+        given = plan.given
         conditions = Conditioning(plan)
         for level in layout.levels:
             part = plan.of(level.number)
             if part is not conditions.plan:
-                conditions = Conditioning(part)
-            grid = Grid.of(part.shape, 2**level.number // part.reduction, options.boundary == "torus")
-            if (here := conditions.at(level.number, grid)) is not None:
+                conditions = conditions.coarser(part)
+            if (here := conditions.at(level.number, part.grid(level.number))) is not None:
                 held = True
                 for name, plane in here._asdict().items():
                     place = f"work/given/held{level.number}/{name}"
@@ -291,7 +290,7 @@ class Store:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
         about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command, "light": light}
-        more = list(Conditioning(plan).confidences), held, given is not None, scattered, channels, source, maps
+        more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
         store._keep("run", about, [described(plan), layout.levels[0].side, *more])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store

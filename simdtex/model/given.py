@@ -86,10 +86,8 @@ class Given:
 
     def halved(self) -> Given:
         """Return the given values of an output of half the size: the means of squares of 2x2 sites, all four given."""
-        more = [(0, side % 2) for side in self.known.shape[:2]]
-        values, unknown = (np.pad(one, [*more, (0, 0)], "edge") for one in (self.values, ~self.known))
         place = None if self.place is None else self.place[::2, ::2]
-        return Given(halved(values), ~halved(unknown), place, self.suggests)
+        return Given(halved(self.values, all_of_it=True), halved(self.known, all_of_it=True), place, self.suggests)
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of a level, with the known values at its sites."""

@@ -159,11 +159,9 @@ class Surroundings:
 
     def halved(self) -> Surroundings:
         """Return the guide of a picture and an output of half the size."""
-        known, values, given = ~halved(~self.known), self.values, self.given
-        more = [(0, side % 2) for side in given.shape]
-        values, missing = np.pad(values, [*more, (0, 0)], "edge"), np.pad(~given, more, "edge")
+        values, given = (halved(one, all_of_it=True) for one in (self.values, self.given))
         corner = self.corner[0] / 2, self.corner[1] / 2
-        return Surroundings(halved(self.sample), known, halved(values), ~halved(missing), corner, self.colours)
+        return Surroundings(halved(self.sample), halved(self.known), values, given, corner, self.colours)
 
     @property
     def channels(self) -> int:

@@ -93,8 +93,7 @@ class Pictures:
 
     def halved(self) -> Pictures:
         """Return pictures of half the size: the means of squares of 2x2 pixels, known and usable if all four are."""
-        masks = [one and tuple(~halved(~mask) for mask in one) for one in (self.known, self.usable)]
-        known, usable = masks
+        known, usable = (masks and tuple(map(halved, masks)) for masks in (self.known, self.usable))
         unknown = known and tuple(~mask for mask in known)
         return replace(self, pixels=tuple(map(halved, self.pixels)), unknown=unknown, usable=usable)
 
@@ -148,12 +147,17 @@ def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
     return True
 
 
-def halved(array: NDArray[Any]) -> NDArray[Any]:
-    """Return the means, in the same type, of the whole squares of 2x2 of an array (rows, cols, ...); of masks any."""
+def halved(array: NDArray[Any], all_of_it: bool = False) -> NDArray[Any]:
+    """Return the means, in the same type, of squares of 2x2 of an array (rows, cols, ...); a mask is True if all are.
+
+    An odd last row or column is left out or, with ``all_of_it``, repeated.
+    """
+    if all_of_it:
+        array = np.pad(array, [(0, side % 2) for side in array.shape[:2]] + [(0, 0)] * (array.ndim - 2), "edge")
     rows, cols = (side - side % 2 for side in array.shape[:2])
     parts = [array[i:rows:2, j:cols:2] for i in (0, 1) for j in (0, 1)]
     if array.dtype == np.bool_:
-        return np.asarray(np.logical_or.reduce(parts))
+        return np.asarray(np.logical_and.reduce(parts))
     mean = np.zeros(parts[0].shape)
     for part in parts:
         mean += part / 4

@@ -100,8 +100,7 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
     """
     machine, grid, run = level.machine, level.setting.grid, run.of(level.number)
     everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-    squares = run.squares(level.number)
-    field = start(machine, run.planes, everywhere, grid, run.seed, above, squares, run.sample.cols)  # 2, 5
+    field = start(machine, run.planes, everywhere, grid, run.seed, above, run.squares, run.sample.cols)  # 2, 5
     return run.conditions.entered(machine, level.number, grid, field)
 
 

@@ -105,7 +105,6 @@ class Conditioning(Conditions):
         super().__init__(confidences or own)
         self.guides, self.planes = sample.guides, planes
         self.plan = plan
-        self.torus = plan.options.boundary == "torus"
         self._held: dict[int, Held] = {}
 
     def at(self, number: int, grid: Grid) -> Held | None:
@@ -113,7 +112,7 @@ class Conditioning(Conditions):
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:
-            self._held = {number: self._whole(Grid.of(self._shape, grid.step, grid.torus))}  # one level is enough
+            self._held = {number: self._whole(self.plan.grid(number))}  # one level is enough
         held = self._held[number]
         return Held(*(grid.cut(plane) for plane in held))
 
@@ -123,22 +122,18 @@ class Conditioning(Conditions):
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        if self.planes is None or 2**number == self.plan.reduction:
+        grid = self.plan.grid(number)
+        if self.planes is None or grid.step == 1:
             return None
-        place = between(self.planes.data, Grid.of(self._shape, 2**number // self.plan.reduction, self.torus))
+        place = between(self.planes.data, grid)
         values = self.planes.values[(slice(None), *place.T)].T
         return Data(place, np.ascontiguousarray(values)) if len(place) else None
-
-    @property
-    def _shape(self) -> tuple[int, ...]:
-        shape: tuple[int, ...] = self.guides.shape[1:] if self.planes is None else self.planes.known.shape
-        return shape
 
     def _whole(self, grid: Grid) -> Held:
         """Return the data and guides of a whole lattice."""
         planes, matched = self.planes, 0 if self.planes is None else len(self.planes.values)
-        values = np.zeros((matched + len(self.guides), *self._shape), np.uint16)
-        source, known = np.full(self._shape, -1, np.int32), np.zeros(self._shape, bool)
+        values = np.zeros((matched + len(self.guides), *self.plan.shape), np.uint16)
+        source, known = np.full(self.plan.shape, -1, np.int32), np.zeros(self.plan.shape, bool)
         if planes is not None:
             values[:matched] = np.where(planes.known, planes.values, 0)
             source, known = planes.source, planes.known

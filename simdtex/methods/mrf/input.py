@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, Planes, Soft
+from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.options import SMALLER
 
@@ -45,6 +46,10 @@ class Input:
     def sizes(self) -> list[Input]:
         """All inputs, the finest first."""
         return [self, *(self.coarser.sizes if self.coarser else ())]
+
+    def grid(self, number: int) -> Grid:
+        """Return the lattice of a level, equation (10), in pixels of the sample."""
+        return Grid.of(self.shape, 2**number // self.reduction, self.options.boundary == "torus")
 
     def of(self, number: int) -> Input:
         """Return the input of a level: this one, or a coarser one."""

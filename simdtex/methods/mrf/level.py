@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import log2, prod, sqrt
 from typing import Any, NamedTuple, Protocol
 
@@ -153,20 +154,20 @@ class Lattices:
         """Return the number of pixels of the sample from site to site of a level."""
         return int(2**number // self.plan.reduction)
 
-    def squares(self, number: int) -> NDArray[np.int32] | None:
-        """Return the first pixel of the square of each pixel of the sample of half the size, if the level above has it.
+    @cached_property
+    def squares(self) -> NDArray[np.int32] | None:
+        """The first pixel of the square of each pixel of the sample of half the size; None if there is no such sample.
 
-        None if the level above has the same sample.
+        If there is one, the level above has it, and the only level of this sample begins with its arrangement.
         """
-        if not self.coarser or number == self.levels - 1:
+        if not self.coarser:
             return None
         coarser = self.coarser.sample
         return self.sample.index(coarser.place(np.arange(coarser.rows * coarser.cols, dtype=np.int32)))
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the level's sample."""
-        lattices = self.of(number)
-        return Grid.of(lattices.plan.shape, lattices.spacing(number), self.options.boundary == "torus")
+        return self.plan.of(number).grid(number)
 
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).

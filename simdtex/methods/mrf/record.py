@@ -225,7 +225,7 @@ def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
         each = run.places(number).positions.size
         if not run.exhaustive(number):
             each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
-        sweeps = sweeps if coarsest or run.squares(number) is None else 0.0
+        sweeps = 0.0 if run.coarser else sweeps  # it begins with an arrangement
         sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
         work[number] = (sweep * sweeps, sweep * options.free_sweeps)
     return work

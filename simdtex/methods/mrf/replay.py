@@ -165,7 +165,7 @@ class Replay:
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
                     return explained(self._twin, moment, (row, col))
-            if (row % 2 or col % 2) and self._twin.of(level).squares(level) is None:  # no site of the level above
+            if (row % 2 or col % 2) and not self._twin.of(level).coarser:  # no site of the level above
                 break
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
