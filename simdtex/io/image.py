@@ -564,7 +564,10 @@ def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> N
 
 
 EXAMPLES = ("brick", "grass", "gravel")
-"""The names of the samples."""
+"""The names of the grey samples."""
+
+TISSUE = "tissue"
+"""The name of the sample in colour."""
 
 WALL = (264, 216)
 """Rows and columns of the wall in scikit-image's brick, seen from the front: bricks 18 pixels wide."""
@@ -574,10 +577,16 @@ TOP, BOTTOM = (70, 360), (11, 499)
 
 
 def example(name: str) -> NDArray[np.uint8]:
-    """Return a grey picture (rows, cols) of one of `EXAMPLES`; brick is a wall seen from the front, 264 x 216."""
+    """Return a picture of scikit-image: of `EXAMPLES` grey, (rows, cols); `TISSUE` has (128, 128, 3).
+
+    Brick is a wall seen from the front, 264 x 216.
+    """
     import skimage
 
     library: Any = skimage  # which has no types
+    if name == TISSUE:
+        stained: NDArray[np.uint8] = library.data.immunohistochemistry()[40:168, 12:140]
+        return stained
     picture: NDArray[np.uint8] = getattr(library.data, name)()
     if name != "brick":
         return picture

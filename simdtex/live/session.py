@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing, pack
-from simdtex.io.image import EXAMPLES, example, read_bytes
+from simdtex.io.image import EXAMPLES, TISSUE, example, read_bytes
 from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
 from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
@@ -34,6 +34,7 @@ from simdtex.methods import mrf
 from simdtex.model.display import temperature_colours
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import plain, regular
+from simdtex.model.source_map import map_role
 from simdtex.options import one_of, resolve, table
 from simdtex.run import Progress
 
@@ -268,8 +269,15 @@ class Session:
         self._open(_read(message, buffers))
 
     def _on_example(self, message: Message, buffers: Sequence[Any]) -> None:
-        one_of("example", message.get("name"), EXAMPLES)
-        self._open(Picture(f"{message['name']}.png", _examples()[message["name"]], None))
+        found = _examples()
+        one_of("example", message.get("name"), found)
+        pixels = found[message["name"]]
+        self._open(Picture(f"{message['name']}.png", pixels, None if pixels.ndim == 2 else -1))
+
+    def _on_lead(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Send the place of the picture among the names of a material's files: its albedo, or else the first."""
+        roles = [map_role(str(name)) for name in message.get("names", [])]
+        self.send({"kind": "lead", "place": roles.index("albedo") if "albedo" in roles else 0}, [])
 
     def _open(self, picture: Picture) -> None:
         self._picture, self._maps, self._levels = picture, {}, None
@@ -282,7 +290,7 @@ class Session:
         if self._picture is not None:
             return
         side, shape = 3 * DEMO_SIDE // 5, (DEMO_SIDE, DEMO_SIDE)
-        sample = example("gravel")[:side, :side]
+        sample = example(TISSUE)[:side, :side]
         pictures: list[bytes] = []
 
         def keep(progress: Progress) -> None:
@@ -293,7 +301,7 @@ class Session:
                 pictures.append(frames.thumbnail(layer, DEMO_SIDE).pixels)
 
         with suppress(Cancelled):
-            synthesize(sample, shape, rng=1, device=self._machine, callback=keep)
+            synthesize(sample, shape, channel_axis=-1, rng=1, device=self._machine, callback=keep)
             self.send({"kind": "demo", "width": DEMO_SIDE, "height": DEMO_SIDE}, pictures)
 
     def _on_map(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -351,6 +359,13 @@ class Session:
         if number is not None:
             self.results.find(number)
         self._select(number, restore=True)
+
+    def _on_forget(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Delete a result; of those that are left, the page shows the latest if it showed this one."""
+        number = self.results.find(message.get("result")).number
+        del self.results[number]
+        if number == self._selected:
+            self._select(max(self.results, default=None))
 
     def _on_inside(self, message: Message, buffers: Sequence[Any]) -> None:
         """Replay the selected result and, side by side, another one; or close the replays."""
@@ -525,8 +540,8 @@ class Session:
 
 @cache
 def _examples() -> dict[str, NDArray[np.uint8]]:
-    """Return the pictures that the page offers, by name."""
-    return {name: example(name)[:192, :192] for name in EXAMPLES}
+    """Return the pictures that the page offers, by name; the first is in colour."""
+    return {name: example(name)[:192, :192] for name in (TISSUE, *EXAMPLES)}
 
 
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:

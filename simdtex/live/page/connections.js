@@ -13,12 +13,14 @@ const LAYERS = {
   sets: "Sites that relax together",
   faults: "Faults of the lattice",
 };
-const JOBS = {
-  synth: ["More of the texture", "Make the texture"],
-  extend: ["A seamless picture", "Make it seamless"],
-  fill: ["A filled hole", "Fill the hole"],
-  classify: ["A classification by texture", "Classify the picture"],
-}; // what the page calls them, and their button
+const TASKS = {
+  more: { job: "synth", place: "make", label: "More of the texture", run: "Make the texture" },
+  seamless: { job: "extend", place: "make", label: "A seamless picture", run: "Make it seamless" },
+  hole: { job: "fill", place: "paint", label: "A hole to fill", run: "Fill the hole" },
+  guide: { job: "synth", place: "paint", label: "A guide: what goes where", run: "Make the texture" },
+  classes: { job: "classify", place: "paint", label: "Classes of a picture", run: "Classify the picture" },
+};
+const PLACES = { make: "Make", paint: "Paint", why: "Why" };
 const PICTURE_LAYERS = ["sample", "labels"]; // which show the picture itself
 const SIDES = ["left", "top", "width", "height"];
 const MAX_PIXELS = 2 ** 22; // of a frame
@@ -68,7 +70,7 @@ class Socket {
   }
 
   send(message, buffers = []) {
-    if (this.socket.readyState !== WebSocket.OPEN) return;
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
     this.socket.send(JSON.stringify({ ...message, buffers: buffers.map((buffer) => buffer.length) }));
     for (const buffer of buffers)
       for (let begin = 0; begin < buffer.length; begin += PIECE) this.socket.send(buffer.subarray(begin, begin + PIECE));

@@ -4,15 +4,34 @@
 
 let count = 0;
 
-/** An element with attributes, listeners (`onclick`) and children. */
+/** Make fields of an object signals: an effect that reads one runs again after it is set. */
+function observe(object, fields) {
+  for (const [name, first] of Object.entries(fields)) {
+    const held = signal(first);
+    Object.defineProperty(object, name, { get: () => held.value, set: (value) => (held.value = value), configurable: true });
+  }
+}
+
+/** Set an attribute, which null removes and a boolean toggles, or the state of a control. */
+function assign(element, name, value) {
+  if (name === "style") element.style.cssText = value;
+  else if (["value", "checked"].includes(name) && value !== null) element[name] = value;
+  else if (typeof value === "boolean") element.toggleAttribute(name, value);
+  else if (value === undefined || value === null) element.removeAttribute(name);
+  else element.setAttribute(name, value);
+}
+
+/** An element with attributes, listeners (`onclick`) and children. A function in place of a value or of all children is an effect. */
 function make(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
+  const [first] = children;
+  if (typeof first === "function") effect(() => element.replaceChildren(...[first()].flat().filter((child) => child !== null)));
+  else element.append(...children.filter((child) => child !== null && child !== undefined));
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (typeof value === "boolean") element.toggleAttribute(name, value);
-    else if (value !== undefined && value !== null) element.setAttribute(name, value);
+    else if (typeof value === "function") effect(() => assign(element, name, value()));
+    else assign(element, name, value);
   }
-  element.append(...children.filter((child) => child !== null && child !== undefined));
   // JupyterLab asks the element with the focus alone whether keys are its own
   if (CONTROLS.includes(tag) || "tabindex" in attributes) element.dataset.lmSuppressShortcuts = "true";
   return element;
@@ -34,7 +53,7 @@ const number = (attributes) => make("input", { type: "number", step: 1, ...attri
 const checkbox = (attributes) => make("input", { type: "checkbox", ...attributes });
 const bar = (...children) => make("div", { class: "bar" }, ...children);
 const choices = (pairs) => pairs.map(([value, text]) => make("option", { value }, text));
-const choice = (pairs, onchange) => make("select", { onchange }, ...choices(pairs));
+const choice = (pairs, onchange, attributes = {}) => make("select", { onchange, ...attributes }, ...choices(pairs));
 const made = (layers) => layers.find((name) => name !== "sample") ?? "sample";
 const stem = (name) => name.replace(/\.[^.]*$/, "").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 40); // as simdtex names a map
 const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}.`;
@@ -78,72 +97,47 @@ function drag(element, event, move, end) {
 
 // -- options ------------------------------------------------------------------------------------------------------
 
-/** The controls of a method, made from the options' declarations. */
+const FIRST = ["order", "structure", "balance", "finish", "light", "alpha", "iterations", "coupling", "weight", "unknown"];
+
+/** The controls of a method, made from the options' declarations: those of the first need, and all others by group. */
 class Options {
   constructor(controls, onchange) {
     this.controls = controls;
-    this.fields = new Map();
-    const groups = new Map();
-    for (const control of controls) {
-      if (!groups.has(control.group)) {
-        groups.set(control.group, make("details", {}, make("summary", {}, control.group)));
-      }
-      groups.get(control.group).append(this.field(control, onchange));
-    }
-    this.element = make("div", {}, ...groups.values());
+    this.onchange = onchange;
+    observe(this, { values: {} }); // the options that differ from their defaults
+    const groups = Map.groupBy(controls.filter(({ name }) => !FIRST.includes(name)), ({ group }) => group);
+    const fields = (shown) => shown.map((control) => this.field(control));
+    this.first = make("div", {}, ...fields(FIRST.flatMap((name) => controls.filter((one) => one.name === name))));
+    const others = [...groups].map(([group, shown]) => make("fieldset", {}, make("legend", {}, group), ...fields(shown)));
+    this.others = make("div", {}, ...others);
   }
 
-  field(control, onchange) {
-    const { name, label, hint } = control;
-    if (control.kind === "words" || control.kind === "switch") {
-      const input = control.kind === "words" ? choice(control.valid, onchange) : checkbox({ onchange });
-      const property = control.kind === "words" ? "value" : "checked";
-      this.fields.set(name, { get: () => input[property], set: (value) => (input[property] = value ?? false) });
-      this.fields.get(name).set(control.default);
-      return labelled(label, input, hint);
-    }
-    const [least, most, step] = control.span;
-    const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange });
+  field(control) {
+    const { name, label, hint, kind, valid, span } = control;
+    const value = () => this.values[name] ?? control.default;
+    const set = (given) => {
+      const { [name]: before, ...others } = this.values;
+      this.values = given === null || given === control.default ? others : { ...others, [name]: given };
+      this.onchange();
+    };
+    if (kind === "words") return labelled(label, choice(valid, ({ target }) => set(target.value), { value }), hint);
+    if (kind === "switch") return labelled(label, checkbox({ onchange: ({ target }) => set(target.checked), checked: value }), hint);
+    const [least, most, step] = span;
     const usual = control.usual ?? least;
+    const onchange = ({ target }) => {
+      set(target.value === "" ? null : Number(target.value));
+      target.value = value() ?? ""; // also if that is as before
+    };
+    const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange, value: () => value() ?? "" });
     const mark = make("datalist", { id: `simdtex-${++count}` }, make("option", { value: usual }));
-    const attributes = { type: "range", min: least, max: most, step, list: mark.id, title: "Double-click for the default" };
-    const slider = make("input", { ...attributes, "aria-label": `${label}, slider` });
-    const note = make("small", { class: "beyond", role: "status" });
-    const follow = () => {
-      slider.value = input.value === "" ? usual : input.value;
-      slider.classList.toggle("automatic", input.value === "");
-      const beyond = Number(input.value) > most;
-      note.textContent = beyond ? `More than ${most}: a run can take many times as long, or need too much memory.` : "";
-    };
-    slider.addEventListener("input", () => {
-      input.value = slider.value;
-      follow();
+    const slider = make("input", {
+      ...{ type: "range", min: least, max: most, step, list: mark.id, title: "Double-click for the default", "aria-label": `${label}, slider` },
+      ...{ value: () => value() ?? usual, class: () => (value() === null ? "automatic" : null) },
+      ...{ onchange: () => set(Number(slider.value)), oninput: () => (input.value = slider.value), ondblclick: () => set(null) },
     });
-    slider.addEventListener("change", onchange);
-    slider.addEventListener("dblclick", () => {
-      set(control.default);
-      onchange();
-    });
-    input.addEventListener("input", follow);
-    const get = () => (input.value === "" ? null : Number(input.value));
-    const set = (value) => {
-      input.value = value ?? "";
-      follow();
-    };
-    this.fields.set(name, { get, set });
-    set(control.default);
+    const beyond = () => (value() > most ? `More than ${most}: a run can take many times as long, or need too much memory.` : "");
     const field = labelled(label, input, hint);
-    input.after(slider, mark, note);
+    input.after(slider, mark, make("small", { class: "beyond", role: "status" }, beyond));
     return field;
-  }
-
-  /** The options that differ from their defaults. */
-  get values() {
-    const values = this.controls.map(({ name, default: usual }) => [name, this.fields.get(name).get() ?? usual, usual]);
-    return Object.fromEntries(values.filter(([, value, usual]) => value !== usual));
-  }
-
-  set values(given) {
-    for (const control of this.controls) this.fields.get(control.name).set(given[control.name] ?? control.default);
   }
 }

@@ -28,7 +28,7 @@ class Inside {
   constructor(page) {
     this.page = page;
     this.sweeps = [];
-    this.at = null; // [sweep, sets], null for the result
+    observe(this, { at: null }); // [sweep, sets], null for the result
     this.goal = null; // the moment that was asked for last, as `at`
     this.waiting = this.late = false; // whether a moment is on its way, and whether the goal is another one
     this.pixel = null; // [row, column]
@@ -74,10 +74,7 @@ class Inside {
 
   toggled() {
     if (this.element.open) this.look(this.beside);
-    else {
-      this.close();
-      this.page.offerLayers();
-    }
+    else this.close();
   }
 
   /** Ask for the run of the selected result, and of the one beside it. */
@@ -163,7 +160,6 @@ class Inside {
     this.setRange.value = sets;
     this.moment.textContent = moment ? this.describe(number, sets) : "The result.";
     this.sweepRange.setAttribute("aria-valuetext", this.moment.textContent);
-    this.page.offerLayers();
   }
 
   describe(number, sets) {

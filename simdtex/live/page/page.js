@@ -2,25 +2,31 @@
 
 // -- the page -----------------------------------------------------------------------------------------------------
 
+/** The state of a page, what it shows, and the messages that change it. */
 class Page {
   constructor(root, connection) {
     this.connection = connection;
-    this.results = new Map();
-    this.shown = null; // the number of the selected result
-    this.picture = null;
+    observe(this, {
+      ...{ place: "make", task: "more", method: "mrf", width: 256, height: 256, seed: 1, auto: true },
+      ...{ picture: null, maps: [], part: null }, // the part of the picture that is the sample
+      ...{ results: new Map(), shown: null, running: false, paused: false, runLayers: ["sample"] }, // the number of the shown result
+      ...{ wanted: "picture", seen: null, tiled: false, latticeShown: false }, // the layers that is asked for, and that came
+      ...{ said: "Connecting …", warned: "", hint: "", doing: "", progress: 0, device: "", choosing: false },
+      ...{ colours: [], examples: [], ready: false },
+    });
     this.given = this.pending = null; // the file and its maps, to give them again to a server that was started anew
     this.session = connection.key;
-    this.guide = { sample: [], output: [] };
-    this.hole = [];
-    this.part = null; // the region of the picture that is the sample
-    this.layer = "picture"; // that is asked for; the frame's own is `seen`
-    this.tiled = false;
-    this.running = this.paused = false;
+    this.seeds = []; // of the runs that follow
+    this.last = { make: "more", paint: "hole" }; // the task of each place
+    this.painting = new Painting(this);
+    this.inside = new Inside(this);
+    this.view = new View(this);
+    this.lecture = new Lecture(this);
     this.build(root);
     this.awaited = new Map();
     connection.onmessage = (message, buffers) => {
       const handler = `on_${message.kind}`;
-      (this[handler] ? this : this.inside)[handler]?.(message, buffers);
+      batch(() => (this[handler] ? this : this.inside)[handler]?.(message, buffers));
       this.awaited.get(message.kind)?.(message);
       this.awaited.delete(message.kind);
     };
@@ -29,7 +35,7 @@ class Page {
   }
 
   send(message, buffers) {
-    this.connection.send(message, buffers);
+    if (this.open) this.connection.send(message, buffers);
   }
 
   /** Wait for the next message of a kind. */
@@ -37,96 +43,82 @@ class Page {
     return new Promise((done) => this.awaited.set(kind, done));
   }
 
-  build(root) {
-    this.view = null;
-    this.status = make("p", { role: "status", class: "status" }, "Connecting …");
-    this.alert = make("p", { role: "alert", class: "alert", hidden: true });
-    this.device = make("p", { class: "device" });
-    const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
-    this.columns = make("div", { class: "columns", hidden: true }, this.resultSection(), side);
-    this.lecture = new Lecture(this);
-    const lecture = button("Lecture: why this pixel?", (event) => this.lecture.start(event.currentTarget));
-    const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, lecture, this.status);
-    this.root = make("main", { class: "simdtex", tabindex: -1 }, header, this.alert, this.startSection(), this.columns, this.lecture.element);
-    root.replaceChildren(this.root);
-    this.root.addEventListener("dragover", (event) => event.preventDefault());
-    this.root.addEventListener("drop", (event) => {
-      event.preventDefault();
-      this.open(event.dataTransfer.files[0], event.target.closest?.(".maps") ? "map" : "open");
-    });
-    this.paste = (event) => this.open(event.clipboardData?.files[0], "open");
-    (root.id === "simdtex-live" ? document : this.root).addEventListener("paste", this.paste);
+  // -- state that follows from other state
+
+  get job() {
+    return TASKS[this.task].job;
   }
 
-  // -- sample
-
-  /** What the page begins with. */
-  startSection() {
-    this.examples = make("div", { class: "examples" });
-    this.demo = make("canvas", { class: "demo", width: 1, height: 1, role: "img", "aria-label": "A run: large shapes settle first." });
-    this.start = make(
-      "section",
-      { "aria-label": "Start", class: "start" },
-      this.demo,
-      make("h2", {}, "Drop a picture of a texture here"),
-      make("p", {}, "or paste one, or choose a file:"),
-      this.fileInput("A picture", "open"),
-      make("p", {}, "or try an example:"),
-      this.examples,
-    );
-    return this.start;
+  get found() {
+    return this.results.get(this.shown);
   }
 
-  sampleSection() {
-    this.preview = make("canvas", { class: "preview", role: "img", "aria-label": "There is no picture yet." });
-    this.preview.addEventListener("pointerdown", (event) => this.drawPart(event));
-    this.partFields = SIDES.map(() => number({ min: 0, onchange: () => this.typePart() }));
-    this.partSet = make(
-      "fieldset",
-      { class: "part" },
-      make("legend", {}, "Pixels"),
-      ...this.partFields.map((input, index) => labelled(SIDES[index][0].toUpperCase() + SIDES[index].slice(1), input)),
-      button("Whole picture", () => this.setPart(null)),
-    );
-    this.finger = button("Choose a part with a finger", () => this.chooseByFinger(!this.choosing), { class: "finger" });
-    const typed = make("details", {}, make("summary", {}, "The part that is the sample"), this.finger, this.partSet);
-    this.mapList = make("ul");
-    this.maps = make(
-      "details",
-      { class: "maps" },
-      make("summary", {}, "Further maps of the material"),
-      make("p", {}, "Normal, height, roughness: each is arranged as the picture is."),
-      this.fileInput("A further map", "map"),
-      this.mapList,
-    );
-    this.named = make("p", { class: "named" });
-    const parts = [make("h2", {}, "Sample"), this.named, this.fileInput("Another picture", "open"), this.preview, typed];
-    return make("section", { "aria-label": "Sample", class: "sample" }, ...parts, this.maps);
+  /** Whether the run is shown. */
+  get watching() {
+    return this.running && this.shown === null;
   }
 
-  fileInput(label, kind) {
-    const input = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy,.json", "aria-label": label });
-    input.addEventListener("change", () => {
-      this.open(input.files[0], kind);
-      input.value = "";
-    });
-    return input;
+  /** The layers of what is shown. */
+  get layers() {
+    const layers = this.found?.layers ?? (this.running ? this.runLayers : ["sample"]);
+    return this.inside.at ? [...layers, "sets"] : layers;
   }
 
-  async open(file, kind) {
-    if (!file) return;
-    if (this.bytes && file.size > this.bytes) {
-      this.warn(`The file has ${file.size} bytes and at most ${this.bytes} are taken; give a smaller one.`);
+  get layer() {
+    return this.layers.includes(this.wanted) ? this.wanted : made(this.layers);
+  }
+
+  /** The lattice that is drawn over the result; null if none is. */
+  get lattice() {
+    return this.latticeShown ? (this.found?.lattice ?? null) : null;
+  }
+
+  /** Columns and rows of the shown texture that its lattice fits; null if it has them. */
+  get fitting() {
+    const [rows, cols] = this.found?.lattice?.fitting ?? [];
+    const { settings, width, height } = this.found ?? {};
+    return settings?.job !== "synth" || !rows || (rows === height && cols === width) ? null : [cols, rows];
+  }
+
+  /** The controls of the method, or of a job that has its own; null before simdtex has told them. */
+  get controls() {
+    return this.ready ? this.options[this.job === "synth" ? this.method : this.job] : null;
+  }
+
+  /** Whether the result has no seam where it repeats. */
+  get tiles() {
+    const { job, method, options } = this.found?.settings ?? {};
+    const boundary = this.ready && this.options[method]?.controls.find(({ name }) => name === "boundary");
+    return job === "extend" || (job === "synth" && (!boundary || (options.boundary ?? boundary.default) === "torus"));
+  }
+
+  /** The classes of a result and their shares; before there is one, the classes that are painted. */
+  get classes() {
+    if (this.found?.shares.length || this.task !== "classes") return this.found?.shares ?? [];
+    return [...new Set(this.painting.strokes.sample.map(({ label }) => label))].filter(Boolean).sort().map((label) => [label, null]);
+  }
+
+  // -- the picture
+
+  /** Take files: one picture, the maps of one material, further maps of the picture, or a saved view. */
+  async take(files, kind) {
+    const taken = [...(files ?? [])];
+    if (!taken.length) return;
+    const large = taken.find(({ size }) => this.bytes && size > this.bytes);
+    if (large) {
+      this.warn(`${large.name} has ${large.size} bytes and at most ${this.bytes} are taken; give a smaller one.`);
       return;
     }
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    const name = file.name || "pasted.png";
-    if (kind === "open" && name.endsWith(".json")) {
-      await this.restoreView(bytes);
-      return;
+    this.busy(`Reading ${taken[0].name || "the picture"} …`);
+    const read = taken.map(async (file) => ({ name: file.name || "pasted.png", bytes: new Uint8Array(await file.arrayBuffer()) }));
+    const found = await Promise.all(read);
+    if (kind === "map") for (const map of found) this.giveMap(map);
+    else if (found[0].name.endsWith(".json")) await this.restoreView(found[0].bytes);
+    else {
+      this.send({ kind: "lead", names: found.map(({ name }) => name) });
+      const [lead] = found.length > 1 ? found.splice((await this.next("lead")).place, 1) : found.splice(0, 1);
+      this.give({ ...lead, maps: new Map(found.map((map) => [stem(map.name), map])) });
     }
-    if (kind === "open") this.give({ name, bytes, maps: new Map() });
-    else this.giveMap({ name, bytes });
   }
 
   /** Give a picture, an example if it has no bytes, and its maps, which are kept in case the server is started anew. */
@@ -146,15 +138,9 @@ class Page {
   on_picture(message, [bytes]) {
     const before = this.picture;
     const same = before && ["name", "width", "height"].every((key) => before[key] === message[key]);
-    this.picture = message;
     this.small = bitmap(bytes, ...message.preview);
-    [this.preview.width, this.preview.height] = message.preview;
-    this.preview.setAttribute("aria-label", `${message.name}, ${message.width} by ${message.height} pixels. Drag over it to choose the part that is the sample.`);
-    const more = message.more ? ". The file has further frames or pages; this is the first." : "";
-    this.named.textContent = `${message.name}, ${message.width} × ${message.height}, ${message.values}${more}`;
-    this.start.hidden = true;
-    this.columns.hidden = false;
-    this.listMaps(message.maps);
+    this.picture = message;
+    this.maps = message.maps;
     this.setPart(same && !message.new ? this.part : message.part, false);
     if (!message.new) {
       if (message.settings && !before) this.restore(message.settings); // else the page has its own, perhaps later ones
@@ -164,315 +150,239 @@ class Page {
     this.pending = null;
     if (this.refused) for (const options of Object.values(this.options)) options.values = {};
     this.refused = false;
-    this.offerFiles(false);
-    this.doing.textContent = "";
-    this.guide = { sample: [], output: [] };
-    this.hole = [];
-    this.mark(this.shown, false);
+    this.seeds = [];
+    this.doing = "";
+    this.painting.restore();
     this.shown = null;
+    this.progress = 0;
     this.say("Ready.");
     if (this.again) this.restore(this.again);
-    else {
-      [this.width.value, this.height.value] = message.size;
-    }
+    else [this.width, this.height] = message.size;
     this.again = null;
-    this.showJob();
-    if (this.job.value !== "fill") this.make();
-    if (["fill", "classify"].includes(this.job.value)) this.showLayer("sample");
+    if (this.task !== "hole") this.make();
+    if (["hole", "classes"].includes(this.task)) this.showLayer("sample");
   }
 
   /** The part, also where it is the whole picture. */
   get wholePart() {
-    return this.part ?? [0, 0, this.picture.width, this.picture.height];
+    return this.part ?? [0, 0, this.picture?.width ?? 0, this.picture?.height ?? 0];
   }
 
   setPart(part, run = true) {
-    const { width, height, preview } = this.picture;
-    this.part = part && part[2] === width && part[3] === height ? null : part;
-    this.partFields.forEach((input, index) => (input.value = this.wholePart[index]));
-    const context = this.preview.getContext("2d");
-    context.drawImage(this.small, 0, 0);
-    if (this.part) {
-      const scale = preview[0] / width;
-      const [x, y, w, h] = this.part.map((one) => one * scale);
-      context.fillStyle = "#0009";
-      context.fillRect(0, 0, ...preview);
-      context.drawImage(this.small, x, y, w, h, x, y, w, h);
-    }
-    if (run) this.changed();
-  }
-
-  typePart() {
     const { width, height } = this.picture;
-    const [x, y, w, h] = this.partFields.map((input) => Math.round(Number(input.value)));
-    const [across, down] = [clamp(w, Math.min(8, width), width), clamp(h, Math.min(8, height), height)];
-    this.setPart([clamp(x, 0, width - across), clamp(y, 0, height - down), across, down]);
-  }
-
-  drawPart(event) {
-    if (!this.picture || event.button !== 0 || (event.pointerType === "touch" && !this.choosing)) return;
-    const box = this.preview.getBoundingClientRect();
-    const place = (now) => [
-      Math.round(clamp((now.clientX - box.left) / box.width, 0, 1) * this.picture.width),
-      Math.round(clamp((now.clientY - box.top) / box.height, 0, 1) * this.picture.height),
-    ];
-    const [x, y] = place(event);
-    const before = this.part;
-    const move = (now) => {
-      const [toX, toY] = place(now);
-      const part = [Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)];
-      if (part[2] >= 8 && part[3] >= 8) this.setPart(part, false);
-    };
-    drag(this.preview, event, move, () => {
-      this.chooseByFinger(false);
-      if (this.part !== before) this.changed();
-    });
+    this.part = part && part[2] === width && part[3] === height ? null : part;
+    if (run) this.changed();
   }
 
   /** Let a finger on the preview choose the part, or scroll the page. */
   chooseByFinger(choosing) {
     this.choosing = choosing;
-    this.preview.style.touchAction = choosing ? "none" : "auto";
-    this.finger.setAttribute("aria-pressed", `${choosing}`);
   }
 
   on_maps({ names }) {
-    this.listMaps(names);
+    this.progress = 0;
+    this.doing = "";
+    this.maps = names;
     if (names.length && (this.shown !== null || this.running)) this.make();
   }
 
-  listMaps(names) {
-    const unmap = (name) => {
-      this.given?.maps.delete(name);
-      this.send({ kind: "unmap", name });
-    };
-    const remove = (name) => button("×", () => unmap(name), { "aria-label": `Remove ${name}` });
-    this.mapList.replaceChildren(...names.map((name) => make("li", {}, `${name} `, remove(name))));
+  removeMap(name) {
+    this.given?.maps.delete(name);
+    this.send({ kind: "unmap", name });
   }
 
-  // -- result
-
-  resultSection() {
-    this.view = new View(this);
-    this.inside = new Inside(this);
-    this.layerChoice = choice(Object.entries(LAYERS), () => this.showLayer(this.layerChoice.value));
-    this.tiling = checkbox({
-      onchange: () => {
-        this.tiled = this.tiling.checked;
-        this.view.fit();
-      },
-    });
-    this.zoomOutput = make("output", { "aria-label": "Zoom" }, "100 %");
-    const zoom = [
-      button("−", () => this.view.zoom(-1), { "aria-label": "Zoom out" }),
-      this.zoomOutput,
-      button("+", () => this.view.zoom(1), { "aria-label": "Zoom in" }),
-      button("Fit", () => this.view.fit()),
-    ];
-    this.latticeShown = checkbox({ onchange: () => this.view.draw() });
-    this.fitting = button("", () => this.useFitting(), { hidden: true, class: "fitting" });
-    this.latticeField = labelled("Lattice", this.latticeShown);
-    const tiled = labelled("Tiled 3 × 3", this.tiling);
-    const layer = labelled("Layer", this.layerChoice);
-    const shown = bar(bar(...zoom), layer, tiled, this.latticeField, this.fitting); // what changes its width comes last
-    this.scale = make("span", { class: "scale", "aria-hidden": "true" });
-    this.meaning = make("span");
-    this.legend = make("p", { class: "legend", hidden: true }, this.scale, this.meaning);
-    this.classes = make("ul", { class: "classes", "aria-label": "Classes", hidden: true });
-    this.hint = make("p", { role: "status", class: "hint" });
-    this.progress = make("progress", { max: 1, value: 0, "aria-label": "Progress" });
-    this.doing = make("p", { class: "doing" });
-    this.pausing = button("Pause", () => this.pause(), { disabled: true });
-    this.cancelling = button("Cancel", () => this.send({ kind: "cancel" }), { disabled: true });
-    this.current = button("Current run", () => this.send({ kind: "select", result: null }));
-    this.currentItem = make("li", { class: "current", hidden: true }, this.current);
-    this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
-    this.files = bar();
-    this.archive = make("p");
-    this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
-    this.downloads = make("section", { "aria-label": "Download" }, make("h3", {}, "Download"), this.files);
-    const copying = button("Copy the command line", () => this.copy(this.command.textContent));
-    this.recipe = make("section", { "aria-label": "The same bytes again" }, this.archive, this.command, copying);
-    return make(
-      "section",
-      { "aria-label": "Result", class: "result" },
-      make("h2", {}, "Result"),
-      shown,
-      make("div", { class: "stage" }, this.view.element, make("div", { class: "kept" }, this.strip, this.downloads)),
-      this.legend,
-      this.hint,
-      this.classes,
-      bar(this.pausing, this.cancelling, this.progress),
-      this.doing,
-      this.inside.element,
-      this.paintSet(),
-      this.recipe,
-    );
-  }
-
-  /** Show or hide the files of a result; their place stays, so that nothing moves. */
-  offerFiles(shown) {
-    for (const one of [this.downloads, this.recipe]) one.style.visibility = shown ? "" : "hidden";
-  }
+  // -- runs and results
 
   showLayer(layer) {
-    this.layer = this.layerChoice.value = layer;
-    this.view.moved();
-    this.view.ask();
+    this.wanted = layer;
   }
 
-  /** Show what the run began from while a key is held, then the layer again. */
-  before(held) {
-    if (held === Boolean(this.held)) return;
-    const layer = held ? "sample" : this.held;
-    this.held = held ? this.layer : null;
-    this.showLayer(layer);
+  /** The tasks of a place, for a list of choices. */
+  tasks(place) {
+    return Object.entries(TASKS).filter(([, one]) => one.place === place).map(([name, { label }]) => [name, label]);
   }
 
-  /** The lattice that is drawn over the result; null if none is. */
-  get lattice() {
-    return this.latticeShown.checked ? (this.results.get(this.shown)?.lattice ?? null) : null;
+  go(place) {
+    this.inside.element.open = place === "why";
+    if (place in this.last && TASKS[this.task].place !== place) this.setTask(this.last[place]);
+    this.place = place;
   }
 
-  useFitting() {
-    const [rows, cols] = this.results.get(this.shown).lattice.fitting;
-    [this.width.value, this.height.value] = [cols, rows];
+  setTask(task) {
+    this.place = TASKS[task].place;
+    this.last[this.place] = this.task = task;
+    this.hint = "";
+    if (this.place === "paint" && this.layer === "labels" && task !== "classes") this.showLayer("sample");
+    if (["hole", "guide"].includes(task) && this.shown === null && !this.running) this.showLayer("sample");
+    if (task === "classes" && this.layer !== "labels") this.showLayer("sample");
+    if (!["hole", "guide"].includes(task)) this.changed();
+  }
+
+  setMethod(method) {
+    this.method = method;
+    this.changed();
+  }
+
+  setSize(width, height) {
+    [this.width, this.height] = [width, height];
+    this.changed();
+  }
+
+  reset() {
+    this.controls.values = {};
+    this.changed();
+  }
+
+  newSeed() {
+    this.seed = Math.floor(Math.random() * 2 ** 32);
     this.make();
+  }
+
+  /** Make four results that differ in their seed alone, to choose from. */
+  fourSeeds() {
+    this.seed = Math.floor(Math.random() * 2 ** 32);
+    this.make();
+    this.seeds = [1, 2, 3].map((n) => (this.seed + n) % 2 ** 32);
+  }
+
+  /** Run again, soon, if that is to happen at every change. */
+  changed() {
+    clearTimeout(this.waiting);
+    if (this.auto && this.picture && this.task !== "hole") this.waiting = setTimeout(() => this.make(), 60);
+  }
+
+  make() {
+    if (!this.picture) {
+      this.warn("There is no picture yet; drop one, or choose a file.");
+      return;
+    }
+    const { job, task, method, width, height, seed, part } = this;
+    const { sample, output, hole } = this.painting.strokes;
+    const message = { kind: "make", job, method, width, height, seed, options: this.controls.values };
+    if (task === "hole") Object.assign(message, { hole, of: PICTURE_LAYERS.includes(this.seen) ? null : this.shown });
+    else if (task !== "classes") message.part = part;
+    if (task === "classes" || task === "guide") message.guide = { sample, output };
+    this.seeds = [];
+    this.asked = structuredClone(message);
+    this.busy("Preparing the run …");
+    this.send(message);
+  }
+
+  /** Show the settings of a result. */
+  restore(settings) {
+    const { job, guide, method, width, height, seed, options } = settings;
+    this.task = this.taskOf(settings);
+    this.last[TASKS[this.task].place] = this.task;
+    if (this.place !== "why") this.place = TASKS[this.task].place;
+    if (job === "synth") [this.method, this.width, this.height] = [method, width, height];
+    this.seed = seed;
+    this.controls.values = options;
+    this.setPart(settings.part ?? null, false);
+    this.painting.restore({ guide, hole: settings.hole });
+  }
+
+  taskOf({ job, guide }) {
+    return Object.keys(TASKS).find((task) => TASKS[task].job === job && (task === "guide") === Boolean(job === "synth" && guide));
+  }
+
+  /** What differs between the settings of two runs, in words. */
+  differences(before, after) {
+    const task = this.taskOf(after);
+    if (!before || this.taskOf(before) !== task) return TASKS[task].label;
+    const { controls } = this.options[after.job === "synth" ? after.method : after.job];
+    const said = after.job === "synth" && before.method !== after.method ? [after.method] : [];
+    for (const { name, label, default: usual } of said.length ? [] : controls) {
+      const [from, to] = [before, after].map(({ options }) => options[name] ?? usual ?? "automatic");
+      if (from !== to) said.push(`${label} ${from} to ${to}`);
+    }
+    if (before.width !== after.width || before.height !== after.height) said.push(`${after.width} × ${after.height}`);
+    const other = (field) => JSON.stringify(before[field] ?? null) !== JSON.stringify(after[field] ?? null);
+    said.push(...["part", "guide", "hole"].filter(other).map((field) => `another ${field}`));
+    if (before.seed !== after.seed) said.push(`seed ${after.seed}`);
+    return said.join(", ") || "the same again";
   }
 
   on_frame(message, [bytes]) {
     this.send({ kind: "shown" });
-    if (message.pane) {
-      this.view.show(message, bytes);
-      return;
-    }
-    this.seen = message.layer;
-    this.meaning.textContent = LEGENDS[message.layer] ?? "";
-    this.legend.hidden = !LEGENDS[message.layer];
-    this.scale.hidden = !["use", "temperature"].includes(message.layer);
+    if (!message.pane) this.seen = message.layer;
     this.view.show(message, bytes);
     if (message.of === "run") this.frames += 1;
   }
 
   on_progress({ fraction, doing }) {
-    this.progress.value = fraction;
-    if (this.watching) this.doing.textContent = doing;
-  }
-
-  /** Offer the layers of what is shown. */
-  offerLayers() {
-    const found = this.results.get(this.shown);
-    const layers = [...(found?.layers ?? (this.running ? this.runLayers : ["sample"]))];
-    if (this.inside.at) layers.push("sets");
-    const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
-    this.layerChoice.replaceChildren(...choices(layers.map((name) => [name, text(name)])));
-    if (!layers.includes(this.layer)) this.showLayer(made(layers));
-    this.layerChoice.value = this.layer;
-    this.fitting.disabled = !found;
-    if (!found && this.running) return; // the controls stay where they are during a run
-    this.latticeField.hidden = !found?.lattice;
-    const [rows, cols] = found?.lattice?.fitting ?? [found?.height, found?.width];
-    this.fitting.hidden = !found || found.settings.job !== "synth" || (rows === found.height && cols === found.width);
-    this.fitting.textContent = `Use ${cols} × ${rows}, which fits`;
+    this.progress = fraction;
+    if (this.watching) this.doing = doing;
   }
 
   on_begun(message) {
+    const before = this.layer;
     this.runLayers = message.layers;
     this.frames = 0;
-    this.progress.value = 0;
-    this.alert.hidden = true;
+    this.progress = null;
+    this.warned = this.hint = "";
+    this.doing = "Preparing the sample.";
     this.refused = false;
-    this.hint.textContent = this.doing.textContent = "";
-    this.setRunning(true);
+    [this.running, this.paused] = [true, false];
     this.select(null);
     this.say(message.from === null ? "Running." : `Continuing after level ${message.from}.`);
-    if (this.layer === "sample") this.showLayer(made(message.layers));
+    if (before === "sample") this.showLayer(made(message.layers));
   }
 
   on_hint({ text }) {
-    this.alert.hidden = true;
-    this.hint.textContent = sentence(text);
+    this.warned = "";
+    this.progress = 0;
+    this.doing = "";
+    this.hint = sentence(text);
   }
 
   on_ended() {
-    this.setRunning(false);
+    [this.running, this.progress] = [false, 0];
     this.say("Cancelled.");
   }
 
   on_result(message, [bytes]) {
-    const { result, width, height, settings, picture } = message;
-    this.setRunning(false);
-    this.progress.value = 1;
-    this.results.set(result, message);
-    const dropped = message.dropped.filter((number) => this.results.has(number));
-    for (const number of dropped) {
-      this.results.get(number).item.remove();
-      this.results.delete(number);
-    }
-    message.button = button(bitmap(bytes, ...message.thumbnail), () => this.send({ kind: "select", result }), { title: `From ${picture}` });
-    message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
-    message.item = make("li", {}, message.button);
-    this.currentItem.before(message.item);
-    this.strip.scrollTo(this.strip.scrollWidth, this.strip.scrollHeight);
-    const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
-    this.say(`Result ${result} is ready${this.shown === null ? "" : `; result ${this.shown} is shown`}.${gone}`);
-    if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
+    const { result, dropped } = message;
+    [this.running, this.progress] = [false, 1];
+    const results = new Map(this.results).set(result, { ...message, thumbnail: bitmap(bytes, ...message.thumbnail) });
+    const gone = dropped.filter((number) => results.delete(number));
+    this.results = results;
+    const words = gone.length ? ` Result ${gone.join(", ")} is no longer kept, to save memory.` : "";
+    this.say(`Result ${result} is ready${this.shown === null ? "" : `; result ${this.shown} is shown`}.${words}`);
+    const [next, ...others] = this.seeds;
+    if (next === undefined) return;
+    this.seed = next;
+    this.make();
+    this.seeds = others;
+  }
+
+  forget(result) {
+    const results = new Map(this.results);
+    results.delete(result);
+    this.results = results;
+    this.send({ kind: "forget", result });
   }
 
   on_selected({ result, settings }) {
     this.select(result);
     if (settings) this.restore(settings);
-    const found = this.results.get(result);
+    const { found } = this;
     if (!found) {
-      this.doing.textContent = "";
-      this.view.canvas.setAttribute("aria-label", "The run, or the sample.");
-      if (this.running) this.say(this.paused ? "Paused." : "Running.");
+      if (!this.running) this.doing = "";
+      else this.say(this.paused ? "Paused." : "Running.");
       return;
     }
-    if (!this.status.textContent.startsWith(`Result ${result} is ready`)) this.say(`Result ${result} is shown.`);
-    if (!settings && found.settings.job === "fill") this.hole = [];
+    if (!this.said.startsWith(`Result ${result} is ready`)) this.say(`Result ${result} is shown.`);
+    if (!settings && found.settings.job === "fill") this.painting.change({ ...this.painting.strokes, hole: [] });
     const { width, height, seconds, note } = found;
     const size = `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${found.settings.seed}`;
-    this.doing.textContent = (note ? `${size}. ${note}` : size).replace(/\.?$/, ".");
-    this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.doing.textContent} Arrow keys move, plus and minus zoom, 0 fits.`);
-    this.command.textContent = found.command;
-    const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
-    this.files.replaceChildren(...found.files.map(download));
-    this.archive.textContent = `This line makes the same bytes from the files in ${found.files.at(-1)}:`;
+    this.doing = (note ? `${size}. ${note}` : size).replace(/\.?$/, ".");
   }
 
-  /** Mark a result, or the present run, as the one that is shown. */
+  /** Show a result, or the run. */
   select(result) {
-    this.mark(this.shown, false);
     this.shown = result;
-    this.mark(result, true);
-    const found = this.results.get(result);
-    this.offerFiles(Boolean(found));
     this.inside.close();
-    this.offerLayers();
     this.inside.look();
-    this.showClasses();
-  }
-
-  /** Show the classes of a result and their shares; before there is one, the classes that are painted. */
-  showClasses() {
-    const painted = [...new Set(this.guide.sample.map(({ label }) => label))].filter(Boolean).sort();
-    const found = this.results.get(this.shown)?.shares ?? [];
-    const classes = found.length || this.job.value !== "classify" ? found : painted.map((label) => [label, null]);
-    const item = ([label, share]) => {
-      const swatch = make("span", { class: "swatch", "aria-hidden": "true" });
-      swatch.style.background = this.colours[label];
-      const name = label ? `Label ${label}` : "Unknown";
-      return make("li", {}, swatch, share === null ? name : `${name}: ${(100 * share).toFixed(1)} %`);
-    };
-    this.classes.replaceChildren(...classes.map(item));
-    this.classes.hidden = !classes.length;
-  }
-
-  mark(result, current) {
-    const marked = result === null ? this.current : this.results.get(result)?.button;
-    if (current) marked?.setAttribute("aria-current", "true");
-    else marked?.removeAttribute("aria-current");
   }
 
   on_file({ name }, [bytes]) {
@@ -524,7 +434,7 @@ class Page {
     const numbers = [];
     for (const settings of [...runs].reverse()) {
       this.restore(settings);
-      this.last = structuredClone(settings);
+      this.asked = structuredClone(settings);
       this.send({ ...settings, kind: "make" });
       numbers.unshift((await this.next("result")).result);
     }
@@ -538,7 +448,7 @@ class Page {
       this.inside.seek(this.inside.sweeps.findIndex((one) => one[0] === moment[0] && one[1] === moment[1]), moment[2]);
       await this.next("moments");
     }
-    this.tiling.checked = this.tiled = saved.tiled;
+    this.tiled = saved.tiled;
     Object.assign(this.view, { left: saved.left, top: saved.top, unit: saved.unit, fitted: false });
     this.showLayer(saved.layer);
     if (saved.pixel) this.inside.pick(...saved.pixel);
@@ -556,264 +466,44 @@ class Page {
 
   pause() {
     this.send({ kind: this.paused ? "resume" : "pause" });
-    this.setRunning(true, !this.paused);
+    this.paused = !this.paused;
     this.say(this.paused ? "Paused." : "Running.");
   }
 
-  setRunning(running, paused = false) {
-    [this.running, this.paused] = [running, paused];
-    this.pausing.disabled = this.cancelling.disabled = !running;
-    this.pausing.textContent = paused ? "Resume" : "Pause";
-    this.currentItem.hidden = !running;
-  }
-
-  // -- painting
-
-  paintSet() {
-    this.tool = choice([], () => this.chooseTool());
-    this.brushWidth = number({ min: 1, max: 1024, value: 16 });
-    const hint =
-      "Labels are a guide: what has a label on the sample goes where the result has the same. For a classification, paint each texture of the picture with a label of its own. With the keyboard, arrow keys move the brush, and the space bar starts and ends a stroke.";
-    return make(
-      "details",
-      { class: "paint" },
-      make("summary", {}, "Paint a hole, a guide or classes"),
-      bar(
-        labelled("Paint", this.tool),
-        labelled("Brush width, pixels", this.brushWidth),
-        button("Undo", () => this.undo()),
-        button("Clear all", () => this.clear()),
-      ),
-      make("p", {}, hint),
-    );
-  }
-
-  chooseTool() {
-    if (this.tool.value === "hole") this.job.value = "fill";
-    this.showJob();
-  }
-
-  /** The strokes that the tool adds to. */
-  get surface() {
-    if (this.tool.value === "hole" || (this.tool.value === "0" && this.job.value === "fill")) return this.hole;
-    return this.labelStrokes;
-  }
-
-  get labelStrokes() {
-    return this.seen === "sample" || this.job.value === "classify" ? this.guide.sample : this.guide.output;
-  }
-
-  /** Whether the run is shown, which cannot be painted on. */
-  get watching() {
-    return this.running && this.shown === null;
-  }
-
-  get paintable() {
-    if (this.inside.open) return false; // a click explains a pixel
-    if (this.job.value === "classify") return PICTURE_LAYERS.includes(this.seen); // which stays as it is during the run
-    return !this.watching && ["sample", "picture"].includes(this.seen);
-  }
-
-  get brush() {
-    if (!this.tool.value || !this.paintable) return null;
-    const width = Math.max(1, Number(this.brushWidth.value) || 16);
-    const label = this.tool.value === "hole" ? 1 : Number(this.tool.value);
-    const { surface } = this;
-    return {
-      width,
-      begin: (point) => surface.push({ label, width, points: [point] }),
-      add: (point) => surface.at(-1)?.points.push(point),
-      end: () => surface !== this.hole && this.painted(),
-    };
-  }
-
-  /** Run again with labels that have changed. */
-  painted() {
-    this.showClasses();
-    if (this.job.value === "classify" || (this.guide.sample.length && this.guide.output.length)) this.changed();
-  }
-
-  visibleStrokes() {
-    if (!this.paintable) return [];
-    if (this.job.value === "fill") return this.tool.value ? [{ strokes: this.hole, colour: () => HOLE }] : [];
-    const colour = (label) => this.colours[label];
-    const hollow = this.seen === "picture" && Boolean(this.results.get(this.shown)?.settings.guide); // else it is hidden
-    return this.seen === "sample" || this.tool.value ? [{ strokes: this.labelStrokes, colour, hollow }] : [];
-  }
-
-  undo() {
-    this.surface.pop();
-    this.repainted();
-  }
-
-  clear() {
-    this.hole.length = this.guide.sample.length = this.guide.output.length = 0;
-    this.repainted();
-  }
-
-  repainted() {
-    this.view.draw();
-    if (this.job.value === "classify") this.painted();
-  }
-
-  // -- options
-
-  optionsSection() {
-    const onchange = () => this.changed();
-    const jobs = Object.entries(JOBS).map(([name, [label]]) => [name, label]);
-    this.job = choice(jobs, () => {
-      this.showJob();
-      if (this.job.value === "fill") this.startHole();
-      else if (this.job.value === "classify") this.startClasses();
-      else this.changed();
-    });
-    this.method = choice([], () => {
-      this.showJob();
-      this.changed();
-    });
-    this.width = number({ min: 1, max: 16384, value: 256, onchange });
-    this.height = number({ min: 1, max: 16384, value: 256, onchange });
-    this.seed = number({ min: 0, max: 4294967295, value: 1, onchange });
-    this.auto = checkbox({ checked: true });
-    this.makeButton = make("button", { type: "submit", class: "first" }, JOBS.synth[1]);
-    this.size = bar(labelled("Result width", this.width), labelled("Result height", this.height));
-    this.methodField = labelled("Method", this.method);
-    this.controls = make("div");
-    const onsubmit = (event) => {
-      event.preventDefault();
-      this.make();
-    };
-    const form = make(
-      "form",
-      { onsubmit },
-      labelled("Make", this.job),
-      this.methodField,
-      this.size,
-      bar(labelled("Seed", this.seed), button("New seed", () => this.newSeed())),
-      labelled("Run at every change", this.auto),
-      this.makeButton,
-      this.controls,
-      button("Reset the options", () => this.reset()),
-    );
-    return make("section", { "aria-label": "Options", class: "options" }, make("h2", {}, "Options"), form);
-  }
-
-  /** The controls of the method, or of a job that has its own. */
-  get jobOptions() {
-    return this.options[this.job.value === "synth" ? this.method.value : this.job.value];
-  }
-
-  /** Show the controls of the job and the method. */
-  showJob() {
-    this.methodField.hidden = this.size.hidden = this.job.value !== "synth";
-    this.makeButton.textContent = JOBS[this.job.value][1];
-    if (this.options) this.controls.replaceChildren(this.jobOptions.element);
-    if (this.job.value !== "classify") this.hint.textContent = "";
-    this.showClasses();
-    this.view.draw();
-  }
-
-  startHole() {
-    this.tool.value = "hole";
-    this.root.querySelector(".paint").open = true;
-    if (this.layer === "labels" || (this.shown === null && !this.running)) this.showLayer("sample");
-    this.view.draw();
-  }
-
-  startClasses() {
-    if (!(this.tool.value > 0)) this.tool.value = "1";
-    this.root.querySelector(".paint").open = true;
-    if (this.picture && this.layer !== "labels") this.showLayer("sample");
-    this.painted();
-  }
-
-  reset() {
-    this.jobOptions.values = {};
-    this.changed();
-  }
-
-  newSeed() {
-    this.seed.value = Math.floor(Math.random() * 2 ** 32);
-    this.make();
-  }
-
-  changed() {
-    clearTimeout(this.waiting);
-    if (this.auto.checked && this.picture && this.job.value !== "fill") this.waiting = setTimeout(() => this.make(), 60);
-  }
-
-  make() {
-    if (!this.picture) {
-      this.warn("There is no picture yet; drop one, or choose a file.");
-      return;
-    }
-    const job = this.job.value;
-    const [width, height, seed] = [this.width, this.height, this.seed].map((input) => Number(input.value));
-    const message = { kind: "make", job, method: this.method.value, width, height, seed, options: this.jobOptions.values };
-    if (job === "fill") Object.assign(message, { hole: this.hole, of: PICTURE_LAYERS.includes(this.seen) ? null : this.shown });
-    else if (job !== "classify") message.part = this.part;
-    if (job === "classify" || (job === "synth" && this.guide.output.length)) message.guide = this.guide;
-    this.last = structuredClone(message);
-    this.send(message);
-  }
-
-  /** Show the settings of a result. */
-  restore(settings) {
-    this.job.value = settings.job;
-    if (settings.job === "synth") {
-      this.method.value = settings.method;
-      [this.width.value, this.height.value] = [settings.width, settings.height];
-    }
-    this.seed.value = settings.seed;
-    this.jobOptions.values = settings.options;
-    this.setPart(settings.part ?? null, false);
-    this.guide = structuredClone(settings.guide ?? { sample: [], output: [] });
-    this.hole = structuredClone(settings.hole ?? []);
-    if (settings.job === "fill") this.tool.value = ""; // the strokes would hide what they were filled with
-    else if (this.tool.value === "hole") this.tool.value = "";
-    this.showJob();
-    if (this.hole.length) this.hint.textContent = "The hole is kept: choose Hole under Paint to see it.";
+  cancel() {
+    this.seeds = [];
+    this.send({ kind: "cancel" });
   }
 
   // -- the connection
 
   on_hello(message, buffers) {
     this.bytes = message.bytes;
-    this.device.textContent = message.device;
-    this.colours = message.colours.map((colour) => `rgb(${colour})`);
-    if (!this.options) {
+    this.device = message.device;
+    if (!this.ready) {
       const options = ([name, controls]) => [name, new Options(controls, () => this.changed())];
       this.options = Object.fromEntries(Object.entries(message.controls).map(options));
-      const labels = this.colours.slice(1).map((_, index) => [`${index + 1}`, `Label ${index + 1}`]);
-      this.tool.replaceChildren(...choices([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]]));
-      this.method.replaceChildren(...choices(Object.entries(message.methods)));
-      this.scale.style.background = `linear-gradient(to right, ${message.scale.map((colour) => `rgb(${colour})`)})`;
-      const shown = ([name, size], index) => {
-        const found = button(name, () => this.give({ name, maps: new Map() }));
-        found.prepend(bitmap(buffers[index], ...size));
-        return found;
-      };
-      this.examples.replaceChildren(...Object.entries(message.examples).map(shown));
-      this.showJob();
+      this.methods = Object.entries(message.methods);
+      this.temperatures = message.scale;
+      this.colours = message.colours.map((colour) => `rgb(${colour})`);
+      this.examples = Object.entries(message.examples).map(([name, size], index) => [name, bitmap(buffers[index], ...size)]);
+      this.ready = true;
     }
     this.say("Ready.");
-    if (message.fresh) setTimeout(() => !this.start.hidden && this.send({ kind: "demo" }), 300); // any message ends its run
-    this.strip.replaceChildren(this.currentItem);
+    if (message.fresh) setTimeout(() => !this.picture && this.send({ kind: "demo" }), 300); // any message ends its run
     this.inside.close();
-    this.results.clear();
+    this.results = new Map();
     this.shown = null;
-    this.setRunning(false);
+    this.running = false;
     this.view.ask();
     const other = this.session && this.session !== message.session; // simdtex was started anew, or has forgotten the page
     this.session = message.session;
     if (!other || !message.fresh) return;
     if (this.given && this.given.label === this.picture?.name) {
-      this.again = this.last?.job === "fill" ? null : this.last;
+      this.again = this.asked?.job === "fill" ? null : this.asked;
       this.give(this.given);
     } else {
       this.picture = null;
-      this.start.hidden = false;
-      this.columns.hidden = true;
       this.warn("The picture and the results of this page are no longer kept; give the picture again.");
     }
   }
@@ -826,7 +516,7 @@ class Page {
     let number = still ? shown.length - 1 : 0;
     const next = () => {
       this.demo.getContext("2d").drawImage(shown[number], 0, 0);
-      if (still || this.start.hidden) return;
+      if (still || this.picture) return;
       const last = number === shown.length - 1;
       number = last ? 0 : number + 1;
       setTimeout(next, last ? 2000 : 120);
@@ -838,19 +528,23 @@ class Page {
   on_error({ text, job }) {
     this.warn(sentence(text));
     this.inside.failed(sentence(text));
+    if (this.progress === null) this.progress = 0;
+    if (!this.running) this.doing = "";
     if (!job) return;
     this.refused = true;
+    this.seeds = [];
     this.say("Nothing was made.");
   }
 
   connected(state, reason) {
+    this.open = state === "open";
     this.root.classList.toggle("lost", state === "lost");
     if (state === "open") {
-      this.alert.hidden = true;
+      this.warned = "";
       this.send({ kind: "hello" });
       return;
     }
-    this.setRunning(false);
+    this.running = false;
     this.say("Not connected.");
     if (state === "ended") {
       this.warn("The kernel was started anew, and this widget is no longer connected. Run its cell again.");
@@ -861,18 +555,287 @@ class Page {
   }
 
   say(text) {
-    this.status.textContent = text;
+    this.said = text;
+  }
+
+  /** Say what goes on before its share is known. */
+  busy(text) {
+    this.doing = text;
+    this.progress = null;
   }
 
   warn(text) {
-    this.alert.textContent = text;
-    this.alert.hidden = false;
+    this.warned = text;
+    if (this.progress === null) this.progress = 0;
   }
 
   close() {
     document.removeEventListener("paste", this.paste);
     this.view.observer.disconnect();
     this.connection.close();
+  }
+
+  // -- what it shows
+
+  build(root) {
+    const place = (name) => button(PLACES[name], () => this.go(name), { "aria-current": () => (this.place === name ? "page" : null), disabled: () => !this.picture });
+    const lecture = button("Lecture: why this pixel?", (event) => this.lecture.start(event.currentTarget));
+    const header = make(
+      "header",
+      {},
+      make("h1", {}, "simdtex live"),
+      make("nav", { class: "bar", "aria-label": "Places" }, ...Object.keys(PLACES).map(place)),
+      lecture,
+      make("p", { class: "device" }, () => this.device),
+      make("p", { role: "status", class: "status" }, () => this.said),
+    );
+    const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
+    const columns = make("div", { class: "columns", hidden: () => !this.picture }, this.resultSection(), side);
+    this.root = make("main", { class: "simdtex", tabindex: -1 }, header, this.startSection(), columns, this.lecture.element, this.runBar());
+    effect(() => (this.root.dataset.place = this.place));
+    root.replaceChildren(this.root);
+    this.root.addEventListener("dragover", (event) => event.preventDefault());
+    this.root.addEventListener("drop", (event) => {
+      event.preventDefault();
+      this.take(event.dataTransfer.files, event.target.closest?.(".maps") ? "map" : "open");
+    });
+    this.root.addEventListener("keydown", (event) => this.painting.key(event));
+    this.inside.element.addEventListener("toggle", () => this.inside.element.open && (this.place = "why"));
+    this.paste = (event) => this.take(event.clipboardData?.files, "open");
+    (root.id === "simdtex-live" ? document : this.root).addEventListener("paste", this.paste);
+  }
+
+  fileInput(label, kind) {
+    const input = make("input", { type: "file", multiple: true, accept: "image/*,.tif,.tiff,.npy,.json", "aria-label": label });
+    input.addEventListener("change", async () => {
+      await this.take(input.files, kind);
+      input.value = "";
+    });
+    return input;
+  }
+
+  /** What the page begins with. */
+  startSection() {
+    const example = ([name, picture]) => {
+      const found = button(name, () => this.give({ name, maps: new Map() }));
+      found.prepend(picture);
+      return found;
+    };
+    this.demo = make("canvas", { class: "demo", width: 1, height: 1, role: "img", "aria-label": "A run: large shapes settle first." });
+    return make(
+      "section",
+      { "aria-label": "Start", class: "start", hidden: () => this.picture },
+      this.demo,
+      make("h2", {}, "Drop a picture of a texture here"),
+      make("p", {}, "or all maps of a material; or paste a picture, or choose a file:"),
+      this.fileInput("A picture", "open"),
+      make("p", {}, "or try an example:"),
+      make("div", { class: "examples" }, () => this.examples.map(example)),
+    );
+  }
+
+  /** What runs, at the lower edge of the screen. */
+  runBar() {
+    const pausing = make("button", { type: "button", onclick: () => this.pause(), disabled: () => !this.running, hidden: () => !this.picture }, () => (this.paused ? "Resume" : "Pause"));
+    return make(
+      "footer",
+      {},
+      make("p", { role: "alert", class: "alert", hidden: () => !this.warned }, () => this.warned),
+      make("button", { type: "submit", class: "first", form: this.form.id, hidden: () => !this.picture }, () => TASKS[this.task].run),
+      pausing,
+      button("Cancel", () => this.cancel(), { disabled: () => !this.running, hidden: () => !this.picture }),
+      make("progress", { max: 1, value: () => this.progress, "aria-label": "Progress", hidden: () => !this.picture && this.progress !== null }),
+      make("p", { class: "doing" }, () => this.doing),
+    );
+  }
+
+  sampleSection() {
+    const preview = make("canvas", { class: "preview", role: "img", style: () => `touch-action: ${this.choosing ? "none" : "auto"}` });
+    preview.addEventListener("pointerdown", (event) => this.drawPart(event));
+    this.preview = preview;
+    effect(() => this.showPart());
+    const typed = SIDES.map((name, index) => labelled(name[0].toUpperCase() + name.slice(1), number({ min: 0, value: () => this.wholePart[index], onchange: ({ target }) => this.typePart(index, Number(target.value)) })));
+    const whole = button("Whole picture", () => this.setPart(null));
+    const finger = button("Choose a part with a finger", () => this.chooseByFinger(!this.choosing), { class: "finger", "aria-pressed": () => `${this.choosing}` });
+    const map = (name) => make("li", {}, `${name} `, button("×", () => this.removeMap(name), { "aria-label": `Remove ${name}` }));
+    const named = () => {
+      const { name, width, height, values, more } = this.picture ?? {};
+      return `${name}, ${width} × ${height}, ${values}${more ? ". The file has further frames or pages; this is the first." : ""}`;
+    };
+    return make(
+      "section",
+      { "aria-label": "Sample", class: "sample" },
+      make("h2", {}, "Sample"),
+      make("p", { class: "named" }, named),
+      this.fileInput("Another picture", "open"),
+      preview,
+      make("details", {}, make("summary", {}, "The part that is the sample"), finger, make("fieldset", { class: "part" }, make("legend", {}, "Pixels"), ...typed, whole)),
+      make(
+        "details",
+        { class: "maps" },
+        make("summary", {}, "Further maps of the material"),
+        make("p", {}, "Normal, height, roughness: each is arranged as the picture is."),
+        this.fileInput("A further map", "map"),
+        make("ul", {}, () => this.maps.map(map)),
+      ),
+    );
+  }
+
+  /** Draw the preview, dark where it is not the part. */
+  showPart() {
+    const { picture, preview, part } = this;
+    if (!picture) return;
+    [preview.width, preview.height] = picture.preview;
+    preview.setAttribute("aria-label", `${picture.name}, ${picture.width} by ${picture.height} pixels. Drag over it to choose the part that is the sample.`);
+    const context = preview.getContext("2d");
+    context.drawImage(this.small, 0, 0);
+    if (!part) return;
+    const [x, y, w, h] = part.map((one) => (one * picture.preview[0]) / picture.width);
+    context.fillStyle = "#0009";
+    context.fillRect(0, 0, ...picture.preview);
+    context.drawImage(this.small, x, y, w, h, x, y, w, h);
+  }
+
+  typePart(index, value) {
+    const { width, height } = this.picture;
+    const [x, y, w, h] = this.wholePart.map((one, n) => (n === index ? Math.round(value) : one));
+    const [across, down] = [clamp(w, Math.min(8, width), width), clamp(h, Math.min(8, height), height)];
+    this.setPart([clamp(x, 0, width - across), clamp(y, 0, height - down), across, down]);
+  }
+
+  drawPart(event) {
+    if (!this.picture || event.button !== 0 || (event.pointerType === "touch" && !this.choosing)) return;
+    const box = this.preview.getBoundingClientRect();
+    const place = (now) => [
+      Math.round(clamp((now.clientX - box.left) / box.width, 0, 1) * this.picture.width),
+      Math.round(clamp((now.clientY - box.top) / box.height, 0, 1) * this.picture.height),
+    ];
+    const [x, y] = place(event);
+    const before = this.part;
+    const move = (now) => {
+      const [toX, toY] = place(now);
+      const part = [Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)];
+      if (part[2] >= 8 && part[3] >= 8) this.setPart(part, false);
+    };
+    drag(this.preview, event, move, () => {
+      this.chooseByFinger(false);
+      if (this.part !== before) this.changed();
+    });
+  }
+
+  resultSection() {
+    const { view } = this;
+    const zoom = bar(
+      button("−", () => view.zoom(-1), { "aria-label": "Zoom out" }),
+      make("output", { "aria-label": "Zoom" }, () => `${Math.round(100 * view.unit)} %`),
+      button("+", () => view.zoom(1), { "aria-label": "Zoom in" }),
+      button("Fit", () => view.fit()),
+    );
+    const layer = choice([], () => this.showLayer(layer.value));
+    effect(() => {
+      layer.replaceChildren(...choices(this.layers.map((name) => [name, LAYERS[name] ?? name.replace(/^map /, "Map: ")])));
+      layer.value = this.layer;
+    });
+    const tiled = checkbox({ checked: () => this.tiled, onchange: ({ target }) => (this.tiled = target.checked) });
+    const lattice = labelled("Lattice", checkbox({ onchange: ({ target }) => (this.latticeShown = target.checked) }));
+    effect(() => (lattice.hidden = !this.found?.lattice));
+    const badge = make("span", { class: "badge", hidden: () => !this.tiles || this.layer !== "picture" }, "tiles: hold T for 3 × 3");
+    const scale = make("span", { class: "scale", "aria-hidden": "true", hidden: () => !["use", "temperature"].includes(this.seen) });
+    effect(() => this.ready && (scale.style.background = `linear-gradient(to right, ${this.temperatures.map((colour) => `rgb(${colour})`)})`));
+    effect(() => view.canvas.setAttribute("aria-label", this.found ? `Result ${this.shown}: ${this.doing} Arrow keys move, plus and minus zoom, 0 fits.` : "The run, or the sample."));
+    const share = ([label, one]) => {
+      const swatch = make("span", { class: "swatch", "aria-hidden": "true" });
+      swatch.style.background = this.colours[label];
+      const name = label ? `Label ${label}` : "Unknown";
+      return make("li", {}, swatch, one === null ? name : `${name}: ${(100 * one).toFixed(1)} %`);
+    };
+    return make(
+      "section",
+      { "aria-label": "Result", class: "result" },
+      make("h2", {}, "Result"),
+      bar(zoom, labelled("Layer", layer), labelled("Tiled 3 × 3", tiled), lattice), // what changes its width comes last
+      make("div", { class: "stage" }, make("div", { class: "shown" }, this.painting.tools(), badge, view.element), this.keptSection()),
+      make("p", { class: "legend", hidden: () => !LEGENDS[this.seen] }, scale, make("span", {}, () => LEGENDS[this.seen] ?? "")),
+      make("p", { role: "status", class: "hint" }, () => this.hint),
+      make("ul", { class: "classes", "aria-label": "Classes", hidden: () => !this.classes.length }, () => this.classes.map(share)),
+      this.inside.element,
+      this.recipeSection(),
+    );
+  }
+
+  /** The results, and the files of the shown one; their place stays, so that nothing moves. */
+  keptSection() {
+    const download = (name) => button(name, () => this.send({ kind: "download", result: this.shown, name }), { "data-file": name });
+    const current = (number) => ({ "aria-current": () => (this.shown === number ? "true" : null) });
+    const numbers = () => [...this.results.keys()];
+    const item = (number, index, all) => {
+      const { thumbnail, settings, picture, width, height } = this.results.get(number);
+      const what = this.differences(this.results.get(all[index - 1])?.settings, settings);
+      const caption = make("span", {}, `Result ${number}, ${what}`);
+      const show = button("", () => this.send({ kind: "select", result: number }), { title: `From ${picture}, ${width} × ${height}, seed ${settings.seed}`, ...current(number) });
+      show.append(thumbnail, caption);
+      return make("li", {}, show, button("×", () => this.forget(number), { "aria-label": `Delete result ${number}`, class: "delete" }));
+    };
+    const running = make("li", { class: "current", hidden: () => !this.running }, button("Current run", () => this.send({ kind: "select", result: null }), current(null)));
+    const strip = make("ol", { class: "strip", "aria-label": "Results" }, () => [...numbers().map(item), running]);
+    effect(() => this.results && strip.scrollTo(strip.scrollWidth, strip.scrollHeight));
+    const files = bar();
+    effect(() => this.found && files.replaceChildren(...this.found.files.map(download)));
+    return make("div", { class: "kept" }, strip, make("section", { "aria-label": "Download", style: () => (this.found ? "" : "visibility: hidden") }, make("h3", {}, "Download"), files));
+  }
+
+  recipeSection() {
+    const command = make("pre", { tabindex: 0, "aria-label": "Command line" }, () => this.found?.command ?? "");
+    return make(
+      "section",
+      { "aria-label": "The same bytes again", style: () => (this.found ? "" : "visibility: hidden") },
+      make("p", {}, () => `This line makes the same bytes from the files in ${this.found?.files.at(-1)}:`),
+      command,
+      button("Copy the command line", () => this.copy(command.textContent)),
+    );
+  }
+
+  optionsSection() {
+    const side = (name) => number({ min: 1, max: 16384, value: () => this[name], onchange: ({ target }) => this.setSize(...(name === "width" ? [Number(target.value), this.height] : [this.width, Number(target.value)])) });
+    const square = (pixels) => button(`${pixels}`, () => this.setSize(pixels, pixels), { "aria-label": `${pixels} × ${pixels}` });
+    const fits = button("", () => this.setSize(...this.fitting), { class: "fitting", hidden: () => !this.fitting });
+    effect(() => this.fitting && (fits.textContent = `Use ${this.fitting.join(" × ")}, which fits`));
+    const task = choice(this.tasks("make"), () => this.setTask(task.value), { value: () => this.task });
+    const made = labelled("Make", task);
+    effect(() => (made.hidden = TASKS[this.task].place !== "make"));
+    const method = choice([], () => this.setMethod(method.value));
+    effect(() => {
+      if (this.ready) method.replaceChildren(...choices(this.methods));
+      method.value = this.method;
+    });
+    const methodField = labelled("Method", method);
+    effect(() => (methodField.hidden = this.job !== "synth"));
+    const seed = number({ min: 0, max: 4294967295, value: () => this.seed, onchange: ({ target }) => {
+      this.seed = Number(target.value);
+      this.changed();
+    } });
+    const auto = checkbox({ checked: () => this.auto, onchange: ({ target }) => (this.auto = target.checked) });
+    const onsubmit = (event) => {
+      event.preventDefault();
+      this.make();
+    };
+    this.form = make(
+      "form",
+      { onsubmit, id: `simdtex-${++count}` },
+      made,
+      make(
+        "fieldset",
+        { hidden: () => this.job !== "synth" },
+        make("legend", {}, "Size"),
+        bar(...[256, 512, 1024].map(square), fits),
+        bar(labelled("Result width", side("width")), labelled("Result height", side("height"))),
+      ),
+      make("div", {}, () => this.controls?.first ?? []),
+      bar(labelled("Seed", seed), button("New seed", () => this.newSeed()), button("Four seeds", () => this.fourSeeds(), { hidden: () => this.job === "classify" })),
+      labelled("Run at every change", auto),
+      make("details", {}, make("summary", {}, "All options"), methodField, make("div", {}, () => this.controls?.others ?? []), button("Reset the options", () => this.reset())),
+    );
+    return make("section", { "aria-label": "Options", class: "options" }, make("h2", {}, "Options"), this.form);
   }
 }
 

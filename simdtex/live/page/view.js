@@ -10,7 +10,7 @@ class View {
   constructor(page) {
     this.page = page;
     this.left = this.top = 0;
-    this.unit = 1; // pixels of the screen for each of the layer
+    observe(this, { unit: 1 }); // pixels of the screen for each of the layer
     this.fitted = true;
     this.rows = this.cols = 0;
     this.cursor = null;
@@ -19,6 +19,13 @@ class View {
     this.element = make("div", { class: "panes" }, ...this.panes.map(({ canvas }) => canvas));
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(this.canvas);
+    const follow = (read, act) => effect(() => {
+      read();
+      untracked(act);
+    });
+    follow(() => page.tiled, () => this.fit());
+    follow(() => page.layer, () => this.ask());
+    follow(() => [page.lattice, page.painting.brush, page.painting.visible], () => this.draw());
   }
 
   pane(name) {
@@ -27,8 +34,8 @@ class View {
     canvas.addEventListener("pointerdown", (event) => this.press(event));
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("keydown", (event) => this.key(event));
-    canvas.addEventListener("keyup", (event) => event.key === "b" && this.page.before(false));
-    canvas.addEventListener("blur", () => this.page.before(false));
+    canvas.addEventListener("keyup", (event) => this.held(event.key, false));
+    canvas.addEventListener("blur", () => this.held("b", false));
     return { canvas, frame: null, why: null };
   }
 
@@ -93,7 +100,6 @@ class View {
     const [left, top] = [Math.floor(this.left), Math.floor(this.top)];
     const { layer, tiled } = this.page;
     this.page.send({ kind: "view", layer, left, top, width, height, step, tiled });
-    this.page.zoomOutput.textContent = `${Math.round(100 * this.unit)} %`;
   }
 
   show(message, bytes) {
@@ -122,7 +128,7 @@ class View {
   }
 
   paint({ canvas, frame, why }) {
-    canvas.style.touchAction = this.page.brush || !this.fitted ? "none" : "auto"; // else a finger scrolls the page
+    canvas.style.touchAction = this.page.painting.brush || !this.fitted ? "none" : "auto"; // else a finger scrolls the page
     const context = canvas.getContext("2d");
     context.clearRect(0, 0, canvas.width, canvas.height);
     const { unit } = this;
@@ -137,15 +143,17 @@ class View {
       const [x, y] = [(frame.left - this.left) * unit, (frame.top - this.top) * unit].map(Math.round);
       context.drawImage(frame.picture, x, y, frame.width * size, frame.height * size);
     }
-    for (const one of this.page.visibleStrokes()) this.strokes(context, one);
+    for (const one of this.page.painting.visible) this.strokes(context, one);
     if (this.page.lattice && !["sample", "use"].includes(frame.layer)) this.lattice(context, this.page.lattice);
     if (why) this.mark(context, frame, why);
     const { cursor } = this;
-    if (cursor && this.page.brush) {
+    const { brush } = this.page.painting;
+    if (cursor && brush) {
       const at = [(cursor[0] - this.left) * unit, (cursor[1] - this.top) * unit];
-      for (const [colour, more] of [["#000", 1], ["#fff", -1]]) {
-        ring(context, ...at, Math.max(3, (this.page.brush.width * unit) / 2 + more), colour, 2);
-      }
+      const radius = Math.max(3, (brush.width * unit) / 2);
+      for (const [colour, more] of [["#000", 1], ["#fff", -1]]) ring(context, ...at, radius + more, colour, 2);
+      context.font = `${12 * (window.devicePixelRatio || 1)}px sans-serif`;
+      lettered(context, `${brush.width} px`, at[0] + radius * 0.7 + 6, at[1] + radius * 0.7 + 12);
     }
   }
 
@@ -245,7 +253,8 @@ class View {
 
   press(event) {
     if (event.button !== 0) return;
-    const { brush, inside } = this.page;
+    const { inside } = this.page;
+    const { brush } = this.page.painting;
     if (event.pointerType === "touch" && !brush && this.fitted && !inside.open) return;
     let [x, y] = this.place(event);
     let dragged = 0;
@@ -272,6 +281,15 @@ class View {
     this.draw();
   }
 
+  /** Show the picture that was given, or the result 3 x 3 times, while a key is held. */
+  held(key, down) {
+    if (key === "t") this.page.tiled = down;
+    if (key !== "b" || down === Boolean(this.before)) return;
+    const layer = down ? "sample" : this.before;
+    this.before = down ? this.page.layer : null;
+    this.page.showLayer(layer);
+  }
+
   wheel(event) {
     event.preventDefault();
     this.zoom(event.deltaY < 0 ? 1 : -1, ...this.place(event));
@@ -279,7 +297,8 @@ class View {
 
   key(event) {
     const directions = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const { brush, inside } = this.page;
+    const { inside } = this.page;
+    const { brush } = this.page.painting;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key in directions) {
       const [x, y] = directions[event.key];
@@ -304,7 +323,7 @@ class View {
     } else if (event.key === "+" || event.key === "=") this.zoom(1);
     else if (event.key === "-") this.zoom(-1);
     else if (event.key === "0") this.fit();
-    else if (event.key === "b") this.page.before(true);
+    else if (["b", "t"].includes(event.key)) this.held(event.key, true);
     else if (event.key === "Enter" && inside.open && !brush) inside.pickMiddle();
     else if (event.key === "Escape" && inside.pixel) inside.unpick();
     else return;
