@@ -63,7 +63,7 @@ class Page:
         self.handle = driver.current_window_handle
         shown(driver, width=1400)
         driver.get(address)
-        until(lambda: self.script("return Boolean(window.page && window.page.options)"))
+        until(lambda: self.script("return Boolean(window.page && window.page.ready)"))
 
     def all(self, selector):
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
@@ -141,7 +141,7 @@ class Page:
 
     def paint(self, label, left, top, right, bottom):
         """Draw a stroke with the mouse, from one pixel of the layer to another."""
-        self.choose("Paint", label)
+        self.one(f".tools [aria-label='{label}']").click()
         canvas = self.one("canvas.view")
         x, y, unit = self.script("return [page.view.left, page.view.top, page.view.unit]")
         start = [int((left - x) * unit - canvas.size["width"] / 2), int((top - y) * unit - canvas.size["height"] / 2)]
@@ -203,7 +203,7 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
 
 
 def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
-    page.script("page.auto.checked = false")
+    page.script("page.auto = false")
     drop(page.driver, wall)
     page.result(1)
     page.put("Result width", 700)
@@ -233,8 +233,8 @@ def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
 def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path):
     drop(page.driver, wall)
     page.result(1)
-    page.choose("Make", "A filled hole")
-    until(lambda: page.one(".paint").get_attribute("open"))
+    page.button("Paint").click()
+    until(lambda: page.one(".tools").is_displayed())
     canvas = page.one("canvas.view")
     ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(30, 20).release().perform()
     page.button("Fill the hole").click()
@@ -249,7 +249,7 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
 
 
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
-    page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
+    page.script("page.setTask('classes')")
     (tmp_path / "ground.png").write_bytes(png(striped()))
     drop(page.driver, tmp_path / "ground.png")
     until(lambda: page.one(".hint").text.startswith("No label is painted yet; paint over two or more textures"))
@@ -261,11 +261,15 @@ def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     page.result(1)
     assert not page.one(".hint").text and not page.all("[role=alert]:not([hidden])")
     page.script("page.make(); page.pause()")
-    until(lambda: page.script("return page.running && page.shown === null"))
+    until(lambda: page.script("return page.watching"))
     page.paint("Label 3", 50, 10, 70, 10)  # during the run, which begins again
     page.result(2)
-    assert page.script("return page.guide.sample.length") == 3
-    page.choose("Paint", "Nothing")  # which hides the strokes
+    assert page.script("return page.painting.strokes.sample.length") == 3
+    ActionChains(page.driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
+    page.result(3)  # without the last stroke
+    page.button("Redo").click()
+    page.result(4)
+    page.script("page.go('make'); clearTimeout(page.waiting)")  # which hides the strokes
     (tmp_path / "strokes.png").write_bytes(page.download("strokes.png"))
     page.assert_command_repeats(tmp_path)
     labels = np.array(PIL.Image.open(tmp_path / "labels.png"))
@@ -304,14 +308,12 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     assert page.script("return page.view.left") > left
     keys("0")
     assert page.script("return page.view.unit") == scale
-    tab_to(lambda one: one.text.startswith("Paint a hole"))
+    tab_to(lambda one: one.text == "Paint", back=True)
     keys(Keys.ENTER)
-    tab_to(lambda one: one.tag_name == "select")
-    keys("Hole")
     until(lambda: page.button("Fill the hole"))
-    tab_to(lambda one: one.tag_name == "canvas", back=True)
+    tab_to(lambda one: one.tag_name == "canvas")
     keys(" ", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_DOWN, " ")
-    assert len(page.script("return page.hole[0].points")) == 4
+    assert len(page.script("return page.painting.strokes.hole[0].points")) == 4
     tab_to(lambda one: one.text == "Fill the hole")
     keys(Keys.ENTER)
     page.result(2)
@@ -324,8 +326,8 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
         port = address.split(":")[2].split("/")[0]
-        page.script("page.auto.checked = false")
-        page.put("Order", 4)
+        page.script("page.auto = false")
+        page.put("Size of features (order)", 4)
         drop(page.driver, wall)
         until(lambda: page.script("return page.running"))
         process.kill()
@@ -345,8 +347,7 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
         port = address.split(":")[2].split("/")[0]
         drop(page.driver, wall)
         until(lambda: page.script("return Boolean(page.picture)"))
-        page.script("page.method.value = 'pyramid'; page.width.value = page.height.value = 32")
-        page.script("page.showJob(); page.make()")
+        page.script("page.method = 'pyramid'; page.width = page.height = 32; page.make()")
         drop(page.driver, tmp_path / "normal.png", ".maps")
         until(lambda: len(page.all(".maps li")) == 1)
         process.kill()
@@ -366,16 +367,17 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
 
 
 def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
-    page.script("page.auto.checked = false")
+    page.script("page.auto = false")
     drop(page.driver, wall)
     page.result(1)
-    page.script("page.setPart([8, 4, 50, 60]); page.guide.sample = [{label: 1, width: 9, points: [[9, 9]]}]")
+    page.script("page.setPart([8, 4, 50, 60])")
+    page.script("page.painting.change({sample: [{label: 1, width: 9, points: [[9, 9]]}], output: [], hole: []})")
     page.put("Coherence", 1.5)
     page.script("page.connection.socket.close()")
     until(lambda: page.status == "Not connected.")
     until(lambda: page.status == "Result 1 is ready." and "seed" in page.one(".doing").text)
     assert page.script("return page.layer") == "picture"
-    assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
+    assert page.script("return [page.part, page.painting.strokes.sample.length]") == [[8, 4, 50, 60], 1]
     assert page.labelled("Coherence").get_attribute("value") == "1.5"
 
 
@@ -409,7 +411,7 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
     try:
         drop(page.driver, wall)
         page.result(1)
-        page.script("page.columns.style.paddingBottom = '900px'")
+        page.script("document.querySelector('.columns').style.paddingBottom = '900px'")
         for selector in ("canvas.preview", "canvas.view"):
             assert swipe(selector) > 30, selector
             swipe(selector, across=2, down=-1)
@@ -432,7 +434,7 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
 
 def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall):
     assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed()
-    assert [one.text for one in page.all(".examples button")] == ["brick", "grass", "gravel"]
+    assert [one.text for one in page.all(".examples button")] == ["tissue", "brick", "grass", "gravel"]
     pixels = (
         "const c = arguments[0]; return new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size"
     )
@@ -444,6 +446,8 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         shown(page.driver, width=width)
         tops = [page.one(f".{name}").rect["y"] for name in ("result", "sample", "options")]
         assert tops == sorted(tops) and page.one("canvas.view").rect["y"] < 350
+        run = page.script("return document.querySelector('footer .first').getBoundingClientRect().toJSON()")
+        assert 0 < run["top"] < run["bottom"] <= page.script("return innerHeight"), "the run is always in reach"
 
 
 def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
@@ -471,27 +475,27 @@ def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
     until(lambda: page.status == "Result 1 is shown.")
     page.script("page.send({kind: 'resume'})")
     until(lambda: page.status == "Result 2 is ready; result 1 is shown.")
-    page.script("page.columns.style.paddingBottom = '2000px'; scrollTo(0, 1e6); page.options.mrf.values = {finish: 99}")
+    page.script("document.querySelector('.columns').style.paddingBottom = '2000px'; scrollTo(0, 1e6); page.options.mrf.values = {finish: 99}")
     page.script("page.make()")
-    until(lambda: page.alert.startswith("Finish is 99; "))
-    box = page.script("return page.alert.getBoundingClientRect().toJSON()")
+    until(lambda: page.alert.startswith("Soften seams (finish) is 99; "))
+    box = page.script("return document.querySelector('[role=alert]').getBoundingClientRect().toJSON()")
     assert page.script("return scrollY") > 300 and 0 <= box["top"] < box["bottom"] <= 1000
     strokes = "[{label: 1, width: 20, points: [[30, 30]]}]"
-    page.script(f"page.guide = {{sample: {strokes}, output: {strokes}}}; page.tool.value = '1'; scrollTo(0, 0)")
-    page.script("page.options.mrf.values = {}; page.make()")
+    page.script(f"page.setTask('guide'); page.painting.change({{sample: {strokes}, output: {strokes}, hole: []}})")
+    page.script("page.options.mrf.values = {}; page.make(); page.showLayer('picture'); scrollTo(0, 0)")
     until(lambda: page.script("return page.view.panes[0].frame.of === 3 && !page.view.drawing"))
     over = page.canvas()
-    page.script("page.tool.value = ''; page.view.draw()")
+    page.script("page.place = 'make'")
     until(lambda: page.script("return !page.view.drawing"))
     covered = (over != page.canvas()).any(-1).sum() / page.script("return page.view.unit") ** 2
     assert 0 < covered < 0.25 * np.pi * 10**2, "only an outline hides the result"
-    page.script("page.job.value = 'fill'")
+    page.script("page.setTask('hole')")
     drop(page.driver, wall)
     until(lambda: page.status == "Ready.")
 
 
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
-    page.script("page.auto.checked = false")
+    page.script("page.auto = false")
     file = tmp_path / "moving.gif"
     first, second = (PIL.Image.fromarray(texture(64, 72, seed=seed)) for seed in (1, 2))
     first.save(file, save_all=True, append_images=[second])
@@ -499,18 +503,18 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.result(1)
     assert "further frames or pages; this is the first" in page.one(".named").text
     slider = "return document.querySelector(`[aria-label='${arguments[0]}, slider']`).value"
-    assert float(page.script(slider, "Finish")) == 1.5
-    field = page.labelled("Order")
+    assert float(page.script(slider, "Soften seams (finish)")) == 1.5
+    field = page.labelled("Size of features (order)")
     for value, words in ((1000, "More than 40: a run can take many times as long"), (20, "")):
-        page.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", field, value)
+        page.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", field, value)
         note = field.find_element(By.XPATH, "..//small[@class='beyond']").get_attribute("textContent")
         assert note.startswith(words) and bool(note) == bool(words)
     assert not page.one(".legend").is_displayed()
     page.choose("Layer", "Temperature")
     until(lambda: page.one(".legend").text.startswith("Black: settled."))
     assert "gradient" in page.one(".scale").value_of_css_property("background-image")
-    page.script("page.doing.textContent = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
-    assert page.one(".doing").text == "", "a new run does not show the last one's level"
+    page.script("page.doing = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
+    assert page.one(".doing").text == "Preparing the sample.", "a new run does not show the last one's level"
     small = "[new Uint8Array(4)]"
     page.script("page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")")
     assert "Result 1 is no longer kept" in page.status
@@ -556,12 +560,12 @@ def inside(page):
     """A page with two results that differ in their schedule, looked into."""
     page.button("grass").click()
     page.result(1)
-    small = "page.width.value = page.height.value = 48; page.options.mrf.values = {order: 4%s}; page.make()"
+    small = "page.width = page.height = 48; page.options.mrf.values = {order: 4%s}; page.make()"
     page.script(small % "")
     page.result(2)
     page.script(small % ", schedule: 'checkerboard'")
     page.result(3)
-    page.open("details.inside")
+    page.button("Why").click()
     until(lambda: page.script("return page.inside.open"))
     return page
 
@@ -655,7 +659,7 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
 
 
 def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
-    inside.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
+    inside.script("page.method = 'pyramid'; page.make()")
     inside.result(4)
     until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
     assert not inside.one(".lines").is_displayed()
@@ -686,7 +690,7 @@ WIDER = "const h = document.querySelector('.dice input'); h.value = 2; h.dispatc
 def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
     page.button("grass").click()
     page.result(1)
-    page.script("page.method.value = 'multires'; page.showJob(); page.make(); page.inside.element.open = true")
+    page.script("page.method = 'multires'; page.make(); page.go('why')")
     page.result(2)
     button = page.button("Lecture: why this pixel?")
     button.click()
@@ -730,9 +734,9 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page, tmp_path):
     assert not page.one(".fitting").is_displayed(), "the first size is one that fits"
     zooms = "return [...document.querySelectorAll('.result .bar .bar button')].map((one) => one.offsetLeft)"
     places = page.script(zooms)
-    page.script("page.latticeField.hidden = true; page.zoomOutput.textContent = '5 %'")
+    page.script("page.latticeShown = true; page.view.unit = 0.05")
     assert page.script(zooms) == places
-    page.script("page.width.value = page.height.value = 170; page.make()")
+    page.script("page.latticeShown = false; page.view.fit(); page.width = page.height = 170; page.make()")
     page.result(2)
     rows, cols = page.script("return page.results.get(2).lattice.fitting")
     until(lambda: page.one(".fitting").is_displayed() and page.script("return !page.view.drawing"))

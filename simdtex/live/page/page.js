@@ -205,6 +205,7 @@ class Page {
   go(place) {
     this.inside.element.open = place === "why";
     if (place in this.last && TASKS[this.task].place !== place) this.setTask(this.last[place]);
+    if (place === "why" && this.found) this.task = this.taskOf(this.found.settings);
     this.place = place;
   }
 
@@ -605,13 +606,13 @@ class Page {
     (root.id === "simdtex-live" ? document : this.root).addEventListener("paste", this.paste);
   }
 
-  fileInput(label, kind) {
-    const input = make("input", { type: "file", multiple: true, accept: "image/*,.tif,.tiff,.npy,.json", "aria-label": label });
-    input.addEventListener("change", async () => {
-      await this.take(input.files, kind);
+  /** A button that asks for files. */
+  files(label, kind) {
+    const input = make("input", { type: "file", multiple: true, accept: "image/*,.tif,.tiff,.npy,.json", onchange: () => this.take(input.files, kind) });
+    return button(label, () => {
       input.value = "";
+      input.click();
     });
-    return input;
   }
 
   /** What the page begins with. */
@@ -628,7 +629,7 @@ class Page {
       this.demo,
       make("h2", {}, "Drop a picture of a texture here"),
       make("p", {}, "or all maps of a material; or paste a picture, or choose a file:"),
-      this.fileInput("A picture", "open"),
+      this.files("Choose a file", "open"),
       make("p", {}, "or try an example:"),
       make("div", { class: "examples" }, () => this.examples.map(example)),
     );
@@ -639,7 +640,7 @@ class Page {
     const pausing = make("button", { type: "button", onclick: () => this.pause(), disabled: () => !this.running, hidden: () => !this.picture }, () => (this.paused ? "Resume" : "Pause"));
     return make(
       "footer",
-      {},
+      { hidden: () => !this.picture && !this.warned && !this.doing },
       make("p", { role: "alert", class: "alert", hidden: () => !this.warned }, () => this.warned),
       make("button", { type: "submit", class: "first", form: this.form.id, hidden: () => !this.picture }, () => TASKS[this.task].run),
       pausing,
@@ -666,8 +667,7 @@ class Page {
       "section",
       { "aria-label": "Sample", class: "sample" },
       make("h2", {}, "Sample"),
-      make("p", { class: "named" }, named),
-      this.fileInput("Another picture", "open"),
+      make("div", { class: "bar" }, make("span", { class: "named" }, named), this.files("Another picture", "open")),
       preview,
       make("details", {}, make("summary", {}, "The part that is the sample"), finger, make("fieldset", { class: "part" }, make("legend", {}, "Pixels"), ...typed, whole)),
       make(
@@ -675,7 +675,7 @@ class Page {
         { class: "maps" },
         make("summary", {}, "Further maps of the material"),
         make("p", {}, "Normal, height, roughness: each is arranged as the picture is."),
-        this.fileInput("A further map", "map"),
+        this.files("Add maps", "map"),
         make("ul", {}, () => this.maps.map(map)),
       ),
     );

@@ -87,6 +87,7 @@ class Options:
         "shapes",
         more="The time grows with the number of neighbours. In three dimensions order 8 has 92 and order 12 has 178.",
         none="18; 12 in three dimensions; of a sample of fewer than 9 pixels the largest that fits",
+        label="Size of features (order)",
         symbol="o of equation (3)",
         slider=(2, 40, 1),
     )
@@ -98,6 +99,7 @@ class Options:
         "signed distance from the border between the sample's bright and dark parts. The weight is its standard "
         "deviation in units of the sample's; it is smaller if grey levels cannot hold the channel. With 0, and with "
         '``pixel="density"``, there is no such channel.',
+        label="Keep structure",
         paper=0.0,
         slider=(0, 6, 0.25),
     )
@@ -130,6 +132,7 @@ class Options:
         "Penalise parts of the sample that are used often: more repeats them less",
         more="A candidate whose surroundings are used more than their fair share costs lambda N C sigma^2 "
         "min(4, u - 1): lambda is the balance, u the use divided by the fair share.",
+        label="Repeat less (balance)",
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
@@ -153,6 +156,7 @@ class Options:
         "of this standard deviation, 0.01 to 16 or 0. A sample of at most 16 different pixels is a map of categories, "
         "which have no mean, and one of at most 64 colours, each of 4 pixels on average, has a palette.",
         none="1.5; 0 for samples of at most 16 different pixels or of a palette, and for pixels of the density",
+        label="Soften seams (finish)",
         unit="pixels",
         paper=0.0,
         slider=(0, 4, 0.25),
