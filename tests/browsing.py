@@ -13,10 +13,12 @@ AXE = Path(__file__).parent / "browser" / "node_modules" / "axe-core" / "axe.min
 """`make browser` fetches it."""
 
 DROP = """
-const [data, name, place] = arguments;
-const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+const [files, place] = arguments;
 const transfer = new DataTransfer();
-transfer.items.add(new File([bytes], name, { type: "image/png" }));
+for (const [name, data] of files) {
+  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+  transfer.items.add(new File([bytes], name, { type: "image/png" }));
+}
 const target = document.querySelector(place);
 window.dropped = performance.now();
 target.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
@@ -85,10 +87,10 @@ def live(*words, **environment):
         process.communicate()
 
 
-def drop(driver, path, place=".simdtex"):
-    """Drop a file on the page."""
-    path = Path(path)
-    driver.execute_script(DROP, base64.b64encode(path.read_bytes()).decode(), path.name, place)
+def drop(driver, *paths, place=".simdtex"):
+    """Drop files on the page."""
+    files = [[Path(path).name, base64.b64encode(Path(path).read_bytes()).decode()] for path in paths]
+    driver.execute_script(DROP, files, place)
 
 
 def until(found, timeout=90):

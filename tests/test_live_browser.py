@@ -348,7 +348,7 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
         drop(page.driver, wall)
         until(lambda: page.script("return Boolean(page.picture)"))
         page.script("page.method = 'pyramid'; page.width = page.height = 32; page.make()")
-        drop(page.driver, tmp_path / "normal.png", ".maps")
+        drop(page.driver, tmp_path / "normal.png", place=".maps")
         until(lambda: len(page.all(".maps li")) == 1)
         process.kill()
         until(lambda: page.alert)
@@ -439,7 +439,7 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         "const c = arguments[0]; return new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size"
     )
     assert all(page.script(pixels, one) > 20 for one in page.all(".examples canvas"))
-    drop(page.driver, wall, ".start")
+    drop(page.driver, wall, place=".start")
     page.result(1)
     assert not page.one(".start").is_displayed()
     for width in (720, 390):
@@ -492,6 +492,48 @@ def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
     page.script("page.setTask('hole')")
     drop(page.driver, wall)
     until(lambda: page.status == "Ready.")
+
+
+def test_a_size_and_a_seed_are_chosen_and_results_say_what_changed(page, wall):
+    def captions():
+        return [one.text.split(", ", 1)[1] for one in page.all(".strip li:not(.current) button:first-child span")]
+
+    page.script("page.auto = false")
+    drop(page.driver, wall)
+    page.result(1)
+    assert page.one(".badge").is_displayed(), "it tiles"
+    page.script("arguments[0].click()", page.one("[aria-label='256 \u00d7 256']"))
+    page.button("Make the texture").click()
+    page.result(2)
+    page.put("Keep structure", 4)
+    page.script("arguments[0].click()", page.button("Four seeds"))
+    page.result(6)
+    seeds = page.script("return [...page.results.values()].map(({settings}) => settings.seed)")
+    assert len(set(seeds)) == 5 and np.ptp(seeds[2:]) == 3
+    said = ["More of the texture", "256 \u00d7 256", f"Keep structure 2 to 4, seed {seeds[2]}"]
+    assert captions() == [*said, *(f"seed {one}" for one in seeds[3:])]
+    page.script("arguments[0].click()", page.one("[aria-label='Delete result 6']"))
+    until(lambda: page.results == 5 and page.script("return page.shown") == 5)
+    held = "page.view.canvas.dispatchEvent(new KeyboardEvent(arguments[0], {key: 't'})); return page.tiled"
+    assert [page.script(held, kind) for kind in ("keydown", "keyup")] == [True, False]
+    page.driver.refresh()
+    until(lambda: page.script("return Boolean(window.page && page.found)"))
+    assert page.results == 5
+
+
+def test_dropped_files_are_one_material(page, tmp_path):
+    paths = [tmp_path / f"wall_{role}.png" for role in ("normal", "albedo", "height")]
+    for seed, path in enumerate(paths):
+        path.write_bytes(png(texture(64, 72, seed=seed)))
+    drop(page.driver, *paths)
+    page.result(1)
+    page.result(2) if page.script("return page.found.layers.length") < 7 else None
+    assert page.script("return [page.picture.name, page.maps]") == ["wall_albedo.png", ["wall-normal", "wall-height"]]
+    until(lambda: "map wall-height" in page.script("return page.found ? page.found.layers : []"))
+    paths[0].write_bytes(png(texture(32, 32)))
+    drop(page.driver, paths[0], place=".maps")
+    until(lambda: page.alert.startswith("Wall_normal.png is 32x32 and the picture 72x64"))
+    assert page.script("return page.maps.length") == 2
 
 
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
@@ -644,14 +686,14 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
     until(lambda: path.exists() and path.stat().st_size)
     other = Page(inside.driver, served)
     try:
-        drop(other.driver, path, ".start")
+        drop(other.driver, path, place=".start")
         until(lambda: other.status == "The view is restored.")
         now = other.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
         assert now == wanted
         settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")
         assert settings == [{"order": 4, "schedule": "checkerboard"}, {"order": 4}]
         path.write_text("{}")
-        drop(other.driver, path, ".result")
+        drop(other.driver, path, place=".result")
         until(lambda: "no view" in other.alert)
     finally:
         other.driver.close()
@@ -663,7 +705,7 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     inside.result(4)
     until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
     assert not inside.one(".lines").is_displayed()
-    inside.all(".strip button")[1].click()
+    inside.all(".strip li > button:first-child")[1].click()
     until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 2)
     assert inside.one(".inside > [role=status]").text == ""
     inside.script("page.connection.socket.close()")

@@ -434,7 +434,7 @@ VERSION = "the page and simdtex are of different versions; load the page again"
 POINT = "a point of a stroke must be two numbers; paint again"
 WRONG = [
     (VERSION, {"kind": "rm -rf"}),
-    ("unknown example '../x'; choose one of: brick, grass, gravel", {"kind": "example", "name": "../x"}),
+    ("unknown example '../x'; choose one of: tissue, brick, grass, gravel", {"kind": "example", "name": "../x"}),
     ("no file came with that; give the picture again", {"kind": "open", "name": "a.png"}),
     ("result 5 is no longer kept; make it again with its command line", {"kind": "select", "result": 5}),
     ("Result width is 0; give 1 or more", asked(width=0)),
@@ -457,7 +457,7 @@ WRONG = [
         asked(options={"pixel": "density", "search": "coherent"}),
     ),
     (
-        "Finish 3 takes means, and of categories there are none; set it",
+        "Soften seams (finish) 3 takes means, and of categories there are none; set it",
         asked(options={"finish": 3, "categorical": True}),
     ),
     ("label 1 is on the output and not on the sample;", asked(guide={"output": [stroke((1, 1))]})),
@@ -515,8 +515,25 @@ def test_few_results_are_kept(monkeypatch):
     assert kept.dropped == [1, 2, 3, 4, 5]
 
 
+def test_a_result_is_deleted_and_the_latest_other_one_is_shown(opened):
+    for seed in (1, 2, 3):
+        opened.result(seed=seed)
+    assert opened.ask("selected", kind="forget", result=3)[0]["result"] == 2
+    after = len(opened.got)
+    assert opened.error(kind="forget", result=3).startswith("result 3 is no longer kept")
+    opened.ask("selected", kind="forget", result=2)
+    opened.say(kind="select", result=1)
+    assert opened.wait("selected", after=after, result=1) and list(opened.session.results) == [1]
+
+
+def test_the_albedo_leads_the_maps_of_a_material(page):
+    names = ["T_Wall_N.png", "T_Wall_BC.png", "T_Wall_H.png"]
+    assert [page.ask("lead", kind="lead", names=one)[0]["place"] for one in (names, names[::2])] == [1, 0]
+
+
 def test_a_large_picture_begins_with_its_middle(page, monkeypatch):
-    monkeypatch.setattr(sessions, "LARGE", 32)
+    monkeypatch.setattr(sessions, "LARGE", 40)
+    monkeypatch.setattr(sessions, "STARTING_SIDE", 32)
     message, (pixels,) = page.ask("picture", png(texture(40, 48)), kind="open", name="a.png")
     assert message["part"] == [8, 4, 32, 32]
     assert len(pixels) == 4 * message["preview"][0] * message["preview"][1]
@@ -535,7 +552,7 @@ FIELDS += ("options", "part", "guide", "hole", "of", "open", "beside", "level", 
 def test_a_page_without_a_picture_gets_a_small_run_to_play(page, monkeypatch):
     monkeypatch.setattr(sessions, "DEMO_SIDE", 20)
     message, pictures = page.ask("demo", kind="demo")
-    assert len(pictures) > 15 and len(set(pictures)) > 15
+    assert len(pictures) > 15 and len(set(pictures)) > 10
     assert {len(one) for one in pictures} == {4 * message["width"] * message["height"]}
 
 
@@ -609,7 +626,7 @@ def test_the_present_run_comes_back_with_its_picture(opened):
 def test_after_a_refusal_no_result_is_shown_as_its(opened):
     opened.result()
     after = len(opened.got)
-    assert opened.error(**asked(options={"finish": 99})).startswith("Finish is 99")
+    assert opened.error(**asked(options={"finish": 99})).startswith("Soften seams (finish) is 99")
     assert opened.wait("error", after=after)[0]["job"] == "synth"
     assert opened.wait("selected", after=after)[0]["result"] is None
     after = len(opened.got)

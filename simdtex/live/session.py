@@ -61,13 +61,13 @@ MAX_QUEUE = 64
 """The most messages that wait to be handled."""
 
 STARTING_SIDE = 512
-"""About the longest side of the first output, pixels; otherwise that is about twice as large as its sample."""
+"""About the longest side of the first output, pixels, which is otherwise twice its sample; and of a large sample."""
 
 PREVIEW = 512
 """The longest side of the preview of the picture, pixels."""
 
 LARGE = 1024
-"""The first sample is only the middle of a picture with a longer side than this, pixels."""
+"""The first sample is only the middle of a picture with a longer side than this, pixels, so that it comes soon."""
 
 DEMO_SIDE = 160
 """Rows and columns of the demonstration run on a page without a picture."""
@@ -550,8 +550,10 @@ def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
     The output of a regular sample has a size that its lattice fits.
     """
     rows, cols = picture.pixels.shape[:2]
-    width, height = min(cols, LARGE), min(rows, LARGE)
-    part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
+    width, height, part = cols, rows, None
+    if max(rows, cols) > LARGE:
+        width, height = min(cols, STARTING_SIDE), min(rows, STARTING_SIDE)
+        part = [(cols - width) // 2, (rows - height) // 2, width, height]
     size = (min(2 * height, STARTING_SIDE), min(2 * width, STARTING_SIDE))
     if max(rows, cols) <= STARTING_SIDE and min(rows, cols) >= MIN_REGION:
         pixels = picture.pixels.reshape(rows, cols, -1)

@@ -785,7 +785,8 @@ class Page {
   }
 
   recipeSection() {
-    const command = make("pre", { tabindex: 0, "aria-label": "Command line" }, () => this.found?.command ?? "");
+    let last = ""; // which stays in its place during a run
+    const command = make("pre", { tabindex: 0, "aria-label": "Command line" }, () => (last = this.found?.command ?? last));
     return make(
       "section",
       { "aria-label": "The same bytes again", style: () => (this.found ? "" : "visibility: hidden") },

@@ -1,4 +1,4 @@
-// @preact/signals-core 1.14.5 (https://github.com/preactjs/signals), whose exports are returned here. Its licence:
+// @preact/signals-core 1.14.5 (github.com/preactjs/signals), whose exports are returned here. Its licence:
 //
 // The MIT License (MIT)
 //
