@@ -442,7 +442,7 @@ WRONG = [
     ("unknown job 'rm'; choose one of: synth, extend, fill, classify", asked(job="rm")),
     ("unknown method 'os'; choose one of: mrf, multires, pyramid", asked(method="os")),
     ("there is no control for 'array'; choose one of: ", asked(options={"array": "4x4"})),
-    ("Balance is -1; give a number of at least 0", asked(options={"balance": -1})),
+    ("Repeat less (balance) is -1; give a number of at least 0", asked(options={"balance": -1})),
     ("options must be names and values, not 3", asked() | {"options": 3}),
     ("the part reaches beyond the picture of 48x40; choose one within it", asked(part=[40, 0, 20, 20])),
     ("a part of the picture is four numbers: left, top, width and height", asked(part=[1, 2])),
