@@ -38,7 +38,7 @@ def main():
         sample = Path(folder) / "tissue.png"
         PIL.Image.fromarray(data.immunohistochemistry()[150:350, 100:300]).save(sample)
         driver.get(address)
-        until(lambda: script("return page.status.textContent") == "Ready.")
+        until(lambda: script("return page.said") == "Ready.")
 
         def made(count):
             until(lambda: script("return page.results.size") == count, 120)
@@ -46,49 +46,46 @@ def main():
         drop(driver, sample)
         made(1)
         keep(driver, "result")
-        script("page.seed.value = 3; page.make()")
+        script("page.seed = 3; page.make()")
         made(2)
         script("page.showLayer('arrangement')")
         until(lambda: script("return page.seen") == "arrangement")
         keep(driver, "arrangement")
-        script(
-            "page.showLayer('picture'); page.job.value = 'fill'; page.showJob(); page.startHole();"
-            "page.brushWidth.value = 40;"
-        )
+        script("page.go('paint'); page.showLayer('picture'); page.painting.width = 40")
         until(lambda: script("return page.seen") == "picture")
-        script("page.brush.begin([90, 100]); page.hole[0].points.push([150, 120], [260, 110]); page.view.draw()")
+        script("const { brush } = page.painting; for (const at of [[150, 120], [260, 110]]) brush.begin(at), brush.add([90, 160])")
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)
-        script("page.job.value = 'synth'; page.showJob(); page.view.fit(); scrollTo(0, 0)")
+        script("page.go('make'); page.view.fit(); scrollTo(0, 0)")
         keep(driver, "phone")
         shown(driver, width=1400, height=900)
         ground = Path(folder) / "ground.png"
         textures = [data.brick(), data.grass(), data.gravel()]
         PIL.Image.fromarray(np.hstack([one[:360, :180] for one in textures])).save(ground)
-        script("page.job.value = 'classify'; page.showJob(); page.startClasses(); scrollTo(0, 0)")
+        script("page.setTask('classes'); scrollTo(0, 0)")
         drop(driver, ground)
         until(lambda: script("return page.view.cols") == 540)
         for label in (1, 2, 3):
             script(
-                "page.tool.value = arguments[0]; page.brushWidth.value = 24; const x = 180 * arguments[0] - 90;"
-                "const { brush } = page; brush.begin([x, 60]); brush.add([x - 30, 180]); brush.add([x + 30, 300])",
-                str(label),
+                "page.painting.label = arguments[0]; page.painting.width = 24; const x = 180 * arguments[0] - 90;"
+                "const { brush } = page.painting; brush.begin([x, 60]); brush.add([x - 30, 180]); brush.add([x + 30, 300])",
+                label,
             )
         before = script("return page.results.size")
-        script("page.brush.end()")
+        script("page.painting.brush.end()")
         made(before + 1)
         keep(driver, "classes")
-        script("page.clear(); page.tool.value = ''; page.job.value = 'synth'; page.showJob()")
+        script("page.setTask('more')")
         drop(driver, sample)
         made(before + 2)
         for count, schedule in enumerate(("coloring", "checkerboard"), before + 3):
             script(
-                "page.width.value = page.height.value = 128;"
+                "page.width = page.height = 128;"
                 "page.options.mrf.values = {schedule: arguments[0]}; page.make()",
                 schedule,
             )
             made(count)
-        script("page.inside.element.open = true")
+        script("page.go('why')")
         until(lambda: script("return page.inside.open"))
         script("page.inside.look(arguments[0])", before + 3)
         until(lambda: script("return page.inside.panes.length") == 2)
