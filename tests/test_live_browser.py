@@ -555,7 +555,7 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.choose("Layer", "Temperature")
     until(lambda: page.one(".legend").text.startswith("Black: settled."))
     assert "gradient" in page.one(".scale").value_of_css_property("background-image")
-    page.script("page.doing = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
+    page.script("page.going = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
     assert page.one(".doing").text == "Preparing the sample.", "a new run does not show the last one's level"
     small = "[new Uint8Array(4)]"
     page.script("page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")")

@@ -11,7 +11,7 @@ class Page {
       ...{ picture: null, maps: [], part: null }, // the part of the picture that is the sample
       ...{ results: new Map(), shown: null, running: false, paused: false, runLayers: ["sample"] }, // the number of the shown result
       ...{ wanted: "picture", seen: null, tiled: false, latticeShown: false }, // the layers that is asked for, and that came
-      ...{ said: "Connecting …", warned: "", hint: "", doing: "", progress: 0, device: "", choosing: false },
+      ...{ said: "Connecting …", warned: "", hint: "", going: "", progress: 0, device: "", choosing: false }, // what is going on, and its share
       ...{ colours: [], examples: [], ready: false },
     });
     this.given = this.pending = null; // the file and its maps, to give them again to a server that was started anew
@@ -92,6 +92,13 @@ class Page {
     return job === "extend" || (job === "synth" && (!boundary || (options.boundary ?? boundary.default) === "torus"));
   }
 
+  /** What is going on or, if that is not shown, how the shown result was made. */
+  get doing() {
+    const { width, height, seconds, settings, note } = this.found ?? {};
+    if (!this.found || (this.going && !this.running)) return this.going;
+    return `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${settings.seed}.${note ? ` ${note.replace(/\.?$/, ".")}` : ""}`;
+  }
+
   /** The classes of a result and their shares; before there is one, the classes that are painted. */
   get classes() {
     if (this.found?.shares.length || this.task !== "classes") return this.found?.shares ?? [];
@@ -151,10 +158,9 @@ class Page {
     if (this.refused) for (const options of Object.values(this.options)) options.values = {};
     this.refused = false;
     this.seeds = [];
-    this.doing = "";
     this.painting.restore();
     this.shown = null;
-    this.progress = 0;
+    this.done(0);
     this.say("Ready.");
     if (this.again) this.restore(this.again);
     else [this.width, this.height] = message.size;
@@ -180,8 +186,7 @@ class Page {
   }
 
   on_maps({ names }) {
-    this.progress = 0;
-    this.doing = "";
+    this.done(0);
     this.maps = names;
     if (names.length && (this.shown !== null || this.running)) this.make();
   }
@@ -311,17 +316,15 @@ class Page {
   }
 
   on_progress({ fraction, doing }) {
-    this.progress = fraction;
-    if (this.watching) this.doing = doing;
+    [this.progress, this.going] = [fraction, doing];
   }
 
   on_begun(message) {
     const before = this.layer;
     this.runLayers = message.layers;
     this.frames = 0;
-    this.progress = null;
+    this.busy("Preparing the sample.");
     this.warned = this.hint = "";
-    this.doing = "Preparing the sample.";
     this.refused = false;
     [this.running, this.paused] = [true, false];
     this.select(null);
@@ -331,19 +334,20 @@ class Page {
 
   on_hint({ text }) {
     this.warned = "";
-    this.progress = 0;
-    this.doing = "";
+    this.done(0);
     this.hint = sentence(text);
   }
 
   on_ended() {
-    [this.running, this.progress] = [false, 0];
+    this.running = false;
+    this.done(0);
     this.say("Cancelled.");
   }
 
   on_result(message, [bytes]) {
     const { result, dropped } = message;
-    [this.running, this.progress] = [false, 1];
+    this.running = false;
+    this.done(1);
     const results = new Map(this.results).set(result, { ...message, thumbnail: bitmap(bytes, ...message.thumbnail) });
     const gone = dropped.filter((number) => results.delete(number));
     this.results = results;
@@ -368,15 +372,11 @@ class Page {
     if (settings) this.restore(settings);
     const { found } = this;
     if (!found) {
-      if (!this.running) this.doing = "";
-      else this.say(this.paused ? "Paused." : "Running.");
+      if (this.running) this.say(this.paused ? "Paused." : "Running.");
       return;
     }
     if (!this.said.startsWith(`Result ${result} is ready`)) this.say(`Result ${result} is shown.`);
     if (!settings && found.settings.job === "fill") this.painting.change({ ...this.painting.strokes, hole: [] });
-    const { width, height, seconds, note } = found;
-    const size = `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${found.settings.seed}`;
-    this.doing = (note ? `${size}. ${note}` : size).replace(/\.?$/, ".");
   }
 
   /** Show a result, or the run. */
@@ -529,8 +529,6 @@ class Page {
   on_error({ text, job }) {
     this.warn(sentence(text));
     this.inside.failed(sentence(text));
-    if (this.progress === null) this.progress = 0;
-    if (!this.running) this.doing = "";
     if (!job) return;
     this.refused = true;
     this.seeds = [];
@@ -561,13 +559,16 @@ class Page {
 
   /** Say what goes on before its share is known. */
   busy(text) {
-    this.doing = text;
-    this.progress = null;
+    [this.going, this.progress] = [text, null];
+  }
+
+  done(share) {
+    [this.going, this.progress] = ["", share];
   }
 
   warn(text) {
     this.warned = text;
-    if (this.progress === null) this.progress = 0;
+    if (!this.running) this.done(0);
   }
 
   close() {
