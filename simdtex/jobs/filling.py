@@ -473,9 +473,7 @@ class HoleReplay:
             pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),
         )
 
-    def explain_pixel(
-        self, row: int, col: int, sweep: int = -1, sets: int | None = None, **other: Any
-    ) -> Explanation:
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None, **other: Any) -> Explanation:
         """Return an explanation of a pixel's value after the first ``sets`` sets of a sweep, None: all.
 
         ``other`` are ``order`` and ``trust`` of `simdtex.methods.mrf.replay.Replay.explain`. Raises ValueError if the

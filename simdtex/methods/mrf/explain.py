@@ -111,7 +111,7 @@ def largest_order(twin: Lattices, level: int) -> int:
         return 0
     side = min(min(one.shape[1:]) for one in sample.sample.levels)
     radius = min(sample.sample.margin // sample.spacing(level), (side - 1) // 2)
-    return min(MOST_ORDER, (radius + 1) ** 2 - 1)
+    return min(MOST_ORDER, (int(radius) + 1) ** 2 - 1)
 
 
 def with_order(twin: Lattices, moment: Moment, order: int) -> tuple[Lattices, Moment]:

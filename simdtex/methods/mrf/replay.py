@@ -193,6 +193,12 @@ class Replay:
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
 
+    def together(self, level: int, relaxed: NDArray[np.uint8]) -> int:
+        """Return how many sites of the last set, 2 in ``relaxed`` of `Instant`, have a neighbour in that set."""
+        sites = np.flatnonzero(relaxed == 2).astype(np.int32)
+        neighbours = self._twin.grid(level).neighbours(sites, self._twin.of(level).offsets)
+        return int(np.isin(neighbours, sites).any(0).sum())
+
     def largest_order(self, level: int) -> int:
         """Return the largest order with which a site of a level is explained; 0 if its search is not exact."""
         return largest_order(self._twin, level)
