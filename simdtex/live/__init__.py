@@ -11,7 +11,7 @@ from importlib.resources import files
 PAGE = files("simdtex.live") / "page"
 """The folder with the files of the page."""
 
-PARTS = ("connections", "elements", "view", "inside", "page")
+PARTS = ("connections", "elements", "view", "why", "inside", "page")
 """The parts of the page's module, in order."""
 
 

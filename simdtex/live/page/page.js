@@ -797,6 +797,7 @@ class Page {
       this.showJob();
     }
     this.say("Ready.");
+    if (message.fresh) followLink(this);
     if (message.fresh) setTimeout(() => !this.start.hidden && this.send({ kind: "demo" }), 300); // any message ends its run
     this.strip.replaceChildren(this.currentItem);
     this.inside.close();
