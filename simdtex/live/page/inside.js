@@ -43,6 +43,7 @@ class Inside {
     this.playing = button("Play", () => this.play());
     this.choice = choice([], () => this.look(Number(this.choice.value) || null));
     this.captions = make("p", { class: "captions" });
+    this.controls = this.dice();
     this.reasons = [0, 1].map(() => make("div", { class: "reason" }));
     const step = (text, label, by) => button(text, () => this.step(by), { "aria-label": label });
     const sweepStep = (text, label, by) => button(text, () => this.stepSweep(by), { "aria-label": label });
@@ -64,7 +65,7 @@ class Inside {
         button("Copy a link", () => this.link(), { class: "save" }),
       ),
       this.captions,
-      this.dice(),
+      this.controls,
       make("div", { class: "reasons" }, ...this.reasons),
       this.films.element,
     );
@@ -257,6 +258,7 @@ class Inside {
   // -- why
 
   hint() {
+    this.controls.hidden = true;
     this.reasons[0].replaceChildren(make("p", {}, HOW));
     this.reasons[1].replaceChildren();
   }
@@ -316,8 +318,9 @@ class Inside {
     const text = `${title}pixel (row ${why.pixel[0]}, column ${why.pixel[1]}). ${sentence(why.reason.replace(/\.$/, ""))}`;
     const heading = make("p", {}, text[0].toUpperCase() + text.slice(1));
     this.tables[why.pane] = null;
+    this.controls.hidden = false;
     if (!why.candidates) {
-      this.said.textContent = "";
+      this.said.textContent = sentence(why.reason.replace(/\.$/, ""));
       place.replaceChildren(heading);
       return;
     }
