@@ -527,10 +527,11 @@ class Inside {
 
 // -- the lecture --------------------------------------------------------------------------------------------------
 
+// The model of the paper, with a probability for every candidate; JSON, which docs/recorded.py reads.
 const PLAIN = {
-  ...{ relaxation: "gibbs", pixel: "density", search: "exact", order: 8, levels: 2, bandwidth: 0.6, lattice: "none" },
-  ...{ structure: 0, coherence: 0, balance: 0, novelty: 0, finish: 0 },
-}; // the model of the paper, with a probability for every candidate
+  "relaxation": "gibbs", "pixel": "density", "search": "exact", "order": 8, "levels": 2, "bandwidth": 0.6,
+  "lattice": "none", "structure": 0, "coherence": 0, "balance": 0, "novelty": 0, "finish": 0
+};
 const SIDE = 32; // pixels of its picture; the sample has half as many more
 
 const KEYS = "Enter: on; F: full screen; ← →: a set; ↑ ↓: a sweep; space: play; N: another pixel; Escape: close.";
