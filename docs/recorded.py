@@ -2,10 +2,11 @@
 """Record a session of the live page for the documentation: `python docs/recorded.py` writes docs/_static/recording.js.
 
 The page of docs/concepts/why.rst plays it without a server. It has the pictures of a small run after every sweep, those
-of one sweep after every set of sites, and the explanations of a few pixels.
+of one sweep after every set of sites, the explanations of a few pixels, and the films of four schedules.
 """
 
 import json
+import re
 import sys
 import zlib
 from base64 import b64decode, b64encode
@@ -15,20 +16,19 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from live import Fake
+from live import Fake, asked
 
 from simdtex.io.image import example
+from simdtex.live import script
 from simdtex.live.job import Picture
+from simdtex.live.session import FILMED
 
 FILE = Path(__file__).parent / "_static" / "recording.js"
 SIDE = 32
 """Rows and columns of the output."""
 
-OPTIONS = {
-    **{"relaxation": "gibbs", "pixel": "density", "search": "exact", "order": 8, "levels": 2, "bandwidth": 0.6},
-    **{"lattice": "none", "structure": 0, "coherence": 0, "balance": 0, "novelty": 0, "finish": 0},
-}
-"""The run of the page's lecture, PLAIN of simdtex/live/page/inside.js."""
+OPTIONS = json.loads(re.search(r"const PLAIN = ({.*?});", script(), re.DOTALL)[1])
+"""The options of the run of the page's lecture."""
 
 SEED = 1
 PIXELS = [(9, 9), (8, 22), (16, 16), (23, 9)]
@@ -60,7 +60,8 @@ def record():
         return kept(*page.wait("frame", after=after, layer=layer))
 
     page.ask("hello", kind="hello")
-    page.result(width=SIDE, height=SIDE, seed=SEED, options=OPTIONS)
+    run = {"width": SIDE, "height": SIDE, "seed": SEED, "options": OPTIONS}
+    page.result(**run)
     after = len(page.got)
     page.ask("selected", kind="hello")
     wanted = {one["kind"]: (one, own) for one, own in page.got[after:]}
@@ -84,12 +85,14 @@ def record():
             if found not in reasons:  # a pixel keeps its value for many moments
                 reasons.append(found)
             explained[f"{pixel[0]},{pixel[1]} {key}"] = reasons.index(found)
+    page.say(**asked(**run) | {"kind": "schedules"})
+    films = [kept(*page.wait("schedule", name=name)) for name in FILMED]
     frames["sample null"] = shown("sample", len(sample()))
     for key, _ in moments[1:]:
         frames[f"sample {key}"] = frames["sample null"]
     page.session.close(10)
     recorded = {"start": start, "inside": inside, "moments": moments, "frames": frames, "explained": explained}
-    return recorded | {"pixels": PIXELS, "reasons": reasons}, b"".join(buffers)
+    return recorded | {"pixels": PIXELS, "reasons": reasons, "films": films}, b"".join(buffers)
 
 
 def pack(recorded, data):

@@ -193,3 +193,69 @@ def test_what_a_notebook_shows():
     widths = [float(one) for one in re.findall(r"width:([\d.e+-]+)%", html)]
     np.testing.assert_allclose(widths[0], 100 * why.candidates.probability[0], rtol=0.01)
     assert html.count("<figcaption>taken: ") == 1
+
+
+EXACT = {
+    **{"search": "exact", "levels": 2, "order": 2, "relaxation": "gibbs", "edges": "whole", "rng": 3},
+    **{"balance": 0, "coherence": 0, "structure": 0, "novelty": 0, "device": REFERENCE},
+}
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """The replay of an exact run whose candidates are whole neighbourhoods, at some moment before its end."""
+    replay = simdtex.replay(BRICK, (12, 14), **EXACT)
+    return replay, next(n for n, one in enumerate(replay.sweeps) if one.level == 0) + 1
+
+
+@pytest.mark.parametrize("order", [1, 4, 8])
+def test_a_site_is_explained_with_another_order(exact, order):
+    """The neighbours are those of the order in the field of the moment; the candidates those of a run of the order."""
+    replay, n = exact
+    own = replay.explain_pixel(5, 7, n)
+    assert replay.explain_pixel(5, 7, n, order=2).table() == own.table()
+    why = replay.explain_pixel(5, 7, n, order=order)
+    consistent(why, 0)
+    assert (why.level, why.sweep, why.temperature) == (own.level, own.sweep, own.temperature)
+    near, squared = why.neighbours, (why.neighbours.offsets**2).sum(1)
+    assert squared.max() <= order and len(squared) == {1: 4, 4: 12, 8: 24}[order]
+    in_both = (own.neighbours.offsets[:, None] == near.offsets).all(2)
+    assert in_both.any(1).all() == (order > 2)
+    for k, m in np.argwhere(in_both):
+        np.testing.assert_array_equal(own.neighbours.values[k], near.values[m])
+        np.testing.assert_array_equal(own.neighbours.confidence[k], near.confidence[m])
+    there = simdtex.replay(BRICK, (12, 14), **EXACT | {"order": order}).explain((5, 7))
+    assert (why.weighed, why.bandwidth) == (there.weighed, there.bandwidth)
+
+
+def test_a_site_is_explained_with_more_trust(exact):
+    replay, n = exact
+    own, half, certain = (replay.explain_pixel(5, 7, n, trust=trust) for trust in (0, 0.5, 1))
+    assert own.table() == replay.explain_pixel(5, 7, n).table()
+    t = 1 - own.neighbours.confidence
+    assert (t > 0.1).any() and (certain.neighbours.confidence == 1).all()
+    np.testing.assert_allclose(half.neighbours.confidence, 1 - t / 2, atol=1 / 1024)
+    assert own.temperature == half.temperature == certain.temperature
+    consistent(certain, 0)
+
+
+def test_what_no_site_can_be_explained_with_is_refused(exact):
+    replay, n = exact
+    assert [replay.largest_order(level) for level in (0, 1)] == [8, 3]
+    refused = {
+        "order is 9 and the sample of level 0 holds 8": {"order": 9},
+        "order is 0; give 1 or more": {"order": 0},
+        "trust is 1.5; give at most 1": {"trust": 1.5},
+        "trust must be a number": {"trust": "much"},
+    }
+    for words, other in refused.items():
+        with pytest.raises((ValueError, TypeError), match=re.escape(words)):
+            replay.explain_pixel(5, 7, n, **other)
+    listed = simdtex.replay(BRICK, (12, 14), **EXACT | {"search": "coherent"})
+    assert listed.largest_order(0) == 0
+    with pytest.raises(ValueError, match='give search="exact"'):
+        listed.explain((5, 7), order=4)
+    assert listed.explain((5, 7), trust=1).neighbours.confidence.min() == 1
+    counted = simdtex.replay(BRICK, (12, 14), **EXACT | {"balance": 1})
+    with pytest.raises(ValueError, match="give balance=0"):
+        counted.explain((5, 7), order=4)

@@ -672,6 +672,108 @@ def test_the_time_line_steps_and_plays(inside):
     assert 3 < seen[0] < len(sweeps)
 
 
+def test_the_line_of_time_is_a_slider_for_the_pointer_and_for_keys(inside):
+    sweeps = inside.script("return page.inside.sweeps")
+    line = inside.one("[role=slider][aria-label=Time]")
+    bands = [one.text for one in inside.all(".band > span")]
+    assert bands[-2:] == ["level 0 (full size)", "result"] and "level 1 (half size)" in bands
+    cells = inside.all(".sweep")
+    assert len(cells) == len(sweeps) + 1
+    heights = inside.script(
+        "return [...document.querySelectorAll('.sweep i')].map((one) => parseFloat(one.style.height))"
+    )
+    np.testing.assert_allclose(heights, [100 * one[4] for one in sweeps], atol=0.01)
+    line.send_keys(Keys.HOME)
+    until(lambda: at(inside) == [0, 0])
+    for keys, moment in ((Keys.ARROW_RIGHT, [0, 1]), (Keys.ARROW_UP, [1, sweeps[1][2]]), (Keys.ARROW_LEFT, [1, 1])):
+        line.send_keys(keys)
+        until(lambda moment=moment: at(inside) == moment)
+        assert line.get_attribute("aria-valuetext") == inside.one(".moment").text
+    line.send_keys(Keys.ARROW_DOWN)
+    until(lambda: at(inside) == [0, sweeps[0][2]])
+    assert int(line.get_attribute("aria-valuenow")) == sweeps[0][2]
+    line.send_keys(Keys.END)
+    until(lambda: at(inside) is None)
+    assert line.get_attribute("aria-valuenow") == line.get_attribute("aria-valuemax")
+    drag = ActionChains(inside.driver).move_to_element(cells[2]).click_and_hold()
+    drag.move_to_element(cells[4]).release().perform()
+    until(lambda: at(inside) == [4, round(sweeps[4][2] / 2)])
+    assert "now" in cells[4].get_attribute("class") and cells[4].find_elements(By.CSS_SELECTOR, ".mark")
+    assert inside.faults() == []
+
+
+SLIDE = "const one = page.inside[arguments[0]]; one.value = arguments[1]; one.dispatchEvent(new Event('input'));"
+
+
+def test_order_and_trust_act_on_the_pixel_without_a_run(inside):
+    inside.script(
+        "page.options.mrf.values = {order: 4, search: 'exact', balance: 0, levels: 2, relaxation: 'gibbs'}; page.make()"
+    )
+    inside.result(4)
+    until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 4)
+    inside.script("page.inside.seekPlace(0, 2, 1)")
+    at(inside)
+    inside.script("page.inside.pick(11, 21)")
+    first = explained(inside)
+    assert (first["order"], len(first["offsets"])) == (4, 12)
+    for name, value in (("order", 8), ("trust", 1)):
+        inside.script("for (const one of [1, 2, 3, 5]) " + "{" + SLIDE.replace("arguments[1]", "one") + "}", name)
+        inside.script(SLIDE, name, value)  # the last answer counts
+        until(lambda: not inside.script("return page.inside.explaining || page.inside.again"))
+        now = explained(inside)
+        assert now["order"] == 8 and len(now["offsets"]) == 24
+        assert (np.array(now["trust"]) == 1).all() == (name == "trust")
+        assert now["totals"] != first["totals"] and (now["level"], now["sweep"]) == (first["level"], first["sweep"])
+    assert "order 8, 24 neighbours; doubt t of the neighbours: 0 %" in inside.one(".dice output").text
+    inside.button("As in the run").click()
+    until(lambda: explained(inside)["totals"] == first["totals"])
+    assert inside.script("return page.results.size") == 4
+
+
+def test_a_pixel_is_watched_from_run_to_run(inside):
+    inside.script("page.inside.seekPlace(0, 2, 1)")
+    moment = at(inside)
+    inside.script("page.inside.pick(11, 21)")
+    explained(inside)
+    inside.script("page.options.mrf.values = {order: 4, schedule: 'checkerboard', bandwidth: 0.5}; page.make()")
+    inside.result(4)
+    until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 4)
+    assert explained(inside)["pixel"] == [11, 21] and at(inside)[1] == moment[1] == 1
+    assert inside.one(".moment").text.startswith("Level 0, sweep 2 of")
+    inside.choose("Beside it", "Result 3")
+    until(lambda: "Result 3 beside it: Bandwidth 0.5 to 0.15." in inside.one(".captions").text)
+    inside.script("page.send({kind: 'inside', open: true, beside: 99}); page.inside.looking = true")
+    until(lambda: "no longer kept" in inside.one(".inside > [role=status]").text)
+    assert not inside.one(".line").is_displayed() and not inside.script("return page.inside.open")
+
+
+def test_a_link_brings_a_look_into_an_example_back(inside, served):
+    inside.script("page.inside.seekPlace(0, 2, 1); page.showLayer('temperature')")
+    at(inside)
+    inside.script("page.inside.pick(20, 31)")
+    explained(inside)
+    wanted = inside.script("return [page.inside.at, page.inside.pixel, page.layer]")
+    inside.button("Copy a link").click()
+    link = inside.driver.current_url
+    assert link.endswith(
+        "#grass&method=mrf&size=48,48&seed=1&order=4&schedule=checkerboard&pixel=20,31&moment=0,2,1&layer=temperature"
+    )
+    other = Page(inside.driver, served + link[link.index("#") :])
+    try:
+        until(lambda: other.status == "The view is restored.")
+        until(lambda: other.script("return [page.inside.at, page.inside.pixel, page.layer]") == wanted)
+        assert explained(other)["pixel"] == [20, 31]
+        other.script("location.hash = '#gravel&size=40,24&order=2'")
+        until(
+            lambda: (
+                other.script("return [page.picture.name, page.results.get(page.shown)?.width]") == ["gravel.png", 40]
+            )
+        )
+    finally:
+        other.driver.close()
+        other.driver.switch_to.window(inside.handle)
+
+
 def test_a_saved_view_brings_all_of_it_back(inside, served):
     inside.choose("Beside it", "Result 2")
     until(lambda: inside.script("return page.inside.panes.length") == 2)
@@ -704,7 +806,7 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     inside.script("page.method = 'pyramid'; page.make()")
     inside.result(4)
     until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
-    assert not inside.one(".lines").is_displayed()
+    assert not inside.one(".line").is_displayed()
     inside.all(".strip li > button:first-child")[1].click()
     until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 2)
     assert inside.one(".inside > [role=status]").text == ""
@@ -736,16 +838,18 @@ def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
     page.result(2)
     button = page.button("Lecture: why this pixel?")
     button.click()
-    until(lambda: page.one(".tour").is_displayed())
+    until(lambda: page.one(".questions").is_displayed())
     shown(page.driver, width=1280, height=720)
-    box = page.one(".tour")
+    box = page.one(".questions")
     for number in range(1, 7):
-        assert page.one(".tour h2").text.startswith(f"{number} of 6") and page.one(".tour h2").text.endswith("?")
-        asked = page.one(".tour p").text
+        assert page.one(".questions h2").text.startswith(f"{number} of 6") and page.one(".questions h2").text.endswith(
+            "?"
+        )
+        asked = page.one(".questions p").text
         assert page.one(".pointed").is_displayed()
         if number == 3:
-            until(lambda: page.all(".reason .dice"))
-            for place in (".tour", ".panes canvas", ".reason table", ".reason .dice", ".reason > figure canvas"):
+            until(lambda: page.all(".dice"))
+            for place in (".questions", ".panes canvas", ".reason table", ".dice", ".reason > figure canvas"):
                 assert (
                     page.script("return document.querySelector(arguments[0]).getBoundingClientRect().bottom", place)
                     <= 720
@@ -757,10 +861,24 @@ def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
             until(lambda: "The dice say" in page.script("return document.querySelector('.dice output').value"), 10)
         assert page.faults() == []
         box.send_keys(Keys.ENTER)
-        assert page.one(".tour p").text != asked, "the answer"
+        assert page.one(".questions p").text != asked, "the answer"
+        words = {2: {"near", "hot"}, 3: {"differs", "taken"}, 4: {"hot"}, 6: {"taken"}}
+        coloured = {one.get_attribute("class").split()[1] for one in page.all(".questions .word")}
+        assert coloured == words.get(number, set())
+        if number == 6:
+            until(lambda: len(page.all(".films figure")) == 4)
+            captions = [one.text for one in page.all(".films figcaption")]
+            assert [one.split()[0] for one in captions] == ["coloring", "checkerboard", "synchronous", "raster"]
+            assert captions[0].startswith("coloring 16 steps a sweep") and "No two neighbours" in captions[0]
+            assert captions[2].startswith("synchronous 1 step a sweep") and "100 %" in captions[2]
+            bottom = "return document.querySelector('.films').getBoundingClientRect().bottom"
+            assert page.script(bottom) <= 720 and page.faults() == []
+            film = "const c = document.querySelector('.films canvas'); return c.toDataURL()"
+            first = page.script(film)
+            until(lambda film=film, first=first: page.script(film) != first, 10)
         box.send_keys(Keys.ARROW_LEFT, "n")
         box.send_keys(Keys.ENTER)
-    assert not page.one(".tour").is_displayed()
+    assert not page.one(".questions").is_displayed()
     assert page.driver.switch_to.active_element == button
     why = explained(page)
     assert why["weighed"] in (44 * 44, 24 * 24), "all candidates of a level, at a pixel at random"
@@ -817,7 +935,7 @@ def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     ActionChains(page.driver).move_to_element(page.one("canvas.view")).click().perform()
     until(lambda: page.all(".reason tr.taken"))
     page.button("Lecture: why this pixel?").click()
-    until(lambda: page.one(".tour").is_displayed())
-    page.one(".tour").send_keys(*[Keys.ENTER] * 5)
-    until(lambda: page.one(".tour h2").text.startswith("3 of 6") and page.all(".reason tr.taken"))
+    until(lambda: page.one(".questions").is_displayed())
+    page.one(".questions").send_keys(*[Keys.ENTER] * 5)
+    until(lambda: page.one(".questions h2").text.startswith("3 of 6") and page.all(".reason tr.taken"))
     assert page.faults() == []

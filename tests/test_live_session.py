@@ -25,8 +25,8 @@ from simdtex.live import frames, results
 from simdtex.live import session as sessions
 from simdtex.live.frames import Layer, Window, parse_window, render
 from simdtex.live.job import LABELS, TABLES, Picture, controls, paint
-from simdtex.live.results import BARS, SET_COLOURS, Results
-from simdtex.live.session import Levels
+from simdtex.live.results import BARS, FILM_FRAMES, SET_COLOURS, Results
+from simdtex.live.session import FILMED, Levels
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
 from simdtex.model.display import read_labels
@@ -563,7 +563,7 @@ def test_a_picture_ends_the_small_run(page):
 
 
 KINDS = ["hello", "open", "example", "map", "unmap", "pause", "resume", "cancel", "view", "shown", "select", "download"]
-KINDS += ["inside", "seek", "explain"]
+KINDS += ["inside", "seek", "explain", "schedules"]
 
 
 @given(
@@ -817,6 +817,55 @@ def test_a_pixel_is_explained_as_in_python(page_inside):
     assert "error" not in page_inside.kinds(after)
     for row, words in [(18, "give 17 or fewer"), (-1, "give 0 or more"), ("x", "the row of the pixel")]:
         assert words in str(page_inside.ask(("explained", "error"), kind="explain", row=row, col=0)[0])
+
+
+EXACT = {"order": 2, "search": "exact", "levels": 2, "balance": 0, "relaxation": "gibbs"}
+
+
+def test_a_pixel_is_explained_with_another_order_and_more_trust(page_inside):
+    page_inside.result(width=20, height=18, options=EXACT)
+    inside(page_inside)
+    (level, sweep, sets, *_) = inside(page_inside)[0]["sweeps"][-2]
+    page_inside.ask("moments", kind="seek", level=level, sweep=sweep, sets=sets)
+    replay = simdtex.replay(SAMPLE, (18, 20), rng=7, **RULES | EXACT)
+    for other in ({}, {"order": 4}, {"trust": 1}, {"order": 1, "trust": 0.5}):
+        found, _ = page_inside.ask("explained", kind="explain", row=5, col=7, **other)
+        why = replay.explain_pixel(5, 7, -2, sets, **other)
+        assert (found["order"], found["orders"]) == (other.get("order", 2), 8)
+        assert found["reason"] == why.reason
+        assert found["offsets"] == why.neighbours.offsets.tolist()
+        np.testing.assert_allclose(found["trust"], why.neighbours.confidence, atol=1e-4)
+        np.testing.assert_allclose(found["totals"], why.totals[: len(found["totals"])], atol=0.1)
+    assert "holds 8" in page_inside.ask("explained", kind="explain", row=5, col=7, order=9)[0]["reason"]
+    assert "trust is 2" in page_inside.ask("explained", kind="explain", row=5, col=7, trust=2)[0]["reason"]
+    assert "Order must be an integer" in page_inside.error(kind="explain", row=5, col=7, order="x")
+
+
+def test_films_of_four_schedules_are_made_while_nothing_else_is_asked(page_inside):
+    run = asked(width=10, height=12, options=EXACT | {"levels": 1}, part=[0, 0, 14, 14])
+    page_inside.say(**run | {"kind": "schedules"})
+    page_inside.result(width=10, height=12)
+    found = {name: page_inside.wait("schedule", name=name) for name in FILMED}
+    kinds = [kind for kind in page_inside.kinds() if kind in ("result", "schedule")]
+    assert kinds.index("result") < len(FILMED), "another request comes before the next film"
+    for name, (one, films) in found.items():
+        replay = simdtex.replay(SAMPLE[:14, :14], (12, 10), rng=7, **RULES | EXACT | {"levels": 1}, schedule=name)
+        assert (one["width"], one["height"]) == (10, 12)
+        assert (one["steps"], one["sweeps"]) == (replay.sweeps[0].sets, len(replay.sweeps))
+        assert (one["together"] == 0) == (name in ("coloring", "raster"))
+        end = np.frombuffer(films[-1], np.uint8).reshape(12, 10, 4)[..., :3]
+        np.testing.assert_array_equal(end, replay.at(-1).image, "the last picture is the result")
+        seen = np.frombuffer(films[0], np.uint8).reshape(12, 10, 4)
+        assert (seen[replay.at(0, 1).relaxed == 2, 0] >= 178).all(), "the sites of the first set are magenta"
+        assert len(films) <= FILM_FRAMES + 1
+    assert found["synchronous"][0]["together"] == 1
+
+
+def test_what_no_film_is_made_of(page_inside):
+    run = asked(options=EXACT) | {"kind": "schedules"}
+    assert "at most 64 x 64" in page_inside.error(**run | {"width": 80})
+    assert "no control for 'schedule'" in page_inside.error(**run | {"job": "extend"})
+    assert "no control for" in page_inside.error(**run | {"method": "pyramid", "options": {}})
 
 
 def test_a_density_has_few_bars(page_inside):

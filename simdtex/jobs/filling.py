@@ -454,7 +454,7 @@ class HoleReplay:
         self._replay = Replay(job.plan(window, sample), machine, seed)
         self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, sample.corner
         self._whole = job.begin()
-        self.origin = window.rows.start, window.cols.start
+        self.origin, self.largest_order = (window.rows.start, window.cols.start), self._replay.largest_order
 
     @property
     def sweeps(self) -> list[Sweep]:
@@ -473,14 +473,15 @@ class HoleReplay:
             pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),
         )
 
-    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None, **other: Any) -> Explanation:
         """Return an explanation of a pixel's value after the first ``sets`` sets of a sweep, None: all.
 
-        Raises ValueError if the pixel has not relaxed.
+        ``other`` are ``order`` and ``trust`` of `simdtex.methods.mrf.replay.Replay.explain`. Raises ValueError if the
+        pixel has not relaxed.
         """
         if not self._hole[row, col]:
             raise ValueError("this pixel is not in the hole: its value is given")
-        why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets)
+        why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets, **other)
         near, found = why.neighbours, why.candidates
         return replace(
             why,

@@ -11,7 +11,7 @@ from importlib.resources import files
 PAGE = files("simdtex.live") / "page"
 """The folder with the files of the page."""
 
-PARTS = ("signals", "connections", "elements", "view", "painting", "inside", "page")
+PARTS = ("signals", "connections", "elements", "view", "painting", "why", "inside", "page")
 """The parts of the page's module, in order."""
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from shutil import make_archive
@@ -17,6 +18,7 @@ from simdtex.io.image import to_display, write
 from simdtex.live import frames
 from simdtex.live.job import Job
 from simdtex.machine import Machine
+from simdtex.methods.mrf.replay import Replay
 from simdtex.model.display import write_labels
 from simdtex.model.explanation import Explanation
 from simdtex.model.light import sample_sentences
@@ -44,6 +46,15 @@ SET_SHARES = (0.0, 0.6, 1.0)
 
 MOST_TOTALS = 1024
 """The most total costs of candidates that the page gets, the least ones."""
+
+FILM_SHARES = (0.0, 0.2, 0.7)
+"""Shares of these colours in films."""
+
+FILM_FRAMES = 24
+"""The number of sets of sites that a film shows."""
+
+FILM_SIDE = 64
+"""The longest side of the output and of the sample of a film, pixels."""
 
 BARS = 64
 """The most bars of the LCPDF of a channel."""
@@ -209,16 +220,52 @@ class Inside:
         rows, cols = self.sample.shape
         return {"width": cols, "height": rows, "sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
 
-    def explain(self, row: Any, col: Any) -> dict[str, Any]:
-        """Return an explanation of the shown value of an output pixel, as plain numbers."""
+    def explain(self, row: Any, col: Any, **other: Any) -> dict[str, Any]:
+        """Return an explanation of the shown value of an output pixel, as plain numbers.
+
+        ``other`` are ``order`` and ``trust`` of `simdtex.methods.mrf.replay.Replay.explain`. ``orders`` is the largest
+        order, 0 if no other one can be given.
+        """
         for name, number, side in zip(("row", "column"), (row, col), self.job.shape, strict=True):
             whole(f"the {name} of the pixel", number, 0, side - 1)
         sweep, sets = self.moment or (-1, None)
-        why = self._replay.explain_pixel(row, col, sweep, sets)
+        why = self._replay.explain_pixel(row, col, sweep, sets, **other)
         sample = self.job.sample
         limits = None if sample.dtype == np.uint8 else (float(sample.min()), float(sample.max()))
         corner = [2**why.level * n + start for n, start in zip(why.site, self._replay.origin, strict=True)]
-        return {"pixel": [row, col], "corner": corner, **described(why, partial(to_display, limits=limits))}
+        order, orders = int((why.neighbours.offsets**2).sum(1).max()), self._replay.largest_order(why.level)
+        found = {"pixel": [row, col], "corner": corner, "order": order, "orders": orders}
+        return found | described(why, partial(to_display, limits=limits))
+
+
+def film(job: Job, machine: Machine) -> tuple[dict[str, Any], list[bytes]]:
+    """Return what is counted in a small run, and RGBA pictures of its finest level: its sets, one by one, and its end.
+
+    ``steps`` and ``sites`` are those of the level's first sweep, ``sweeps`` those of the run, and ``together`` is the
+    share of the sites in the sets shown that relax together with a neighbour. A sweep of many sets is shown in part.
+    """
+    if max(*job.shape, *job.sample.shape[:2]) > FILM_SIDE:
+        raise ValueError(f"a film has an output and a sample of at most {FILM_SIDE} x {FILM_SIDE} pixels; give fewer")
+    replay = job.replay(machine)
+    own = [(n, one) for n, one in enumerate(replay.sweeps) if one.level == 0]
+    if not isinstance(replay, Replay) or not own:
+        raise ValueError("a film shows sweeps of a texture at its full size, and this run has none; give another one")
+    first = own[0][1]
+    moments = [(n, k) for n, one in own for k in range(1, one.sets + 1)]
+    moments = moments[:: -(-first.sets // FILM_FRAMES)][:FILM_FRAMES]
+    instants = [replay.at(*moment) for moment in moments]
+    moved = [int((one.relaxed == 2).sum()) for one in instants]
+    together = sum([replay.together(0, one.relaxed) for one in instants]) / sum(moved)
+    end = replay.at(-1)
+    instants.append(replace(end, relaxed=np.zeros_like(end.relaxed)))
+    pictures = [one.image if job.sample.ndim == 3 else one.image[..., 0] for one in instants]
+    layers = [
+        frames.overlay(image, one.relaxed, SET_COLOURS, FILM_SHARES)
+        for image, one in zip(pictures, instants, strict=True)
+    ]
+    counted = {"steps": first.sets, "sites": first.sites, "sweeps": len(replay.sweeps), "together": together}
+    shown = [frames.thumbnail(one, FILM_SIDE).pixels for one in layers]
+    return {"width": job.shape[1], "height": job.shape[0], **counted}, shown
 
 
 def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]:
@@ -250,6 +297,5 @@ def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]
         **{"temperature": why.temperature, "cooled": why.cooled, "values": why.values.tolist()},
         **{"channels": why.channels, "levels": near.values.tolist(), "trust": near.confidence.round(4).tolist()},
         "totals": why.totals[:MOST_TOTALS].astype(np.float64).round(1).tolist(),
-        **{"offsets": near.offsets.tolist(), "confidence": near.confidence.max(1).clip(0, 1).tolist()},
-        **{"pixels": display(near.pixels).tolist(), "candidates": candidates},
+        **{"offsets": near.offsets.tolist(), "pixels": display(near.pixels).tolist(), "candidates": candidates},
     }

@@ -28,7 +28,7 @@ from simdtex.io.image import EXAMPLES, TISSUE, example, read_bytes
 from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
 from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
-from simdtex.live.results import THUMBNAIL, Inside, Result, Results
+from simdtex.live.results import THUMBNAIL, Inside, Result, Results, film
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.display import temperature_colours
@@ -68,6 +68,9 @@ PREVIEW = 512
 
 LARGE = 1024
 """The first sample is only the middle of a picture with a longer side than this, pixels, so that it comes soon."""
+
+FILMED = ("coloring", "checkerboard", "synchronous", "raster")
+"""The schedules of which a page gets films."""
 
 DEMO_SIDE = 160
 """Rows and columns of the demonstration run on a page without a picture."""
@@ -146,6 +149,7 @@ class Session:
         self.results = Results()
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
         self._inside: dict[int, Inside] = {}  # the replayed results: the shown one, and one beside it
+        self._films: Iterator[bool] = iter(())  # the films that are still to be made
         self._window = frames.Window()
         self._wanted: Message | None = None  # the requested job, until it is finished
         self._asked: Message | None = None  # the last requested job with this picture
@@ -200,7 +204,8 @@ class Session:
 
     def _work(self) -> None:
         while not self._closed:
-            self._handle(*self._messages.get())
+            if not self._messages.empty() or not self._filming():
+                self._handle(*self._messages.get())
             self._handle_all()
             while self._wanted and not self._closed:
                 self._run(self._wanted)
@@ -208,6 +213,12 @@ class Session:
             if self._stale and self._unseen < MAX_UNSEEN:
                 with self._reported():
                     self._show_selected()
+
+    def _filming(self) -> bool:
+        """Make the next film; return False if there is none."""
+        with self._reported():
+            return next(self._films, False)
+        return False
 
     def _handle_all(self) -> None:
         while not self._messages.empty():
@@ -280,7 +291,7 @@ class Session:
         self.send({"kind": "lead", "place": roles.index("albedo") if "albedo" in roles else 0}, [])
 
     def _open(self, picture: Picture) -> None:
-        self._picture, self._maps, self._levels = picture, {}, None
+        self._picture, self._maps, self._levels, self._films = picture, {}, None, iter(())
         self._wanted, self._selected, self._stale, self._paused = None, None, True, False
         self._asked = None
         self._send_picture(new=True)
@@ -401,10 +412,26 @@ class Session:
     def _on_explain(self, message: Message, buffers: Sequence[Any]) -> None:
         for pane, one in enumerate(self._inside.values()):
             try:
-                found = one.explain(message.get("row"), message.get("col"))
+                other = {"order": message.get("order"), "trust": message.get("trust", 0)}
+                found = one.explain(message.get("row"), message.get("col"), **other)
             except ValueError as error:
                 found = {"pixel": [message.get("row"), message.get("col")], "reason": str(error)}
             self.send({"kind": "explained", "pane": pane, **found}, [])
+
+    def _on_schedules(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Make films of a small run with each of `FILMED`, one at a time, while no other message waits."""
+        if self._picture is None:
+            raise ValueError("there is no picture yet; give one first")
+        job = Job(message, self._picture, self._maps, self.results.find)
+        self._films = self._make_films(job)
+
+    def _make_films(self, job: Job) -> Iterator[bool]:
+        """Send a film of a job with each of `FILMED`, and yield True after each."""
+        for name in FILMED:
+            message = job.message | {"options": job.options | {"schedule": name}}
+            described, pictures = film(Job(message, *job.given, self.results.find), self._machine)
+            self.send({"kind": "schedule", "name": name, **described}, pictures)
+            yield True
 
     def _on_download(self, message: Message, buffers: Sequence[Any]) -> None:
         result, name = self.results.find(message.get("result")), str(message.get("name"))

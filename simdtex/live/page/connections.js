@@ -140,6 +140,7 @@ class Recording {
     const frame = () => this.emit(frames[`${this.layer} ${this.at}`] ?? frames[`picture ${this.at}`]);
     if (message.kind === "hello") start.forEach((one) => this.emit(one));
     else if (message.kind === "inside" && message.open) this.emit(inside);
+    else if (message.kind === "schedules") this.recorded.films.forEach((one) => this.emit(one));
     else if (message.kind === "view") {
       this.layer = message.layer;
       frame();

@@ -33,12 +33,17 @@ class Inside {
     this.waiting = this.late = false; // whether a moment is on its way, and whether the goal is another one
     this.pixel = null; // [row, column]
     this.beside = null; // the number of the result that is shown beside the selected one
-    const range = (label, onchange) => make("input", { type: "range", min: 0, max: 0, value: 0, step: 1, "aria-label": label, oninput: onchange });
-    this.sweepRange = range("Sweep", () => this.seek(Number(this.sweepRange.value), null));
-    this.setRange = range("Set of sites", () => this.seek(this.at[0], Number(this.setRange.value)));
+    this.pinned = null; // the pixel of a result that is shown no more, its moment and layer
+    this.asked = { order: null, trust: 0 }; // with which the pixel is explained: null, the order of the run
+    this.looking = this.explaining = this.again = false; // whether an answer is awaited, and another one after it
+    this.tables = []; // what the controls change, by pane
+    this.line = new TimeLine(this);
+    this.films = new Films(page);
     this.moment = make("output", { class: "moment" });
     this.playing = button("Play", () => this.play());
     this.choice = choice([], () => this.look(Number(this.choice.value) || null));
+    this.captions = make("p", { class: "captions" });
+    this.controls = this.dice();
     this.reasons = [0, 1].map(() => make("div", { class: "reason" }));
     const step = (text, label, by) => button(text, () => this.step(by), { "aria-label": label });
     const sweepStep = (text, label, by) => button(text, () => this.stepSweep(by), { "aria-label": label });
@@ -51,12 +56,18 @@ class Inside {
         this.playing,
         step("›", "A set of sites on", 1),
         sweepStep("»", "A sweep on", 1),
+        this.moment,
+      ),
+      this.line.element,
+      bar(
         labelled("Beside it", this.choice),
         button("Save this view", () => this.page.saveView(), { class: "save" }),
+        button("Copy a link", () => this.link(), { class: "save" }),
       ),
-      make("div", { class: "lines" }, make("span", {}, "Sweep"), this.sweepRange, make("span", {}, "Set"), this.setRange),
-      this.moment,
+      this.captions,
+      this.controls,
       make("div", { class: "reasons" }, ...this.reasons),
+      this.films.element,
     );
     this.status = make("p", { role: "status" });
     this.element = make(
@@ -74,7 +85,10 @@ class Inside {
 
   toggled() {
     if (this.element.open) this.look(this.beside);
-    else this.close();
+    else {
+      this.close();
+      this.pinned = null;
+    }
   }
 
   /** Ask for the run of the selected result, and of the one beside it. */
@@ -83,16 +97,18 @@ class Inside {
     this.status.textContent = this.page.shown === null ? "Look inside when there is a result." : "The run is repeated …";
     this.beside = beside;
     this.page.view.split(beside !== null);
-    if (this.page.shown !== null) this.page.send({ kind: "inside", open: true, beside });
+    this.looking = this.page.shown !== null;
+    if (this.looking) this.page.send({ kind: "inside", open: true, beside });
   }
 
-  /** Close the time line. */
+  /** Close the time line; the pixel and its moment come back with the next result. */
   close() {
     this.stop();
+    if (this.pixel && this.open) this.pinned = { pixel: this.pixel, moment: this.place, layer: this.page.layer };
     if (!this.body.hidden) this.page.send({ kind: "inside", open: false });
     this.body.hidden = true;
     this.at = this.goal = this.beside = null;
-    this.waiting = this.late = false;
+    this.waiting = this.late = this.looking = this.explaining = this.again = false;
     this.unpick();
     this.page.view.split(false);
     if (this.page.layer === "sets") this.page.showLayer("picture");
@@ -100,28 +116,40 @@ class Inside {
 
   /** Show why there is nothing to look into. */
   failed(text) {
-    this.waiting = false;
+    this.waiting = this.explaining = false;
     if (!this.page.view.panes[1].frame) this.page.view.split(false);
+    if (this.looking && !this.body.hidden) this.close(); // the session has forgotten what was open
     if (this.element.open && this.body.hidden) this.status.textContent = text;
   }
 
   on_inside({ panes }, buffers) {
     this.panes = panes;
     this.samples = panes.map(({ preview }, n) => bitmap(buffers[n], ...preview));
-    [this.sweeps, this.body.hidden] = [panes[0].sweeps, false];
+    [this.sweeps, this.body.hidden, this.looking] = [panes[0].sweeps, false, false];
     this.status.textContent = "";
+    this.tables = [];
+    this.line.build(this.sweeps);
     this.beside = panes[1]?.result ?? null;
     this.page.view.split(panes.length > 1);
     const others = [...this.page.results.values()].filter(({ result, layers }) => result !== panes[0].result && layers.includes("temperature"));
     this.choice.replaceChildren(...choices([["", "Nothing"], ...others.map(({ result }) => [`${result}`, `Result ${result}`])]));
     this.choice.value = this.beside ?? "";
-    this.sweepRange.max = this.sweeps.length;
+    const [own, other] = panes.map(({ result }) => this.page.results.get(result));
+    this.captions.textContent = other ? `Result ${other.result} beside it: ${this.page.differences(own.settings, other.settings)}.` : "";
     const [at] = panes.map(({ moment }) => moment);
     this.goal = at;
     this.show(at);
-    if (panes.length > 1 && at) this.seek(...at);
-    if (this.pixel) this.explain();
+    const { pixel, moment, layer } = this.pinned ?? {};
+    this.pinned = null;
+    if (pixel) {
+      const { height, width } = this.page.results.get(panes[0].result);
+      this.pixel = [Math.min(pixel[0], height - 1), Math.min(pixel[1], width - 1)];
+    }
+    if (moment) this.seekPlace(...moment);
+    else if (panes.length > 1 && at) this.seek(...at);
+    else if (this.pixel) this.explain();
     else this.hint();
+    if (moment && layer === "sets") this.page.showLayer(layer);
   }
 
   // -- the time line
@@ -132,6 +160,17 @@ class Inside {
     this.goal = number < this.sweeps.length ? [number, sets ?? this.sweeps[number][2]] : null;
     if (this.waiting) this.late = true;
     else this.ask();
+  }
+
+  /** Go to a sweep of a level, or to the last one before it. */
+  seekPlace(level, sweep, sets) {
+    const found = this.sweeps.findLastIndex((one) => one[0] === level && one[1] <= sweep);
+    this.seek(found < 0 ? this.sweeps.length : found, Math.min(sets, this.sweeps[found]?.[2] ?? 0));
+  }
+
+  /** The level, the sweep and the sets of the present moment; null for the result. */
+  get place() {
+    return this.at && [...this.sweeps[this.at[0]].slice(0, 2), this.at[1]];
   }
 
   /** Ask for the goal. */
@@ -154,12 +193,8 @@ class Inside {
   show(moment) {
     this.at = moment;
     const [number, sets] = moment ?? [this.sweeps.length, 0];
-    this.sweepRange.value = number;
-    this.setRange.disabled = !moment;
-    this.setRange.max = moment ? this.sweeps[number][2] : 0;
-    this.setRange.value = sets;
     this.moment.textContent = moment ? this.describe(number, sets) : "The result.";
-    this.sweepRange.setAttribute("aria-valuetext", this.moment.textContent);
+    this.line.show(number, sets, this.moment.textContent);
   }
 
   describe(number, sets) {
@@ -179,6 +214,16 @@ class Inside {
 
   stepSweep(by) {
     this.seek((this.goal?.[0] ?? this.sweeps.length) + by, null);
+  }
+
+  /** Act on a key of the line of time; return whether it is one. */
+  timeKey(key) {
+    const acts = {
+      ...{ ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), ArrowDown: () => this.stepSweep(-1), ArrowUp: () => this.stepSweep(1) },
+      ...{ Home: () => this.seek(0, 0), End: () => this.seek(this.sweeps.length) },
+    };
+    acts[key]?.();
+    return key in acts;
   }
 
   play() {
@@ -211,6 +256,7 @@ class Inside {
   // -- why
 
   hint() {
+    this.controls.hidden = true;
     this.reasons[0].replaceChildren(make("p", {}, HOW));
     this.reasons[1].replaceChildren();
   }
@@ -248,22 +294,36 @@ class Inside {
     this.hint();
   }
 
+  /** Ask why; if an answer is on its way, after it. */
   explain() {
-    this.page.send({ kind: "explain", row: this.pixel[0], col: this.pixel[1] });
+    this.again = this.explaining;
+    if (!this.pixel || this.explaining) return;
+    this.explaining = true;
+    this.page.send({ kind: "explain", row: this.pixel[0], col: this.pixel[1], ...this.asked });
   }
 
   on_explained(why) {
+    if (why.pane === this.panes.length - 1) {
+      this.explaining = false;
+      if (this.again) this.explain();
+    }
     if (!this.pixel) return;
+    why.confidence = why.trust?.map((each) => clamp(Math.max(...each), 0, 1));
     this.page.view.panes[why.pane].why = why;
     this.page.view.draw();
     const place = this.reasons[why.pane];
     const title = this.beside === null ? "" : `Result ${this.panes[why.pane].result}, `;
     const text = `${title}pixel (row ${why.pixel[0]}, column ${why.pixel[1]}). ${sentence(why.reason.replace(/\.$/, ""))}`;
     const heading = make("p", {}, text[0].toUpperCase() + text.slice(1));
+    this.tables[why.pane] = null;
+    this.controls.hidden = false;
     if (!why.candidates) {
+      this.said.textContent = sentence(why.reason.replace(/\.$/, ""));
       place.replaceChildren(heading);
       return;
     }
+    this.order.disabled = !why.orders;
+    if (why.orders) [this.order.max, this.order.value] = [Math.min(why.orders, 32), why.order];
     const cooled = `Temperature ${why.temperature.toFixed(3)}, after the relaxation ${why.cooled.toFixed(3)}. Bandwidth h = ${why.bandwidth.toFixed(2)} grey levels.`;
     const white = (levels) => levels.map((pixel, n) => pixel.map((one) => one * why.confidence[n] + 255 * (1 - why.confidence[n])));
     const seen = [this.tile(why.offsets, white(why.pixels), null, 2 * TILE)];
@@ -271,7 +331,8 @@ class Inside {
     if (structure) seen.push(this.tile(why.offsets, white(why.levels.map(structure)), null, 2 * TILE));
     const caption = `Its neighbourhood${structure ? ", and the same in the structure channel" : ""}; white: confidence 1 − t is 0.`;
     const around = make("figure", {}, bar(...seen), make("figcaption", {}, caption));
-    place.replaceChildren(heading, make("p", {}, cooled), make("div", { class: "bar seen" }, around, this.marks(why)), ...this.table(why), ...this.density(why));
+    place.replaceChildren(heading, make("p", {}, cooled), make("div", { class: "bar seen" }, around, this.marks(why)), this.table(why), ...this.density(why));
+    this.follow();
   }
 
   /** A neighbourhood as a picture: pixels at offsets, and one in the middle. */
@@ -318,7 +379,7 @@ class Inside {
     return hidden < 0 ? null : (levels) => [(255 * Math.min(levels[hidden], most)) / most];
   }
 
-  /** The candidates, and controls that change their probabilities: h, and another draw. */
+  /** The candidates; the controls change their probabilities. */
   table(why) {
     const { candidates, offsets, pane, channels, totals, bandwidth } = why;
     const structure = this.structure(why);
@@ -347,38 +408,88 @@ class Inside {
       }
     };
     set(({ probability }) => probability);
-    const scrolled = make(
+    this.tables[pane] = { rows, set, totals, bandwidth, about: `order ${why.order}, ${offsets.length} neighbours` };
+    return make(
       "div",
       { class: "wide", tabindex: 0, role: "region", "aria-label": `Candidates of result ${this.panes[pane].result}` },
       make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text, n) => make("th", { scope: "col", class: n < shown ? null : "more" }, text)))), make("tbody", {}, ...rows.map(({ line }) => line))),
     );
-    return [scrolled, this.dice(rows, set, totals, bandwidth)];
   }
 
-  /** Controls of a site's choice: the bandwidth, which acts on the probabilities at once, and another draw. */
-  dice(rows, set, totals, bandwidth) {
-    let weights = null;
-    const weight = (total, h) => Math.exp((totals[0] - total) / (2 * h * h));
-    const said = make("output", {}, "");
-    const width = make("input", { type: "range", min: -2, max: 2, step: 0.02, value: 0 });
-    const follow = () => {
-      const h = bandwidth * 2 ** Number(width.value);
-      weights = totals.map((total) => weight(total, h));
-      const all = sum(weights);
-      set(({ costs }) => weight(costs.total, h) / all);
-      said.textContent = `h = ${h.toFixed(2)}: ${Math.round(1 / sum(weights.map((one) => (one / all) ** 2)))} candidates count.`;
+  /** Controls of a pixel's choice: the bandwidth, which acts here; order and trust, by which it is explained again. */
+  dice() {
+    const range = (attributes, oninput) => make("input", { type: "range", ...attributes, oninput });
+    this.width = range({ min: -2, max: 2, step: 0.02, value: 0 }, () => this.follow());
+    this.order = range({ min: 1, max: 8, value: 8, disabled: true }, () => this.askWith({ order: Number(this.order.value) }));
+    this.trust = range({ min: 0, max: 1, step: 0.05, value: 0 }, () => this.askWith({ trust: Number(this.trust.value) }));
+    this.said = make("output");
+    const reset = () => {
+      this.width.value = this.trust.value = 0;
+      this.askWith({ order: null, trust: 0 });
     };
-    width.addEventListener("input", follow);
-    const draw = () => {
-      if (!weights) follow();
-      const u = Math.random();
+    return make(
+      "div",
+      { class: "bar dice" },
+      labelled("Bandwidth h", this.width),
+      labelled("Order", this.order),
+      labelled("Trust", this.trust),
+      button("Draw again", () => this.draw()),
+      button("As in the run", reset),
+      this.said,
+    );
+  }
+
+  askWith(asked) {
+    Object.assign(this.asked, asked);
+    this.explain();
+  }
+
+  /** The bandwidth, and the weights of all candidates of a table with it. */
+  weights({ totals, bandwidth }) {
+    const h = bandwidth * 2 ** Number(this.width.value);
+    const weight = (total) => Math.exp((totals[0] - total) / (2 * h * h));
+    return { h, weight, weights: totals.map(weight) };
+  }
+
+  /** Show the probabilities with the bandwidth of the slider, and what all controls say. */
+  follow() {
+    const texts = this.tables.filter(Boolean).map((table) => {
+      const { h, weight, weights } = this.weights(table);
+      const all = sum(weights);
+      if (Number(this.width.value)) table.set(({ costs }) => weight(costs.total) / all);
+      else table.set(({ probability }) => probability);
+      return `h = ${h.toFixed(2)}: ${Math.round(1 / sum(weights.map((one) => (one / all) ** 2)))} candidates count; ${table.about}`;
+    });
+    const trust = this.asked.trust ? `; doubt t of the neighbours: ${Math.round(100 * (1 - this.asked.trust))} % of the run's` : "";
+    this.said.textContent = texts.length ? `${texts.join("; ")}${trust}.` : "";
+  }
+
+  /** Draw one of the candidates, without a change of the result. */
+  draw() {
+    const u = Math.random();
+    const ranks = this.tables.filter(Boolean).map((table) => {
+      const { weights } = this.weights(table);
       let rank = 0;
       for (let left = u * sum(weights) - weights[0]; left > 0 && rank < weights.length - 1; left -= weights[rank]) rank += 1;
-      said.textContent = `The dice say ${u.toFixed(3)}: the candidate of rank ${rank}.`;
-      for (const { one, line } of rows) line.classList.toggle("again", one.rank === rank);
-    };
-    width.setAttribute("aria-label", "Bandwidth h");
-    return make("div", { class: "bar dice" }, "Bandwidth h", width, button("Draw again", draw), said);
+      for (const { one, line } of table.rows) line.classList.toggle("again", one.rank === rank);
+      return rank;
+    });
+    if (ranks.length) this.said.textContent = `The dice say ${u.toFixed(3)}: the candidate of rank ${ranks.join(" and ")}.`;
+  }
+
+  /** Copy an address that brings the view back. */
+  link() {
+    const link = linkOf(this.page);
+    if (!link) {
+      this.page.warn("Only a run of an example can be linked, without maps and guide; save this view instead.");
+      return;
+    }
+    history.replaceState(null, "", link);
+    this.page.copy(location.href);
+  }
+
+  on_schedule(message, pictures) {
+    this.films.add(message, pictures);
   }
 
   /** The terms of equation (12) as a picture; a pixel names its own terms. */
@@ -414,21 +525,22 @@ class Inside {
 
 // -- the lecture --------------------------------------------------------------------------------------------------
 
+// The model of the paper, with a probability for every candidate; JSON, which docs/recorded.py reads.
 const PLAIN = {
-  ...{ relaxation: "gibbs", pixel: "density", search: "exact", order: 8, levels: 2, bandwidth: 0.6, lattice: "none" },
-  ...{ structure: 0, coherence: 0, balance: 0, novelty: 0, finish: 0 },
-}; // the model of the paper, with a probability for every candidate
+  "relaxation": "gibbs", "pixel": "density", "search": "exact", "order": 8, "levels": 2, "bandwidth": 0.6,
+  "lattice": "none", "structure": 0, "coherence": 0, "balance": 0, "novelty": 0, "finish": 0
+};
 const SIDE = 32; // pixels of its picture; the sample has half as many more
 
 const KEYS = "Enter: on; F: full screen; ← →: a set; ↑ ↓: a sweep; space: play; N: another pixel; Escape: close.";
 
 const LECTURE = [
   [".panes", "What does the model know about a texture?", "Only these pixels. No edge, colour or shape is described anywhere: every rule that follows is read off the sample."],
-  [".panes", "Which pixels decide about this one?", "Its neighbours, the outlined pixels: a Markov random field. A neighbour counts as far as it is trusted, 1 − t: outlines are strong where temperatures t are low."],
-  [".reasons", "Where in the sample does it look like this?", "Each line is a place of the sample beside the pixel's neighbourhood. Orange is what differs: the terms of equation (12), which add up to the distance. A small distance is a large probability, and one place is drawn. Move h, or draw again."],
-  [".lines", "When is a pixel certain?", "A relaxed pixel gets the mean temperature of its neighbours, less a little: equation (13). Bright is hot. When all pixels are cold, the level is at its equilibrium."],
-  [".lines", "Why are there so few pixels at first?", "Local rules spread large shapes slowly. Every second pixel comes first, so that a neighbourhood reaches twice as far; they stay, and the others are drawn around them."],
-  [".panes", "May all pixels change at the same time?", "Only pixels that are not neighbours: each is drawn given its neighbours, which must not move meanwhile. The coloured pixels are such a set. In 1998, 16,384 processors relaxed one set after another."],
+  [".panes", "Which pixels decide about this one?", "{near:Its neighbours}, the outlined pixels: a Markov random field. A neighbour counts as far as it is trusted, 1 − t: outlines are strong where {hot:temperatures} t are low."],
+  [".reasons", "Where in the sample does it look like this?", "Each line is a place of the sample beside the pixel's neighbourhood. {differs:Orange} is what differs: the terms of equation (12), which add up to the distance. A small distance is a large probability, and {taken:one place is drawn}. Move h, order and trust, or draw again."],
+  [".line", "When is a pixel certain?", "A relaxed pixel gets the mean {hot:temperature} of its neighbours, less a little: equation (13). Bright is hot, and {hot:high bars} are. When all pixels are cold, the level is at its equilibrium."],
+  [".line", "Why are there so few pixels at first?", "Local rules spread large shapes slowly. Every second pixel comes first, so that a neighbourhood reaches twice as far; they stay, and the others are drawn around them."],
+  [".panes", "May all pixels change at the same time?", "Only pixels that are not neighbours: each is drawn given its neighbours, which must not change meanwhile. {taken:The coloured pixels} are such a set, a step of a schedule. In 1998, 16,384 processors relaxed one set after another."],
 ]; // what is pointed at, a question, and its answer
 
 /** Six questions and answers on a run of the plain model. */
@@ -440,7 +552,7 @@ class Lecture {
     this.forth = button("Answer", () => this.on(), { class: "next" });
     this.back = button("Back", () => this.go(this.number - 1));
     const buttons = bar(this.back, this.forth, button("Full screen (F)", () => this.full()), button("Close", () => this.close()));
-    this.element = make("section", { class: "tour", role: "dialog", "aria-labelledby": "simdtex-lecture", hidden: true, tabindex: -1, title: KEYS }, this.title, this.text, buttons);
+    this.element = make("section", { class: "questions", role: "dialog", "aria-labelledby": "simdtex-lecture", hidden: true, tabindex: -1, title: KEYS }, this.title, this.text, buttons);
     this.element.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -456,7 +568,8 @@ class Lecture {
     }
     const { width, height } = page.picture;
     const part = [0, 0, ...[width, height].map((side) => Math.min(side, SIDE + SIDE / 2))];
-    page.send({ kind: "make", job: "synth", method: "mrf", width: SIDE, height: SIDE, seed: 1, options: PLAIN, part });
+    this.run = { kind: "make", job: "synth", method: "mrf", width: SIDE, height: SIDE, seed: 1, options: PLAIN, part };
+    page.send(this.run);
     let made = page.connection instanceof Recording ? page.results.get(page.shown) : null;
     while (made?.settings.options.relaxation !== PLAIN.relaxation || made.width !== SIDE) {
       made = await done("result");
@@ -494,14 +607,21 @@ class Lecture {
     if (number === 0) inside.unpick();
     else inside.pixel ??= [9, 9];
     inside.seek(...moments[number]);
+    this.page.root.classList.remove("filmed");
+    if (number === LECTURE.length - 1) inside.films.ask(this.run);
     this.point(place);
   }
 
   /** Show the answer, or the next question. */
   on() {
+    const { inside } = this.page;
     if (this.forth.textContent !== "Answer") this.go(this.number + 1);
     else {
-      [, , this.text.textContent] = LECTURE[this.number];
+      this.text.replaceChildren(...worded(LECTURE[this.number][2]));
+      if (this.number === LECTURE.length - 1) {
+        this.page.root.classList.add("filmed");
+        inside.films.play();
+      }
       this.forth.textContent = this.number === LECTURE.length - 1 ? "End" : "Next";
     }
   }
@@ -510,13 +630,13 @@ class Lecture {
     const { inside } = this.page;
     const keys = {
       ...{ Escape: () => this.close(), Enter: () => this.on(), f: () => this.full(), n: () => inside.pick(...inside.another()) },
-      ...{ ArrowLeft: () => inside.step(-1), ArrowRight: () => inside.step(1), ArrowUp: () => inside.stepSweep(-1), ArrowDown: () => inside.stepSweep(1) },
       " ": () => inside.play(),
     };
     const act = keys[event.key.length > 1 ? event.key : event.key.toLowerCase()];
-    if (!act || event.target.tagName === "BUTTON" && ["Enter", " "].includes(event.key)) return;
+    if (event.target.tagName === "BUTTON" && ["Enter", " "].includes(event.key)) return;
+    if (!act && !inside.timeKey(event.key)) return;
     event.preventDefault();
-    act();
+    act?.();
   }
 
   /** Fill the screen, in large letters; or leave it. */
@@ -534,7 +654,7 @@ class Lecture {
   close() {
     if (document.fullscreenElement) document.exitFullscreen();
     this.element.hidden = true;
-    this.page.root.classList.remove("lecture");
+    this.page.root.classList.remove("lecture", "filmed");
     this.page.view.fit();
     this.point(null);
     this.opener.focus();

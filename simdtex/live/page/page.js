@@ -491,6 +491,7 @@ class Page {
       this.ready = true;
     }
     this.say("Ready.");
+    if (message.fresh) followLink(this);
     if (message.fresh) setTimeout(() => !this.picture && this.send({ kind: "demo" }), 300); // any message ends its run
     this.inside.close();
     this.results = new Map();

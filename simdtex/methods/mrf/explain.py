@@ -8,6 +8,7 @@ it serves both a run in progress (`simdtex.run.Progress.explain`) and a run that
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +16,12 @@ from numpy.typing import NDArray
 
 from simdtex.methods.mrf.level import Lattices, with_penalty
 from simdtex.model.explanation import Explanation, Neighbours, Ranked
+from simdtex.model.lattice import MOST_ORDER, neighbourhood_offsets
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import continuing
 from simdtex.ops.neighbourhood import Field, near
 from simdtex.ops.relax import SUGGESTING, AllCandidates, Relaxation, relax_out_of_place
+from simdtex.options import real, whole
 
 MOST = 100
 """The most candidates whose terms are returned, the first by rank."""
@@ -99,6 +102,50 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
         totals=np.sort(total),
         density=_density(weights, pixels[: candidates.made], choice) if choice.density else None,
     )
+
+
+def largest_order(twin: Lattices, level: int) -> int:
+    """Return the largest order that `with_order` takes at a level, 0 unless the search is exact there."""
+    sample = twin.of(level)
+    if not isinstance(sample.level(level).proposal, AllCandidates):
+        return 0
+    side = min(min(one.shape[1:]) for one in sample.sample.levels)
+    radius = min(sample.sample.margin // sample.spacing(level), (side - 1) // 2)
+    return min(MOST_ORDER, (int(radius) + 1) ** 2 - 1)
+
+
+def with_order(twin: Lattices, moment: Moment, order: int) -> tuple[Lattices, Moment]:
+    """Return a run's plan with a neighbourhood of another order, and a moment of the run with its candidates.
+
+    Raises ValueError if the order is beyond `largest_order`, or if the candidates differ and the run has penalties.
+    """
+    level, most = moment.level, largest_order(twin, moment.level)
+    if not most:
+        raise ValueError(
+            'a site is explained with another order only if it evaluates all candidates; give search="exact"'
+        )
+    before = twin.of(level)
+    whole("order", order, 1)
+    if order > most:
+        raise ValueError(f"order is {order} and the sample of level {level} holds {most}; give 1 to {most}")
+    axes = before.offsets.shape[1]
+    options = replace(before.options, order=order)
+    plan = replace(before.plan, offsets=neighbourhood_offsets(order, axes), options=options, coarser=None)
+    after = Lattices(plan, before.machine, before.seed, None if before is twin else before.conditions)
+    here, there = (one.level(level).proposal.candidates.positions for one in (before, after))
+    if np.array_equal(here, there):
+        return after, moment
+    if moment.penalty.any():
+        raise ValueError(f"order {order} has other candidates, whose use is not counted; give balance=0")
+    return after, moment._replace(penalty=np.zeros(len(there), np.float32))
+
+
+def with_trust(moment: Moment, pixel: int, trust: float) -> Moment:
+    """Return a moment at which all sites but one have (1 - ``trust``) times their temperatures."""
+    real("trust", trust, 0, 1)
+    temperature = np.round(moment.field.temperature * (1 - trust)).astype(np.uint16)
+    temperature.flat[pixel] = moment.field.temperature.flat[pixel]
+    return moment._replace(field=moment.field._replace(temperature=temperature))
 
 
 def site_number(run: Lattices, number: int, site: tuple[int, ...]) -> int:

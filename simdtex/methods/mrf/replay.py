@@ -13,7 +13,7 @@ from simdtex import schedules
 from simdtex.machine import Machine
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.algorithm import run_steps
-from simdtex.methods.mrf.explain import Moment, explained, site_number
+from simdtex.methods.mrf.explain import Moment, explained, largest_order, site_number, with_order, with_trust
 from simdtex.methods.mrf.level import Lattices, State
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.record import picture, sources, temperatures
@@ -129,11 +129,24 @@ class Replay:
         seen = picture(run, grid, field), sources(run, grid, field), temperatures(run, grid, field)
         return Instant(level, *seen, done)
 
-    def explain(self, site: tuple[int, ...], level: int = 0, sweep: int | None = None) -> Explanation:
+    def explain(
+        self,
+        site: tuple[int, ...],
+        level: int = 0,
+        sweep: int | None = None,
+        *,
+        order: int | None = None,
+        trust: float = 0.0,
+    ) -> Explanation:
         """Return an explanation of the value that a site of a level took in a sweep of the level.
 
         ``sweep`` counts from 1; None is the last sweep in which the site relaxes. Raises ValueError if there is no such
         site or level, or if the site does not relax there.
+
+        With ``order``, the explanation describes what the site would take with a neighbourhood of that order, and with
+        ``trust``, 0 to 1, what it would take if the other sites' temperatures were 1 - ``trust`` times theirs: with 1,
+        as if all neighbours were certain. The field, the seed and all else stay as in the run. Raises ValueError if the
+        search at the level is not exact, or the level's sample does not hold the order (`largest_order`).
         """
         if not 0 <= level < self._run.levels:
             raise ValueError(
@@ -145,17 +158,27 @@ class Replay:
             pass
         for n, one in reversed(list(enumerate(self._sweeps))):
             if one.level == level and sweep in (None, one.sweep) and (moment := self._moment(n, pixel)):
-                return explained(self._twin, moment, site)
+                return self._explained(moment, site, order, trust)
         where = f"level {level}" + (f", sweep {sweep}" if sweep else "")
         raise ValueError(
             f"site {site} does not relax at {where}: it keeps its value; give another site, sweep or level"
         )
 
-    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
+    def explain_pixel(
+        self,
+        row: int,
+        col: int,
+        sweep: int = -1,
+        sets: int | None = None,
+        *,
+        order: int | None = None,
+        trust: float = 0.0,
+    ) -> Explanation:
         """Return an explanation of the value of an output pixel after the first ``sets`` sets of a sweep, None: all.
 
         It explains the last relaxation until then: on the sweep's level or, if the pixel has kept its value since, on a
         level above. Raises ValueError if there was none: the value is known, or was drawn at random at the start.
+        ``order`` and ``trust`` are as in `explain`.
         """
         sweep = range(len(self.sweeps))[sweep]
         limits: dict[int, int | None] = {sweep: sets}
@@ -164,11 +187,28 @@ class Replay:
             pixel = site_number(self._run, level, (row, col))
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
-                    return explained(self._twin, moment, (row, col))
+                    return self._explained(moment, (row, col), order, trust)
             if (row % 2 or col % 2) and not self._twin.of(level).coarser:  # no site of the level above
                 break
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
+
+    def together(self, level: int, relaxed: NDArray[np.uint8]) -> int:
+        """Return how many sites of the last set, 2 in ``relaxed`` of `Instant`, have a neighbour in that set."""
+        sites = np.flatnonzero(relaxed == 2).astype(np.int32)
+        neighbours = self._twin.grid(level).neighbours(sites, self._twin.of(level).offsets)
+        return int(np.isin(neighbours, sites).any(0).sum())
+
+    def largest_order(self, level: int) -> int:
+        """Return the largest order with which a site of a level is explained; 0 if its search is not exact."""
+        return largest_order(self._twin, level)
+
+    def _explained(self, moment: Moment, site: tuple[int, ...], order: int | None, trust: float) -> Explanation:
+        """Return an explanation of a moment, with another order or more trust."""
+        twin, moment = self._twin, with_trust(moment, site_number(self._twin, moment.level, site), trust)
+        if order not in (None, twin.of(moment.level).options.neighbourhood):
+            twin, moment = with_order(twin, moment, order)
+        return explained(twin, moment, site)
 
     def _record(self) -> bool:
         """Run the next sweep, and keep the state before it; return False if the run has ended."""
