@@ -601,7 +601,7 @@ class Lecture {
     const { inside } = this.page;
     const finest = inside.sweeps.findIndex(([level]) => level === 0);
     this.page.showLayer(["sample", , , "temperature", , "sets"][number] ?? "picture");
-    const moments = [[inside.sweeps.length, 0], [finest + 1, null], [finest + 1, null], [finest + 1, null], [finest, 0], [finest + 1, 1]];
+    const moments = [[inside.sweeps.length, 0], [finest + 1, null], [finest + 1, null], [finest + 1, null], [finest - 1, null], [finest + 1, 1]];
     if (number === 0) inside.unpick();
     else inside.pixel ??= [9, 9];
     inside.seek(...moments[number]);
