@@ -717,6 +717,8 @@ def test_a_link_brings_a_look_into_an_example_back(inside, served):
         until(lambda: other.status == "The view is restored.")
         until(lambda: other.script("return [page.inside.at, page.inside.pixel, page.layer]") == wanted)
         assert explained(other)["pixel"] == [20, 31]
+        other.script("location.hash = '#granite&size=40,24'")
+        until(lambda: 'no example "granite"' in other.alert)
         other.script("location.hash = '#gravel&size=40,24&order=2'")
         until(
             lambda: (

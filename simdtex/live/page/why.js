@@ -151,6 +151,11 @@ async function followLink(page) {
   if (page.root.parentElement?.id !== "simdtex-live") return; // the address of a notebook is not the page's
   window.onhashchange = () => followLink(page);
   if (location.hash.length < 2) return;
-  await page.restoreView(new TextEncoder().encode(JSON.stringify(viewOf(location.hash))));
+  const view = viewOf(location.hash);
+  if (![...page.examples.children].some(({ textContent }) => textContent === view.given.name)) {
+    page.warn(`There is no example "${view.given.name}", which the link names; choose one on the page.`);
+    return;
+  }
+  await page.restoreView(new TextEncoder().encode(JSON.stringify(view)));
   page.view.fit();
 }
