@@ -271,6 +271,18 @@ def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
             assert reason == str(error)
 
 
+def test_recorded_films_are_of_the_four_schedules_and_end_in_the_result(recording):
+    found, data = recording
+    counted = {message["name"]: (message, places) for message, places in found["films"]}
+    assert list(counted) == list(recorded.FILMED)
+    _, ((begin, size),) = found["frames"]["picture null"]
+    first, last = (counted["coloring"][n] for n in (0, 1))
+    assert data[begin : begin + size] == data[last[-1][0] : sum(last[-1])]
+    sweeps = found["inside"][0]["panes"][0]["sweeps"]
+    fine = next(one for one in sweeps if one[0] == 0)
+    assert [first[name] for name in ("steps", "sites", "sweeps", "together")] == [*fine[2:4], len(sweeps), 0]
+
+
 def test_the_recording_is_small_and_packs(recording):
     assert recorded.FILE.stat().st_size < 700_000
     assert recorded.unpack(recorded.pack(*recording)) == recording

@@ -243,8 +243,8 @@ def test_what_no_site_can_be_explained_with_is_refused(exact):
     replay, n = exact
     assert [replay.largest_order(level) for level in (0, 1)] == [8, 3]
     refused = {
-        "order is 9 and the sample of level 0 holds 8": {"order": 9},
-        "order is 0; give 1 or more": {"order": 0},
+        "order at level 0 is 9; give 8 or fewer": {"order": 9},
+        "order at level 0 is 0; give 1 or more": {"order": 0},
         "trust is 1.5; give at most 1": {"trust": 1.5},
         "trust must be a number": {"trust": "much"},
     }

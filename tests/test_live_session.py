@@ -836,9 +836,9 @@ def test_a_pixel_is_explained_with_another_order_and_more_trust(page_inside):
         assert found["offsets"] == why.neighbours.offsets.tolist()
         np.testing.assert_allclose(found["trust"], why.neighbours.confidence, atol=1e-4)
         np.testing.assert_allclose(found["totals"], why.totals[: len(found["totals"])], atol=0.1)
-    assert "holds 8" in page_inside.ask("explained", kind="explain", row=5, col=7, order=9)[0]["reason"]
+    assert "give 8 or fewer" in page_inside.ask("explained", kind="explain", row=5, col=7, order=9)[0]["reason"]
     assert "trust is 2" in page_inside.ask("explained", kind="explain", row=5, col=7, trust=2)[0]["reason"]
-    assert "Order must be an integer" in page_inside.error(kind="explain", row=5, col=7, order="x")
+    assert "order at level 0 must be an integer" in page_inside.error(kind="explain", row=5, col=7, order="x")
 
 
 def test_films_of_four_schedules_are_made_while_nothing_else_is_asked(page_inside):

@@ -47,14 +47,8 @@ SET_SHARES = (0.0, 0.6, 1.0)
 MOST_TOTALS = 1024
 """The most total costs of candidates that the page gets, the least ones."""
 
-FILM_SHARES = (0.0, 0.2, 0.7)
-"""Shares of these colours in films."""
-
-FILM_FRAMES = 24
-"""The number of sets of sites that a film shows."""
-
-FILM_SIDE = 64
-"""The longest side of the output and of the sample of a film, pixels."""
+FILM_SHARES, FILM_FRAMES, FILM_SIDE = (0.0, 0.2, 0.7), 24, 64
+"""Of a film: shares of these colours, the most sets of sites, and the longest side of its output and its sample."""
 
 BARS = 64
 """The most bars of the LCPDF of a channel."""
@@ -254,16 +248,11 @@ def film(job: Job, machine: Machine) -> tuple[dict[str, Any], list[bytes]]:
     moments = [(n, k) for n, one in own for k in range(1, one.sets + 1)]
     moments = moments[:: -(-first.sets // FILM_FRAMES)][:FILM_FRAMES]
     instants = [replay.at(*moment) for moment in moments]
-    moved = [int((one.relaxed == 2).sum()) for one in instants]
-    together = sum([replay.together(0, one.relaxed) for one in instants]) / sum(moved)
+    together = np.mean(np.concatenate([replay.together(one) for one in instants]))
     end = replay.at(-1)
     instants.append(replace(end, relaxed=np.zeros_like(end.relaxed)))
-    pictures = [one.image if job.sample.ndim == 3 else one.image[..., 0] for one in instants]
-    layers = [
-        frames.overlay(image, one.relaxed, SET_COLOURS, FILM_SHARES)
-        for image, one in zip(pictures, instants, strict=True)
-    ]
-    counted = {"steps": first.sets, "sites": first.sites, "sweeps": len(replay.sweeps), "together": together}
+    layers = [frames.overlay(one.image, one.relaxed, SET_COLOURS, FILM_SHARES) for one in instants]
+    counted = {"steps": first.sets, "sites": first.sites, "sweeps": len(replay.sweeps), "together": float(together)}
     shown = [frames.thumbnail(one, FILM_SIDE).pixels for one in layers]
     return {"width": job.shape[1], "height": job.shape[0], **counted}, shown
 

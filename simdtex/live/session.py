@@ -422,8 +422,7 @@ class Session:
         """Make films of a small run with each of `FILMED`, one at a time, while no other message waits."""
         if self._picture is None:
             raise ValueError("there is no picture yet; give one first")
-        job = Job(message, self._picture, self._maps, self.results.find)
-        self._films = self._make_films(job)
+        self._films = self._make_films(Job(message, self._picture, self._maps, self.results.find))
 
     def _make_films(self, job: Job) -> Iterator[bool]:
         """Send a film of a job with each of `FILMED`, and yield True after each."""

@@ -381,7 +381,7 @@ class Inside {
 
   /** The candidates; the controls change their probabilities. */
   table(why) {
-    const { candidates, offsets, pane, channels, totals, bandwidth } = why;
+    const { candidates, offsets, pane, channels } = why;
     const structure = this.structure(why);
     const terms = candidates.map(({ values }) => why.levels.map((x, n) => x.map((level, c) => ((level - values[n + 1][c]) * why.trust[n][c]) ** 2)));
     const costs = Object.keys(candidates[0].costs);
@@ -407,8 +407,7 @@ class Inside {
         share.style.width = `${(100 * probability(one)) / greatest}%`;
       }
     };
-    set(({ probability }) => probability);
-    this.tables[pane] = { rows, set, totals, bandwidth, about: `order ${why.order}, ${offsets.length} neighbours` };
+    this.tables[pane] = { ...why, rows, set };
     return make(
       "div",
       { class: "wide", tabindex: 0, role: "region", "aria-label": `Candidates of result ${this.panes[pane].result}` },
@@ -419,13 +418,17 @@ class Inside {
   /** Controls of a pixel's choice: the bandwidth, which acts here; order and trust, by which it is explained again. */
   dice() {
     const range = (attributes, oninput) => make("input", { type: "range", ...attributes, oninput });
+    const ask = (asked) => {
+      Object.assign(this.asked, asked);
+      this.explain();
+    };
     this.width = range({ min: -2, max: 2, step: 0.02, value: 0 }, () => this.follow());
-    this.order = range({ min: 1, max: 8, value: 8, disabled: true }, () => this.askWith({ order: Number(this.order.value) }));
-    this.trust = range({ min: 0, max: 1, step: 0.05, value: 0 }, () => this.askWith({ trust: Number(this.trust.value) }));
+    this.order = range({ min: 1, max: 8, value: 8, disabled: true }, () => ask({ order: Number(this.order.value) }));
+    this.trust = range({ min: 0, max: 1, step: 0.05, value: 0 }, () => ask({ trust: Number(this.trust.value) }));
     this.said = make("output");
     const reset = () => {
       this.width.value = this.trust.value = 0;
-      this.askWith({ order: null, trust: 0 });
+      ask({ order: null, trust: 0 });
     };
     return make(
       "div",
@@ -439,36 +442,31 @@ class Inside {
     );
   }
 
-  askWith(asked) {
-    Object.assign(this.asked, asked);
-    this.explain();
-  }
-
-  /** The bandwidth, and the weights of all candidates of a table with it. */
+  /** The weights of all candidates of a table with the bandwidth of the slider, and that. */
   weights({ totals, bandwidth }) {
     const h = bandwidth * 2 ** Number(this.width.value);
-    const weight = (total) => Math.exp((totals[0] - total) / (2 * h * h));
-    return { h, weight, weights: totals.map(weight) };
+    return [totals.map((total) => Math.exp((totals[0] - total) / (2 * h * h))), h];
   }
 
   /** Show the probabilities with the bandwidth of the slider, and what all controls say. */
   follow() {
-    const texts = this.tables.filter(Boolean).map((table) => {
-      const { h, weight, weights } = this.weights(table);
-      const all = sum(weights);
-      if (Number(this.width.value)) table.set(({ costs }) => weight(costs.total) / all);
-      else table.set(({ probability }) => probability);
-      return `h = ${h.toFixed(2)}: ${Math.round(1 / sum(weights.map((one) => (one / all) ** 2)))} candidates count; ${table.about}`;
-    });
     const trust = this.asked.trust ? `; doubt t of the neighbours: ${Math.round(100 * (1 - this.asked.trust))} % of the run's` : "";
-    this.said.textContent = texts.length ? `${texts.join("; ")}${trust}.` : "";
+    const texts = this.tables.filter(Boolean).map((table) => {
+      const [weights, h] = this.weights(table);
+      const all = sum(weights);
+      const wider = ({ costs }) => Math.exp((table.totals[0] - costs.total) / (2 * h * h)) / all;
+      table.set(Number(this.width.value) ? wider : ({ probability }) => probability);
+      const count = Math.round(1 / sum(weights.map((one) => (one / all) ** 2)));
+      return `h = ${h.toFixed(2)}: ${count} candidates count; order ${table.order}, ${table.offsets.length} neighbours${trust}.`;
+    });
+    this.said.textContent = texts.join(" ");
   }
 
   /** Draw one of the candidates, without a change of the result. */
   draw() {
     const u = Math.random();
     const ranks = this.tables.filter(Boolean).map((table) => {
-      const { weights } = this.weights(table);
+      const [weights] = this.weights(table);
       let rank = 0;
       for (let left = u * sum(weights) - weights[0]; left > 0 && rank < weights.length - 1; left -= weights[rank]) rank += 1;
       for (const { one, line } of table.rows) line.classList.toggle("again", one.rank === rank);
@@ -480,12 +478,10 @@ class Inside {
   /** Copy an address that brings the view back. */
   link() {
     const link = linkOf(this.page);
-    if (!link) {
-      this.page.warn("Only a run of an example can be linked, without maps and guide; save this view instead.");
-      return;
-    }
-    history.replaceState(null, "", link);
-    this.page.copy(location.href);
+    if (link) {
+      history.replaceState(null, "", link);
+      this.page.copy(location.href);
+    } else this.page.warn("Only a run of an example can be linked, without maps and guide; save this view instead.");
   }
 
   on_schedule(message, pictures) {
@@ -603,7 +599,7 @@ class Lecture {
     const { inside } = this.page;
     const finest = inside.sweeps.findIndex(([level]) => level === 0);
     this.page.showLayer(["sample", , , "temperature", , "sets"][number] ?? "picture");
-    const moments = [[inside.sweeps.length, 0], [finest + 1, null], [finest + 1, null], [finest + 1, null], [finest, 0], [finest + 1, 1]];
+    const moments = [[inside.sweeps.length, 0], [finest + 1, null], [finest + 1, null], [finest + 1, null], [finest - 1, null], [finest + 1, 1]];
     if (number === 0) inside.unpick();
     else inside.pixel ??= [9, 9];
     inside.seek(...moments[number]);

@@ -2,7 +2,7 @@
 
 // -- the line of time, films, words and links of a look inside ---------------------------------------------------
 
-const TICKS = 64; // sets of a sweep that are told apart on the line of time, at most
+const TICKS = 24; // sets of a sweep that are told apart on the line of time, at most
 const BEAT = 260; // milliseconds for a picture of a film
 
 /** All sweeps of a run, level by level, and the present moment in them. */
@@ -34,7 +34,7 @@ class TimeLine {
     });
     const band = (level) => {
       const own = this.cells.filter((_, n) => sweeps[n][0] === level);
-      const size = ["full", "half", "a quarter of the"][level] ?? `1/${2 ** level} of the`;
+      const size = ["full", "half"][level] ?? `1/${2 ** level}`;
       const element = make("div", { class: "band" }, make("div", {}, ...own), make("span", {}, `level ${level} (${size} size)`));
       element.style.flexGrow = own.length;
       return element;
@@ -42,27 +42,23 @@ class TimeLine {
     const bands = [...new Set(sweeps.map(([level]) => level))].map(band);
     this.cells.push(make("div", { class: "sweep" }));
     this.element.replaceChildren(...bands, make("div", { class: "band end" }, make("div", {}, this.cells.at(-1)), make("span", {}, "result")));
-    this.before = sweeps.map((_, n) => sum(sweeps.slice(0, n).map(([, , sets]) => sets)));
-    this.before.push(sum(sweeps.map(([, , sets]) => sets)));
-    this.element.setAttribute("aria-valuemax", this.before.at(-1));
+    this.element.setAttribute("aria-valuemax", sweeps.length);
   }
 
   show(number, sets, text) {
-    const all = this.inside.sweeps[number]?.[2] ?? 1;
+    const share = sets / (this.inside.sweeps[number]?.[2] ?? 1);
     this.cells.forEach((cell, n) => cell.classList.toggle("now", n === number));
     this.cells[number].append(this.mark);
-    this.mark.style.left = `${(100 * sets) / all}%`;
-    this.element.setAttribute("aria-valuenow", this.before[number] + sets);
+    this.mark.style.left = `${100 * share}%`;
+    this.element.setAttribute("aria-valuenow", number + share);
     this.element.setAttribute("aria-valuetext", text);
   }
 
   seek({ clientX }) {
     const boxes = this.cells.map((cell) => cell.getBoundingClientRect());
-    const found = boxes.findIndex(({ right }) => clientX < right);
-    const number = found < 0 ? boxes.length - 1 : found;
-    const all = this.inside.sweeps[number]?.[2] ?? 0;
-    const share = clamp((clientX - boxes[number].left) / boxes[number].width, 0, 1);
-    this.inside.seek(number, Math.round(share * all));
+    const number = boxes.filter(({ right }) => right <= clientX).length;
+    const { left, width } = boxes[number] ?? boxes.at(-1);
+    this.inside.seek(number, Math.round(clamp((clientX - left) / width, 0, 1) * (this.inside.sweeps[number]?.[2] ?? 0)));
   }
 }
 
@@ -75,7 +71,7 @@ class Films {
 
   ask(request) {
     const asked = JSON.stringify([request, this.page.picture.name]);
-    if (asked === this.asked) return;
+    if (asked === this.asked && this.films.length) return;
     this.asked = asked;
     this.element.replaceChildren(make("p", {}, "Four runs are made, one for each schedule …"));
     this.films = [];
@@ -144,6 +140,11 @@ async function followLink(page) {
   if (page.root.parentElement?.id !== "simdtex-live") return; // the address of a notebook is not the page's
   window.onhashchange = () => followLink(page);
   if (location.hash.length < 2) return;
-  await page.restoreView(new TextEncoder().encode(JSON.stringify(viewOf(location.hash))));
+  const view = viewOf(location.hash);
+  if (![...page.examples.children].some(({ textContent }) => textContent === view.given.name)) {
+    page.warn(`There is no example "${view.given.name}", which the link names; choose one on the page.`);
+    return;
+  }
+  await page.restoreView(new TextEncoder().encode(JSON.stringify(view)));
   page.view.fit();
 }

@@ -119,18 +119,12 @@ def with_order(twin: Lattices, moment: Moment, order: int) -> tuple[Lattices, Mo
 
     Raises ValueError if the order is beyond `largest_order`, or if the candidates differ and the run has penalties.
     """
-    level, most = moment.level, largest_order(twin, moment.level)
+    level, before, most = moment.level, twin.of(moment.level), largest_order(twin, moment.level)
     if not most:
-        raise ValueError(
-            'a site is explained with another order only if it evaluates all candidates; give search="exact"'
-        )
-    before = twin.of(level)
-    whole("order", order, 1)
-    if order > most:
-        raise ValueError(f"order is {order} and the sample of level {level} holds {most}; give 1 to {most}")
-    axes = before.offsets.shape[1]
-    options = replace(before.options, order=order)
-    plan = replace(before.plan, offsets=neighbourhood_offsets(order, axes), options=options, coarser=None)
+        raise ValueError('a site has another order only if it evaluates all candidates; give search="exact"')
+    whole(f"order at level {level}", order, 1, most)
+    offsets, options = neighbourhood_offsets(order, before.offsets.shape[1]), replace(before.options, order=order)
+    plan = replace(before.plan, offsets=offsets, options=options, coarser=None)
     after = Lattices(plan, before.machine, before.seed, None if before is twin else before.conditions)
     here, there = (one.level(level).proposal.candidates.positions for one in (before, after))
     if np.array_equal(here, there):

@@ -136,7 +136,7 @@ class Replay:
         sweep: int | None = None,
         *,
         order: int | None = None,
-        trust: float = 0.0,
+        trust: float = 0,
     ) -> Explanation:
         """Return an explanation of the value that a site of a level took in a sweep of the level.
 
@@ -164,21 +164,12 @@ class Replay:
             f"site {site} does not relax at {where}: it keeps its value; give another site, sweep or level"
         )
 
-    def explain_pixel(
-        self,
-        row: int,
-        col: int,
-        sweep: int = -1,
-        sets: int | None = None,
-        *,
-        order: int | None = None,
-        trust: float = 0.0,
-    ) -> Explanation:
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None, **other: Any) -> Explanation:
         """Return an explanation of the value of an output pixel after the first ``sets`` sets of a sweep, None: all.
 
         It explains the last relaxation until then: on the sweep's level or, if the pixel has kept its value since, on a
         level above. Raises ValueError if there was none: the value is known, or was drawn at random at the start.
-        ``order`` and ``trust`` are as in `explain`.
+        ``other`` are ``order`` and ``trust`` of `explain`.
         """
         sweep = range(len(self.sweeps))[sweep]
         limits: dict[int, int | None] = {sweep: sets}
@@ -187,23 +178,25 @@ class Replay:
             pixel = site_number(self._run, level, (row, col))
             for n in range(sweep, -1, -1):
                 if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
-                    return self._explained(moment, (row, col), order, trust)
+                    return self._explained(moment, (row, col), **other)
             if (row % 2 or col % 2) and not self._twin.of(level).coarser:  # no site of the level above
                 break
             row, col = row // 2, col // 2
         raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
 
-    def together(self, level: int, relaxed: NDArray[np.uint8]) -> int:
-        """Return how many sites of the last set, 2 in ``relaxed`` of `Instant`, have a neighbour in that set."""
-        sites = np.flatnonzero(relaxed == 2).astype(np.int32)
-        neighbours = self._twin.grid(level).neighbours(sites, self._twin.of(level).offsets)
-        return int(np.isin(neighbours, sites).any(0).sum())
+    def together(self, now: Instant) -> NDArray[np.bool_]:
+        """Return whether each site of the last set of an instant has a neighbour in that set."""
+        sites = np.flatnonzero(now.relaxed == 2).astype(np.int32)
+        neighbours = self._twin.grid(now.level).neighbours(sites, self._twin.offsets)
+        return np.asarray(np.isin(neighbours, sites).any(0))
 
     def largest_order(self, level: int) -> int:
         """Return the largest order with which a site of a level is explained; 0 if its search is not exact."""
         return largest_order(self._twin, level)
 
-    def _explained(self, moment: Moment, site: tuple[int, ...], order: int | None, trust: float) -> Explanation:
+    def _explained(
+        self, moment: Moment, site: tuple[int, ...], order: int | None = None, trust: float = 0
+    ) -> Explanation:
         """Return an explanation of a moment, with another order or more trust."""
         twin, moment = self._twin, with_trust(moment, site_number(self._twin, moment.level, site), trust)
         if order not in (None, twin.of(moment.level).options.neighbourhood):
