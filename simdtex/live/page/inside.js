@@ -71,20 +71,24 @@ class Inside {
     );
     this.status = make("p", { role: "status" });
     this.element = make(
-      "details",
-      { class: "inside", ontoggle: () => this.toggled() },
-      make("summary", {}, "Look inside: see why each pixel has its value"),
+      "section",
+      { class: "inside", "aria-label": "Why", hidden: () => !this.looks },
       this.status,
       this.body,
     );
   }
 
-  get open() {
-    return this.element.open && !this.body.hidden;
+  get looks() {
+    return this.page.place === "why";
   }
 
+  get open() {
+    return this.looks && !this.body.hidden;
+  }
+
+  /** Begin or end to look, as the page goes to its place or leaves it. */
   toggled() {
-    if (this.element.open) this.look(this.beside);
+    if (this.looks) this.look(this.beside);
     else {
       this.close();
       this.pinned = null;
@@ -93,7 +97,7 @@ class Inside {
 
   /** Ask for the run of the selected result, and of the one beside it. */
   look(beside = null) {
-    if (!this.element.open) return;
+    if (!this.looks) return;
     this.status.textContent = this.page.shown === null ? "Look inside when there is a result." : "The run is repeated …";
     this.beside = beside;
     this.page.view.split(beside !== null);
@@ -119,7 +123,7 @@ class Inside {
     this.waiting = this.explaining = false;
     if (!this.page.view.panes[1].frame) this.page.view.split(false);
     if (this.looking && !this.body.hidden) this.close(); // the session has forgotten what was open
-    if (this.element.open && this.body.hidden) this.status.textContent = text;
+    if (this.looks && this.body.hidden) this.status.textContent = text;
   }
 
   on_inside({ panes }, buffers) {
@@ -572,8 +576,8 @@ class Lecture {
       if (made.kind === "error") return;
     }
     if (page.shown !== made.result) page.send({ kind: "select", result: made.result });
-    if (page.inside.element.open) page.inside.look();
-    page.inside.element.open = true;
+    if (page.inside.looks) page.inside.look();
+    else page.go("why");
     await done("inside");
     if (!page.inside.open) return;
     this.element.hidden = false;

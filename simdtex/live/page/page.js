@@ -208,7 +208,6 @@ class Page {
   }
 
   go(place) {
-    this.inside.element.open = place === "why";
     if (place in this.last && TASKS[this.task].place !== place) this.setTask(this.last[place]);
     if (place === "why" && this.found) this.task = this.taskOf(this.found.settings);
     this.place = place;
@@ -439,7 +438,7 @@ class Page {
       this.send({ ...settings, kind: "make" });
       numbers.unshift((await this.next("result")).result);
     }
-    this.inside.element.open = true;
+    this.go("why");
     await this.next("inside");
     if (numbers.length > 1) {
       this.inside.look(numbers[1]);
@@ -603,7 +602,10 @@ class Page {
       this.take(event.dataTransfer.files, event.target.closest?.(".maps") ? "map" : "open");
     });
     this.root.addEventListener("keydown", (event) => this.painting.key(event));
-    this.inside.element.addEventListener("toggle", () => this.inside.element.open && (this.place = "why"));
+    effect(() => {
+      this.place;
+      untracked(() => this.inside.toggled());
+    });
     this.paste = (event) => this.take(event.clipboardData?.files, "open");
     (root.id === "simdtex-live" ? document : this.root).addEventListener("paste", this.paste);
   }
@@ -860,5 +862,5 @@ const recorded = document.getElementById("simdtex-recorded");
 if (recorded) {
   const page = new Page(recorded, new Recording(window.simdtexRecording));
   page.root.classList.add("recorded");
-  page.next("selected").then(() => (page.inside.element.open = true));
+  page.next("selected").then(() => page.go("why"));
 }
