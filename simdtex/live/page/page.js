@@ -404,8 +404,7 @@ class Page {
     const { name, bytes, maps } = this.given;
     const { left, top, unit } = this.view;
     const given = { name, bytes: text(bytes), maps: [...maps.values()].map((one) => ({ name: one.name, bytes: text(one.bytes) })) };
-    const { at, sweeps, pixel } = this.inside;
-    const moment = at && [...sweeps[at[0]].slice(0, 2), at[1]];
+    const { place: moment, pixel } = this.inside;
     const saved = { simdtex: "view", given, runs, moment, pixel, layer: this.layer, tiled: this.tiled, left, top, unit };
     this.on_file({ name: `${stem(name)}-view.json` }, [new TextEncoder().encode(JSON.stringify(saved))]);
   }
@@ -445,7 +444,7 @@ class Page {
       await this.next("inside");
     }
     if (moment) {
-      this.inside.seek(this.inside.sweeps.findIndex((one) => one[0] === moment[0] && one[1] === moment[1]), moment[2]);
+      this.inside.seekPlace(...moment);
       await this.next("moments");
     }
     this.tiled = saved.tiled;
