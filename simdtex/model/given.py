@@ -313,10 +313,8 @@ class Soft:
         """Yield the kinds by category, and those by training image, if their probabilities are given."""
         inside = np.flatnonzero(sample.inside)
         if self.categories is not None:
-            categories = sample.pictures.categories(0)
-            assert categories is not None
-            of = np.searchsorted(categories, sample.own(np.concatenate([source, inside]))[:, 0])
-            yield Kind(of[: source.size], _shares(of[source.size :], len(categories)), self.categories)
+            shares = _shares(sample.category(inside), len(self.categories))
+            yield Kind(sample.category(source), shares, self.categories)
         if self.images is not None:
             shares = _shares(sample.picture_of(inside), len(self.images))
             yield Kind(sample.picture_of(source), shares, self.images)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
@@ -18,10 +19,10 @@ from simdtex.ops.neighbourhood import Field
 CAP = 4.0
 """Excess of use over the fair share above which the penalty is constant."""
 
-STEPS, GAIN = 1024, 256
-"""Steps of the penalty of a kind in N C sigma^2, and the most steps that it changes by after a sweep."""
+STEPS = 1024
+"""Steps of the penalty of a kind in N C sigma^2."""
 
-FEW = 16
+FEW = 4
 """Sites of a region at which the change of a penalty is half of that of a large region with the same shares."""
 
 
@@ -32,7 +33,8 @@ class FairUse:
     ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around``, the number of places from one to the edge
     of its neighbourhood; ``fair`` (places,) int64, the weight of each, 0 if it is no candidate, or None if all are
     equal; ``listed``, whether numbers count the candidates only, or all places; ``wanted`` (regions, kinds) float64,
-    the share that is asked of each kind in each region of the output (`Regions`), if any.
+    the share that is asked of each kind in each region of the output (`Regions`), if any; ``gain``, the most steps that
+    the penalty of a kind changes by after a sweep.
     """
 
     shape: tuple[int, ...]
@@ -40,6 +42,7 @@ class FairUse:
     fair: NDArray[np.int64] | None = None
     listed: bool = False
     wanted: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    gain: int = 0
 
     @cached_property
     def due(self) -> tuple[NDArray[np.int64], int]:
@@ -52,12 +55,12 @@ class FairUse:
 class Regions:
     """Regions of the output, and the share that is asked of each kind of candidates (category) in each.
 
-    ``wanted`` (regions, kinds) float64; ``kinds`` (pixels,), the kind of each pixel of the sample; ``of`` (H, W) int32,
+    ``wanted`` (regions, kinds) float64; ``kinds`` returns the kinds of pixels (n,) of the sample; ``of`` (H, W) int32,
     the region of each pixel of the output, -1 without one, or None if all are of one; ``unit``, a step of a penalty.
     """
 
     wanted: NDArray[np.float64]
-    kinds: NDArray[np.uint16]
+    kinds: Callable[[NDArray[np.int32]], NDArray[np.intp]]
     of: NDArray[np.int32] | None
     unit: np.float32
 
@@ -69,7 +72,7 @@ class Regions:
         """Return the number of sites with t < 1 and a source of each kind in each region, (regions x kinds,)."""
         source, region = grid.latest(field.source), self.at(grid)
         there = (grid.latest(field.temperature) < 1024) & (source >= 0) & (region >= 0)
-        number = region[there] * self.wanted.shape[1] + self.kinds[source[there]]
+        number = region[there] * self.wanted.shape[1] + self.kinds(source[there])
         return np.bincount(number, minlength=self.wanted.size)
 
     def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
@@ -112,8 +115,8 @@ def use_penalty(
     sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the mean with
     that ``before``, so that penalties converge. It is infinite at a place without a candidate.
 
-    The penalty of a kind, in whole steps, adds up: after a sweep it rises by `GAIN` (n - d) / max(n, d, 1), where n is
-    the number of its sites in the region and d the number that is asked.
+    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M + `FEW`), where
+    n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
 
     Penalties are the potentials of a transport problem: giving all output sites the nearest candidates, with every
     candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
@@ -123,7 +126,7 @@ def use_penalty(
     counts, of_kinds = counts[: counts.size - kinds], counts[counts.size - kinds :]
     kept = np.zeros(kinds, np.float32) if before is None else before[before.size - kinds :]
     before = None if before is None or before.size == kinds else before[: before.size - kinds]
-    kept = kept if before is None else kept + _changes(of_kinds.reshape(fair_use.wanted.shape), fair_use.wanted)
+    kept = kept if before is None else kept + _changes(of_kinds, fair_use)
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     found = np.zeros(places, np.float32)
@@ -138,9 +141,10 @@ def use_penalty(
     return np.append(found if before is None else (found + before[: found.size]) / np.float32(2), kept)
 
 
-def _changes(counts: NDArray[np.integer], wanted: NDArray[np.float64]) -> NDArray[np.float32]:
+def _changes(counts: NDArray[np.integer], fair_use: FairUse) -> NDArray[np.float32]:
     """Return the changes of the penalties of kinds in regions, whole steps, (regions x kinds,)."""
+    counts = counts.reshape(fair_use.wanted.shape)
     total = counts.sum(1, keepdims=True)
-    due = wanted * total
+    due = fair_use.wanted * total
     excess = (counts - due) / np.maximum(np.maximum(counts, due), 1) * total / (total + FEW)
-    return np.rint(GAIN * excess).astype(np.float32).ravel()
+    return np.rint(fair_use.gain * excess).astype(np.float32).ravel()

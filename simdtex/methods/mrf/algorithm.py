@@ -156,7 +156,7 @@ def run_steps(
 
 
 def use_counts(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
-    """Return the uses of each candidate, zeros if nothing depends on these, and the sites of each kind in each region."""
+    """Return the uses of each candidate, zeros if none matters, and the number of sites of each kind in each region."""
     candidates, machine, kinds = level.proposal.candidates, level.machine, np.zeros(0, np.int32)
     found = use(machine, field, grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
     if level.regions:

@@ -39,6 +39,9 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
+GAIN = STEPS // 4
+"""The most steps by which the penalty of a category changes after a sweep of the coarsest level; twice that below."""
+
 TOGETHER = 2**16
 """Number of sites that one kernel relaxes between two checks of the clock."""
 
@@ -285,8 +288,7 @@ class Lattices:
         if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
             return None
         of, shares = (None, np.array([wanted]) / sum(wanted)) if wanted else soft.regions()
-        kinds = soft.kinds(self.sample, np.arange(self.sample.rows * self.sample.cols))[0]
-        return Regions(shares, kinds, of, np.float32(self.typical_distance / STEPS))
+        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS))
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
@@ -340,8 +342,9 @@ class Lattices:
         places = self.places(number)
         around = int(self.offsets[:, 1].max()) * step
         fair, listed = self.sample.fair(places), not self.exhaustive(number)
-        wanted = {"wanted": self.regions.wanted} if self.regions else {}
-        return FairUse(places.shape, around, fair, listed, **wanted)
+        gain = GAIN if number == self.levels - 1 else 2 * GAIN
+        asked: dict[str, Any] = {"wanted": self.regions.wanted, "gain": gain} if self.regions else {}
+        return FairUse(places.shape, around, fair, listed, **asked)
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""

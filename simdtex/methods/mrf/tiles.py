@@ -89,7 +89,7 @@ def begin_tile(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[
 def run_level(
     run: Run, number: int, above: Field | None, penalty: NDArray[np.float32] | None
 ) -> tuple[Field, NDArray[np.float32]]:
-    """Return a level that is a single tile, after all its sweeps, and the penalties; ``penalty`` is that of `Run.enter`."""
+    """Return a level that is a single tile, after all its sweeps, and the penalties; ``penalty`` as in `Run.enter`."""
     state = run.enter(number, above and _on(run.machine, above), penalty)
     while not run.at_equilibrium(state):
         state, _ = run.step(state)
