@@ -83,6 +83,7 @@ def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
     before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
+    assert penalty is not None
     done, free = turn.cooling + turn.free, not turn.active
     field, tally = tiles.sweep_tile(here.run, turn.level, tile, frame, before, penalty, done, free)
     here.store.write(turn, tile, field)

@@ -475,7 +475,7 @@ class Sample:
         own: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return own
 
-    def category(self, source: NDArray[np.int32]) -> NDArray[np.intp]:
+    def category(self, source: NDArray[Any]) -> NDArray[np.intp]:
         """Return the number of the category of the first variable of pixels (n,), in ascending order."""
         categories = self.pictures.categories(0)
         assert categories is not None

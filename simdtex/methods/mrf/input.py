@@ -49,7 +49,7 @@ class Input:
         if not wanted or (self.soft and self.soft.categories is not None):
             return self.soft
         everywhere = (np.array(wanted) / sum(wanted)).reshape(-1, *[1] * len(self.shape))
-        return Soft(everywhere, self.soft and self.soft.images)
+        return Soft(everywhere, self.soft.images if self.soft else None)
 
     @property
     def sizes(self) -> list[Input]:

@@ -278,8 +278,8 @@ class Lattices:
 
     def _soft(self, grid: Grid) -> NDArray[np.float32] | None:
         """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, H, W)."""
-        soft = self.plan.kinds
-        return soft and soft.costs(self.sample, grid, self.options.soft_weight * self.typical_distance)
+        rate = self.options.soft_weight * self.typical_distance
+        return self.plan.kinds.costs(self.sample, grid, rate) if self.plan.kinds else None
 
     @cached_property
     def regions(self) -> Regions | None:
