@@ -479,8 +479,8 @@ def shares(level):
 def shares_asked(probability, o):
     """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
 
-    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts of
-    fewer than 256 pixels are together.
+    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts
+    of fewer than 256 pixels are together.
     """
     found = SimpleNamespace(of={}, shares=[], charges=[])
     if probability is None or not (o.proportions or o.soft_weight):
@@ -535,7 +535,8 @@ def charged_too(level, s, cost):
     region = level.asked.of.get(level.pixel(s))
     if region is None:
         return cost
-    cost = [float32(a) + float32(b) * level.step_of_charge for a, b in zip(cost, level.asked.charges[region], strict=True)]
+    charges = [float32(one) * level.step_of_charge for one in level.asked.charges[region]]
+    cost = [float32(a) + b for a, b in zip(cost, charges, strict=True)]
     return [one - min(cost) for one in cost]
 
 

@@ -115,8 +115,8 @@ def use_penalty(
     sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the mean with
     that ``before``, so that penalties converge. It is infinite at a place without a candidate.
 
-    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M + `FEW`),
-    where n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
+    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M +
+    `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
 
     Penalties are the potentials of a transport problem: giving all output sites the nearest candidates, with every
     candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
