@@ -104,8 +104,13 @@ def figures(made, image, truth, known):
 
 def sheet(image, made):
     """The training image, two realisations, and the share of category 1."""
-    shown = [np.rint(255 * one).astype(np.uint8) for one in (image, *made[:2], (made == 1).mean(0))]
-    gap = np.full((len(image), 6), 128, np.uint8)
+    return beside((image, *made[:2], (made == 1).mean(0)))
+
+
+def beside(pictures):
+    """Pictures of values from 0 to 1 side by side."""
+    shown = [np.rint(255 * one).astype(np.uint8) for one in pictures]
+    gap = np.full((len(shown[0]), 6), 128, np.uint8)
     return np.hstack([part for one in shown for part in (one, gap)][:-1])
 
 
@@ -192,7 +197,7 @@ def soft(_images, _data, number, side, options, out):
     flat = [made(None, proportions=(1 - p, p)) for p in FLAT]
     yield ["proportions", *_shares(flat), *[""] * 4, *_offs([]), *_patterns(flat[1], image)]
     if out:
-        files.write(out / "soft.png", np.hstack([255 * one for one in pictures[7:13]]).astype(np.uint8))
+        files.write(out / "soft.png", beside(pictures[7:13]))
 
 
 def _shares(flat):
