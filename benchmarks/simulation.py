@@ -13,8 +13,10 @@ maps     training images of channels, of a network of thin lines without ends, a
 volumes  channels of elliptic cross section along x in 100 x 100 x 30 voxels, at random depths: the share of channels,
          the data missed, and the mean absolute differences, from the training image, of the indicator variograms and
          of the connectivity functions along z, y and x, lags up to a third of a side; *another* is one more draw.
-soft     probabilities of channels that rise from 0.02 at the left to 0.98 at the right: the shares in six strips, the
-         means over the realisations, by the weight of the soft data; weight 0 is a run without.
+soft     the shares of channels in 128 x 128 pixels, means of 8 realisations, by the weight of the soft data: where the
+         same probability is asked everywhere, in four bands of a gradient from 0 to 1, and in 16 blocks of 32 x 32, by
+         how much they differ from 0.1, 0.15 ... 0.85; and the dead ends and the js 4x4 of the second map. Weight 0 is a
+         run without, and *proportions* are asked instead of the first four maps.
 """
 
 from pathlib import Path
@@ -37,7 +39,8 @@ LINE = 4  # width of its lines, pixels
 STRETCH = 2  # cells are so many times as wide as high
 SIZES = ((56, 10), (22, 7))  # lengths and heights of lenses, pixels
 SHARE = 0.3  # of lenses, and of channels in a volume
-STRIPS, WEIGHTS = 6, (0, 0.5, 1, 2)  # of soft data
+FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
+BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
 
 
 def network(shape, rng=None):
@@ -101,8 +104,13 @@ def figures(made, image, truth, known):
 
 def sheet(image, made):
     """The training image, two realisations, and the share of category 1."""
-    shown = [np.rint(255 * one).astype(np.uint8) for one in (image, *made[:2], (made == 1).mean(0))]
-    gap = np.full((len(image), 6), 128, np.uint8)
+    return beside((image, *made[:2], (made == 1).mean(0)))
+
+
+def beside(pictures):
+    """Pictures of values from 0 to 1 side by side."""
+    shown = [np.rint(255 * one).astype(np.uint8) for one in pictures]
+    gap = np.full((len(shown[0]), 6), 128, np.uint8)
     return np.hstack([part for one in shown for part in (one, gap)][:-1])
 
 
@@ -157,23 +165,60 @@ def volumes(_images, _data, number, side, options, _out):
     yield ["another", f"{truth.mean():.3f}", f"{training.mean():.3f}", "", *apart(truth, training)]
 
 
-def soft(_images, _data, number, side, options, _out):
-    """Rows of the shares of channels in strips."""
-    wanted = np.broadcast_to(np.linspace(0.02, 0.98, side or 120), (side or 120,) * 2)
-    shares = {"asked": wanted}
+def soft(_images, _data, number, side, options, out):
+    """Rows of the shares of channels, and of their patterns."""
+    side, image = (side or 128) // BLOCK * BLOCK, of_the_pages()[0]
+    many = (side // BLOCK) ** 2
+    blocks = np.random.default_rng(3).permutation(np.linspace(0.1, 0.85, many)).reshape(side // BLOCK, -1)
+    slope = np.repeat((np.arange(side) + 0.5)[:, None] / side, side, 1)
+    pictures = []
+
+    def made(p, **given):
+        given |= {} if p is None else {"probabilities": np.stack([1 - p, p])}
+        found = simdtex.simulate(image, min(number, TOGETHER), shape=(side, side), **given, **options).values
+        pictures.append(found[0])
+        return found
+
     for weight in WEIGHTS:
-        given = {"probabilities": np.stack([1 - wanted, wanted]), "soft_weight": weight} if weight else {}
-        made = simdtex.simulate(of_the_pages()[0], min(number, 12), shape=wanted.shape, **given, **options).values
-        shares[f"weight {weight:g}"] = made.mean(0)
-    for name, share in shares.items():
-        yield [name, *(f"{part.mean():.2f}" for part in np.array_split(share, STRIPS, axis=1))]
+        given = {"soft_weight": weight}
+        flat = [made(np.full((side, side), p) if weight else None, **given) for p in (FLAT if weight else FLAT[:1])]
+        bands, off = [""] * 4, []
+        if weight:
+            bands = [f"{part.mean():.2f}" for part in np.split(made(slope, **given).mean(0), 4)]
+            found = made(np.kron(blocks, np.ones((BLOCK, BLOCK))), **given).mean(0)
+            off = abs(found.reshape(len(blocks), BLOCK, -1, BLOCK).mean((1, 3)) - blocks)
+        yield [
+            f"weight {weight:g}",
+            *_shares(flat),
+            *bands,
+            *_offs(off),
+            *_patterns(flat[min(1, len(flat) - 1)], image),
+        ]
+    flat = [made(None, proportions=(1 - p, p)) for p in FLAT]
+    yield ["proportions", *_shares(flat), *[""] * 4, *_offs([]), *_patterns(flat[1], image)]
+    if out:
+        files.write(out / "soft.png", beside(pictures[7:13]))
+
+
+def _shares(flat):
+    return [f"{one.mean():.2f}" for one in flat] + [""] * (len(FLAT) - len(flat))
+
+
+def _offs(off):
+    return (f"{np.mean(off):.3f}", f"{np.max(off):.3f}") if len(off) else ("", "")
+
+
+def _patterns(made, image):
+    found = summary(made, image)
+    return f"{found.dead_ends[1][:-1].mean():.2f}", f"{found.anodi.by_level[0, 1]:.3f}"
 
 
 OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
+BANDS = [f"band {p}" for p in (0.125, 0.375, 0.625, 0.875)]
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
     "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
-    "soft": (soft, ["channels", *map(str, range(1, STRIPS + 1))]),
+    "soft": (soft, ["channels", *map(str, FLAT), *BANDS, "blocks off by", "at most", "dead ends", "js 4x4"]),
 }
 
 

@@ -78,6 +78,10 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     sizes = [(pictures, shape, mask, known, known_source, guide)]
     while 2 ** len(sizes) <= (o.reduction or 1):
         sizes.append(halved(*sizes[-1]))
+    if o.proportions and "categories" not in maps:
+        p = np.array(o.proportions) / sum(o.proportions)
+        maps = maps | {"categories": np.broadcast_to(p[:, None, None], (len(p), *shape))}
+    asked = shares_asked(maps.get("categories"), o)
     Ys, lattices = [], None
     for y, size, *more in sizes:
         Ys.append(material(y, o, size, *more, maps, lattices))
@@ -97,7 +101,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
             X = at_random(Y, size, seed) if X is None else twice(X, Y, size)  # 2., 5.
         level = Level(number, levels, Y, size, seed, o, 2**k, k < len(sizes) - 1)  # 3., 4., 6.1
         place_guides(level, X, Y)
-        level.penalty = penalties(level, X)
+        level.penalty, level.asked = penalties(level, X), asked
         cooling = True
 
         def active(level=level, X=X):
@@ -215,6 +219,7 @@ def sweep(level, X, steps):
             X.t[level.pixel(s)] = t
         if last:
             level.penalty = (penalties(level, X) + level.penalty) / float32(2)
+            charge(level, X)
             return
 
 
@@ -348,7 +353,8 @@ class Level:
             self.of_phase = self.by_phase()
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
-        self.rate, self.strict = (0 if arranged else o.balance * differing), 0.5 * differing
+        self.rate = 0 if arranged else o.balance * differing
+        self.step_of_charge, self.gain = float32(differing / 1024), 256 if coarsest else 512
         apart = n // self.spacing**2 if self.phased else n  # candidates that lie the spacing apart
         freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0
         self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
@@ -457,7 +463,7 @@ def penalties(level, X):
         square = (slice(max(0, a - level.blur), a + level.blur + 1), slice(max(0, b - level.blur), b + level.blur + 1))
         u = int(used[square].sum()) * int(due.sum()) / (int(due[square].sum()) * total)
         penalty[p] = float32(level.rate * min(4, max(0, u - 1)))
-    return penalty + of_kinds(level, [int(used[at]) for at in crossing]) if level.o.proportions and total else penalty
+    return penalty
 
 
 def shares(level):
@@ -470,15 +476,68 @@ def shares(level):
     return [round(2**16 * one) for one in each]
 
 
-def of_kinds(level, used):
-    """What it costs a candidate to be of a category that is used more often than it is to be."""
-    kinds = [level.Y.pictures[n][i, j, 0].item() for n, i, j in level.places]
-    costs = {}
-    for kind, share in zip(level.Y.categories[0], level.o.proportions, strict=True):
-        due = share / sum(level.o.proportions) * sum(used)
-        times = sum(n for n, k in zip(used, kinds, strict=True) if k == kind)
-        costs[kind] = float32(level.strict * min(1.0, max(0.0, times / due - 1) if due else 1.0))
-    return np.array([costs[kind] for kind in kinds], float32)
+def shares_asked(probability, o):
+    """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
+
+    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts
+    of fewer than 256 pixels are together.
+    """
+    found = SimpleNamespace(of={}, shares=[], charges=[])
+    if probability is None or not (o.proportions or o.soft_weight):
+        return found
+    sites = list(np.ndindex(probability.shape[1:]))
+    if o.proportions:
+        found.of, found.shares = dict.fromkeys(sites, 0), [[one / sum(o.proportions) for one in o.proportions]]
+    else:
+        p = {s: [float(plane[s]) for plane in probability] for s in sites}
+        alike = {s: tuple(round(one * 16) for one in p[s]) for s in sites if p[s][0] == p[s][0]}
+        parts = {}
+        for s in alike:
+            if s in found.of:
+                continue
+            part, left = [], [s]
+            found.of[s] = None
+            while left:
+                i, j = left.pop()
+                part.append((i, j))
+                for r in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+                    if r not in found.of and alike.get(r) == alike[s]:
+                        found.of[r] = None
+                        left.append(r)
+            parts.setdefault((alike[s], s if len(part) >= 256 else None), []).extend(part)
+        for number, part in enumerate(parts.values()):
+            sums = [0.0] * len(probability)
+            for s in sorted(part):
+                found.of[s] = number
+                sums = [a + b for a, b in zip(sums, p[s], strict=True)]
+            found.shares.append([one / len(part) for one in sums])
+    found.charges = [[0] * len(probability) for _ in found.shares]
+    return found
+
+
+def charge(level, X):
+    """After a sweep: a category of which a region has more sites than asked is charged more, in steps."""
+    asked = level.asked
+    counts = [[0] * len(one) for one in asked.shares]
+    for s in map(level.pixel, level.sites):
+        n, i, j = X.source[s].tolist()
+        if asked.of.get(s) is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
+            counts[asked.of[s]][level.Y.soft[0][1][n][i, j]] += 1
+    for those, shares, charges in zip(counts, asked.shares, asked.charges, strict=True):
+        for k, (n, share) in enumerate(zip(those, shares, strict=True)):
+            due = share * sum(those)
+            excess = (n - due) / max(n, due, 1) * sum(those) / (sum(those) + 4)
+            charges[k] += round(level.gain * excess)
+
+
+def charged_too(level, s, cost):
+    """Costs of the categories at a site with the charges of its region; the least of them is 0."""
+    region = level.asked.of.get(level.pixel(s))
+    if region is None:
+        return cost
+    charges = [float32(one) * level.step_of_charge for one in level.asked.charges[region]]
+    cost = [float32(a) + b for a, b in zip(cost, charges, strict=True)]
+    return [one - min(cost) for one in cost]
 
 
 def candidates_of(level, X, s, near, turn):
@@ -582,13 +641,13 @@ def of_kind(level, s, numbers):
     """
     d, places = np.zeros(len(numbers), float32), [level.places[p] for p in numbers]
     rate = level.o.soft_weight * len(level.offsets) * level.Y.matched * level.Y.variance / 16
-    for probability, of_pictures, shares in level.Y.soft:
+    for number, (probability, of_pictures, shares) in enumerate(level.Y.soft):
         p = [float(plane[level.pixel(s)]) for plane in probability]
-        if any(map(np.isnan, p)):
-            continue
+        p = shares if any(map(np.isnan, p)) else p
         said = [log(one / share) if one else None for one, share in zip(p, shares, strict=True)]
         most = max(one for one in said if one is not None)
         cost = [2.0**40 if one is None else min(2.0**40, rate * round((most - one) * 1024) / 1024) for one in said]
+        cost = charged_too(level, s, cost) if number == 0 else cost
         for k, (n, i, j) in enumerate(places):
             d[k] += float32(cost[of_pictures[n][i, j]])
     return d

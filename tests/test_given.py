@@ -280,17 +280,6 @@ def test_a_unit_changes_nothing_where_variables_are_weighted(search):
     assert_same_bits(output.source, elsewhere.source)
 
 
-@pytest.mark.slow
-def test_proportions_are_about_kept():
-    cells = (texture((24, 24), seed=4) > 150).astype(np.uint8)
-    found = {}
-    for share in (0.25, 0.75):
-        options = {"categorical": True, "proportions": (1 - share, share), "order": 4}
-        found[share] = np.mean([run(cells, (32, 32), rng, **options)[0] for rng in range(3)])
-    assert abs(found[0.25] - 0.25) < 0.12
-    assert abs(found[0.75] - 0.75) < 0.12
-
-
 def near(place, grid, order):
     """{site: [(number of the datum, offset)]} of the data near the sites of a lattice."""
     found = {}

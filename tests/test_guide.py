@@ -9,6 +9,8 @@ import pytest
 from cases import REFERENCE, assert_same_bits, slow_but, texture
 
 import simdtex
+from simdtex.experiments.ensemble import channels
+from simdtex.model.given import Soft
 from simdtex.model.guide import Guide, Surroundings, smooth
 from simdtex.model.pictures import MOST_COPIES, Pictures, copy_of, turned
 from simdtex.model.sample import STEPS, Sample, variance
@@ -94,8 +96,8 @@ def shares(pixels=TRAINING):
 
 
 @pytest.mark.parametrize("search", slow_but(["coherent"], ["exact", "coherent"]))
-def test_what_is_as_probable_as_it_is_frequent_changes_no_bit(search):
-    same = simulate(probabilities=of(shares()), search=search, soft_weight=7.0)
+def test_what_asks_for_nothing_changes_no_bit(search):
+    same = simulate(probabilities=of(shares()), search=search, soft_weight=0.0)
     assert_same_bits(same.values, simulate(search=search).values)
     nothing = simulate(probabilities=of([np.nan] * 3), search=search)
     assert_same_bits(nothing.values, simulate(search=search).values)
@@ -111,6 +113,53 @@ def test_what_is_impossible_is_not_there(search, weight):
     told = ~np.isnan(p[0])
     assert not (found[:, told & (p[2] == 0)] == 8).any()
     assert (found[:, told & (p[2] == 1)] == 8).all()
+
+
+def test_regions_are_connected_cells_with_about_the_same_probabilities():
+    p = np.full((3, 40, 60), np.nan)
+    p[:, :, :] = np.array([0.5, 0.3, 0.2])[:, None, None]
+    p[:, :, 20:25] = np.array([0.51, 0.29, 0.2])[:, None, None]  # the same in sixteenths
+    p[:, 10:30, 30:] = np.array([0.1, 0.2, 0.7])[:, None, None]
+    p[:, 3, 3:9], p[:, 6, 3:9] = np.array([[0, 0, 1]]).T, np.array([[0, 0, 1]]).T  # small parts: together
+    p[:, 39] = np.nan
+    of, wanted = Soft(p).regions()
+    assert (of[39] == -1).all() and len(np.unique(of)) == len(wanted) + 1 == 4
+    assert (of[10:30, 30:] == of[12, 33]).all() and (of[[3, 6], 3:9] == of[3, 3]).all() and of[0, 0] == of[8, 24]
+    for number, share in enumerate(wanted):
+        assert np.allclose(share, p[:, of == number].mean(1))
+    two = np.full((2, 40, 60), 0.5)
+    two[:, :, 20:40] = np.array([[0.9], [0.1]])[..., None]
+    of, wanted = Soft(two).regions()
+    assert len(wanted) == 3 and of[0, 0] != of[0, 59], "which are not connected"
+
+
+CHANNELS, _ = channels()
+SLOPE = np.repeat((np.arange(64) + 0.5)[:, None] / 64, 64, 1)
+BLOCKS = np.random.default_rng(3).permutation(np.linspace(0.1, 0.85, 16)).reshape(4, 4)
+
+
+def of_channels(p, n, **options):
+    """How often each cell is of a channel."""
+    given = {} if p is None else {"probabilities": np.stack([1 - p, p]), "shape": p.shape}
+    return simdtex.simulate(CHANNELS, n, categorical=True, rng=1, **given, **options).values.mean(0)
+
+
+def test_shares_are_those_asked():
+    for share in (0.27, 0.8):
+        assert abs(of_channels(np.full((64, 64), share), 3).mean() - share) < 0.03
+    found = of_channels(None, 3, proportions=(0.9, 0.1), shape=(64, 64))
+    assert abs(found.mean() - 0.1) < 0.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("weight", [0.25, 1.0, 4.0])
+def test_shares_of_regions_are_those_asked(weight):
+    """Bands of a gradient, and blocks of 32x32 sites, whatever the weight."""
+    bands = of_channels(SLOPE, 6, soft_weight=weight).reshape(4, -1).mean(1)
+    assert abs(bands - SLOPE.reshape(4, -1).mean(1)).max() < 0.05
+    found = of_channels(np.kron(BLOCKS, np.ones((32, 32))), 8, soft_weight=weight)
+    off = abs(found.reshape(4, 32, 4, 32).mean((1, 3)) - BLOCKS)
+    assert off.mean() < 0.03
 
 
 def test_each_cell_is_from_the_training_image_of_its_number():

@@ -7,8 +7,10 @@ from hypothesis import given, settings
 
 import simdtex
 from simdtex.model.display import use_colours
+from simdtex.model.lattice import Grid
 from simdtex.model.source_map import counts, effective_use
-from simdtex.ops.use import FairUse, use, use_penalty
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.use import FairUse, Regions, use, use_penalty
 
 
 @given(p=problems(max_order=5))
@@ -111,20 +113,29 @@ def test_what_is_fair_counts_in_the_square_around():
     assert found[2, 1] == 0.0 == np.float32(max(0, 4 * whole / (due[2, 1] * 10) - 1))
 
 
-def test_a_kind_that_is_used_too_often_costs():
-    kinds = np.array([0, 0, 1, 1, 2, 2])
-    fair_use = FairUse((2, 3), 0, kinds=kinds, wanted=(1.0, 2.0, 1.0), strict=10.0)
-    used = np.array([2, 0, 3, 3, 0, 0])  # of 8: 2, 4 and 2 are due
-    assert use_penalty(used, fair_use, 0.0).tolist() == [0, 0, 5, 5, 0, 0]
-    assert use_penalty(used * 2, fair_use, 0.0).tolist() == [0, 0, 5, 5, 0, 0], "in proportion"
-    assert use_penalty(np.array([0, 0, 0, 0, 9, 0]), fair_use, 0.0).tolist() == [0, 0, 0, 0, 10, 10], (
-        "no more than that"
-    )
-    none = FairUse((2, 3), 0, kinds=kinds, wanted=(1.0, 0.0, 1.0), strict=10.0)
-    assert use_penalty(used, none, 0.0)[2] == 10, "what is not wanted at all"
-    both = use_penalty(used, fair_use, 1.0)
-    assert np.allclose(both, use_penalty(used, FairUse((2, 3), 0), 1.0) + np.float32([0, 0, 5, 5, 0, 0]))
-    assert not use_penalty(used * 0, fair_use, 1.0).any()
+def test_the_penalty_of_a_kind_adds_up_where_it_is_not_as_often_as_asked():
+    """Of two regions, from the sweep before or from the level above, beside the penalties of candidates."""
+    fair_use = FairUse((2, 2), 0, wanted=np.array([[0.25, 0.75, 0.0], [1.0, 0.0, 0.0]]), gain=100)
+    used, kinds = np.array([8, 0, 0, 0]), np.array([2, 9, 1, 0, 0, 0])  # of 12: 3, 9 and 0 are due
+    kept, before = np.float32([7, 0, 0, 5, 0, 0]), np.array([2, 4, 0, 6], np.float32)
+    found = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept))
+    assert found[:4].tolist() == [2.5, 2, 0, 3]
+    assert found[4:].tolist() == [7 + round(-100 / 3 * 12 / 16), 0, 100 * 12 / 16, 5, 0, 0]
+    begun = use_penalty(np.append(used, kinds), fair_use, 1.0, kept)
+    assert begun.tolist() == [3, 0, 0, 0, *kept], "a level begins with those of the level above"
+    assert not use_penalty(np.append(used, kinds), fair_use, 1.0)[4:].any(), "the coarsest with none"
+
+
+def test_a_kind_is_counted_where_a_region_has_a_relaxed_site_of_it():
+    wanted = np.array([[0.5, 0.5], [0.25, 0.75]])
+    of = np.repeat(np.int32([[0, 0, 1, -1]]), 2, 0)
+    regions = Regions(wanted, lambda source: source % 2, of, np.float32(0.5))
+    temperature = np.array([[0, 1024, 0, 0], [1023, 0, 0, 0]], np.uint16)
+    field = Field(None, np.int32([[4, 5, 6, 7], [8, 9, -1, 5]]), temperature)
+    assert regions.counts(field, Grid((2, 4))).tolist() == [2, 1, 1, 0]
+    soft = np.float32([[[0, 8, 0, 1]] * 2, [[3, 0, 0, 0]] * 2, [[9, 9, 9, 9]] * 2])
+    found = regions.costs(soft, np.float32([2, 4, -6, 0]), Grid((2, 4)))
+    assert found[:, 0].tolist() == [[0, 7, 0, 1], [4, 0, 3, 0], [9] * 4]
 
 
 def test_a_price_is_the_mean_of_two_sweeps():

@@ -78,6 +78,7 @@ def simulate(
         f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
         str(output),
         [lambda made, run: write_realisations(output, made)],
+        more=lambda made, _: _say_shares(made.attrs),
         report=lambda folder, made, run: _report(folder, material, made, known, place),
     )
 
@@ -147,6 +148,12 @@ def georeferenced(made: Any, crs: str) -> Any:
     for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
         one.encoding["grid_mapping"] = "spatial_ref"
     return found
+
+
+def _say_shares(attributes: dict[str, Any]) -> None:
+    """Print the shares of categories that were asked and those reached."""
+    if "shares_asked" in attributes:
+        click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**attributes))
 
 
 def _report(folder: Path, material: Material, made: Any, known: Any, place: dict[str, Any]) -> None:

@@ -5,11 +5,11 @@
     checksums        the checksum of each chunk of those, in the order of the attribute ``arrays`` of ``simdtex``
     work/            removed at the end
         run          the plan (`described`), conditioning data between sites of levels, and maps
-        turn         the current turn, and the penalty of each candidate during it
+        turn         the current turn, and the penalties during it
         begun0       the turn that began level 0; likewise for each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
         level0/7     values, source, temperature after turn 7: of each level the last state, and the one being written
-        tally7       a row for each task that has finished turn 7: active, sum of temperatures, use of each candidate
+        tally7       a row for each task that has finished turn 7: active, sum of temperatures, uses and kinds
 
 A turn is one operation on every tile: begin a level, a sweep, write the picture. It reads the state that the turn
 before it wrote, and no data that it writes itself, so its missing tasks complete an interrupted turn. The file ``turn``
@@ -103,7 +103,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
 
 
-FORMAT = 9
+FORMAT = 10
 """Format of the store; all other formats are rejected."""
 
 TALLIES_AT_ONCE = 2**22
@@ -318,12 +318,12 @@ class Store:
         """The current turn."""
         return Turn(*self._state("turn")[1][0])
 
-    def penalty(self, turn: Turn) -> NDArray[np.float32]:
-        """Return the penalty of each candidate during the current turn."""
+    def penalty(self, turn: Turn) -> NDArray[np.float32] | None:
+        """Return the penalties during the current turn, of kinds alone if it begins a level; None at the first."""
         present, penalty = self._state("turn")[1]
         if Turn(*present) != turn:
             raise Damaged("work/turn")
-        return np.asarray(penalty)
+        return None if penalty is None else np.asarray(penalty)
 
     def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> Turn:
         """Make a turn the current one, and return it; what no later turn reads is removed."""

@@ -73,14 +73,17 @@ def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
-    here.store.write(turn, tile, tiles.run_level(here.run, turn.level, _above(here, turn, tile)))
-    return Tally(np.zeros(0, np.int32), 0, 0)
+    field, penalty = tiles.run_level(here.run, turn.level, _above(here, turn, tile), here.store.penalty(turn))
+    here.store.write(turn, tile, field)
+    kinds = here.run.of(turn.level).fair_use(turn.level).wanted.size
+    return Tally(penalty[penalty.size - kinds :].astype(np.int64), 0, 0)  # whole steps
 
 
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
     before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
+    assert penalty is not None
     done, free = turn.cooling + turn.free, not turn.active
     field, tally = tiles.sweep_tile(here.run, turn.level, tile, frame, before, penalty, done, free)
     here.store.write(turn, tile, field)
@@ -180,12 +183,12 @@ class Turns:
         return Watch(self, callback)
 
     def _candidates(self, turn: Turn) -> int:
-        """Return the number of candidates whose use a tile counts."""
-        if turn.phase in ("whole", "show"):
-            return 0
+        """Return the number of candidates, and of kinds in regions, whose use a tile counts."""
         lattices = self.lattices.of(turn.level)
-        places = lattices.places(turn.level)
-        return int((places.everywhere if lattices.exhaustive(turn.level) else places.positions).size)
+        kinds, places = lattices.fair_use(turn.level).wanted.size, lattices.places(turn.level)
+        if turn.phase in ("whole", "show"):
+            return kinds * (turn.phase == "whole")
+        return kinds + int((places.everywhere if lattices.exhaustive(turn.level) else places.positions).size)
 
     def _complete(self, turn: Turn) -> Turn:
         """Return the turn after a complete one, which becomes the current turn of the store."""
@@ -197,11 +200,14 @@ class Turns:
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
         number = turn.number + 1
         after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
-        if turn.phase != "whole" and not lattices.at_equilibrium(after):
-            before = store.penalty(turn) if turn.phase == "sweep" else None
-            return store.save(after, use_penalty(counts, lattices.fair_use(turn.level), lattices.rate, before))
+        fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
+        if turn.phase != "whole":
+            penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn))
+            if not lattices.at_equilibrium(after):
+                return store.save(after, penalty)
         if turn.level:
-            return store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1))
+            below = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1)
+            return store.save(below, penalty[penalty.size - fair_use.wanted.size :])
         return store.save(Turn(number, "show", 0))
 
 

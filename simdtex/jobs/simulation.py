@@ -63,7 +63,8 @@ def simulate(call: Simulate) -> Work:
         realisation: `simdtex.synthesize` with it returns the same map, unless `region` or a later parameter is used.
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
-        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
+        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. With `probabilities` or ``proportions``
+        those of all realisations are ``shares_asked`` and ``shares_reached``. All are texts and numbers, so that
         ``to_netcdf`` and ``to_zarr`` of xarray write them; ``units`` and ``long_name`` are those of a training image of
         xarray. With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute
         ``missing``. ``plot(number=8)`` draws the first realisations.
@@ -195,6 +196,16 @@ def simulate(call: Simulate) -> Work:
         if inputs.given and inputs.given.outside is not None:
             coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
             attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
+        if categories is not None and plan.kinds and plan.kinds.categories is not None:
+            p = np.broadcast_to(plan.kinds.categories, (len(categories), *size))
+            there = ~np.isnan(p[0])
+            if inputs.given and inputs.given.outside is not None:
+                there &= ~inputs.given.outside
+            told = arrays.reshape(n, *size, -1)[:, there, 0]
+            asked = np.array(chosen.proportions or p[:, there].sum(1))
+            reached = np.array([(told == one).sum() for one in categories])
+            for name, those in (("asked", asked), ("reached", reached)) if told.size else ():
+                attributes[f"shares_{name}"] = " ".join(f"{one:.3f}" for one in those / those.sum())
         attributes |= sides_of_cells | described(call.given)
         result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
         if not call.source:

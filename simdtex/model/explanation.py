@@ -68,9 +68,9 @@ class Ranked(Brief):
     costs : dict of str to (n,) float32 arrays
         The terms added to ``distance``, in this order, if the run has them: ``guide``, equation (12) over the guides'
         channels; ``coherence``, the discount of candidates that continue a neighbour's source, 0 or less; ``use``, the
-        penalty of candidates or categories that are used too often; ``lattice``, the distance of the phases of a
-        regular sample; ``data``, the distance from data between the sites; ``soft``, the cost of the candidate's kind;
-        and ``novelty``.
+        penalty of candidates that are used too often; ``lattice``, the distance of the phases of a regular sample;
+        ``data``, the distance from data between the sites; ``soft``, the cost of the candidate's kind, by its
+        probability and by how often it is taken; and ``novelty``.
     total : (n,) float32 array
         The sum of ``distance`` and all costs, which the relaxation compares.
     probability : (n,) float64 array

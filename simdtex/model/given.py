@@ -212,6 +212,9 @@ UNIT = 1 / 16
 STEPS = 1024
 """Steps of ln(p / q) in 1, so that the last bit of a platform's logarithm does not matter."""
 
+ALIKE, LEAST = 16, 256
+"""Steps of a probability that cells of a region have in common, and the fewest cells of a region of its own."""
+
 LEAST_SHARE = 1e-3
 """The least fair share of the output for each training image."""
 
@@ -235,7 +238,7 @@ class Soft:
     Parameters
     ----------
     categories : (categories, H, W) or (categories, D, H, W) float64 array, optional
-        The probability of each category of the first variable, in ascending order.
+        The probability of each category of the first variable, in ascending order. A side of 1 is repeated.
     images : (training images, H, W) float64 array, optional
         The probability of each training image.
 
@@ -266,30 +269,52 @@ class Soft:
             before += len(kind.shares)
         return np.stack(found).astype(np.uint16)
 
-    def costs(self, sample: Sample, step: int, rate: float) -> NDArray[np.float32]:
-        """Return the cost of each kind at the sites (step i, step j), (kinds, [layers of sites,] rows, columns).
+    def costs(self, sample: Sample, grid: Grid, rate: float) -> NDArray[np.float32]:
+        """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, *grid.shape).
 
         ``rate`` is w N C sigma^2. A coarse level uses the probability at the site itself.
         """
         found = []
         for kind in self._all(sample, np.zeros(0, np.intp)):
-            sites = (slice(None, None, step),) * (kind.probability.ndim - 1)
-            p = kind.probability[(slice(None), *sites)]
+            p = kind.probability
+            p = np.broadcast_to(p, (len(p), *grid.shape)) if p[0].size == 1 else grid.cut(grid.decimated(p))
             with np.errstate(divide="ignore", invalid="ignore"):  # of 0 and of NaN
-                said = np.log(p) - np.log(kind.shares).reshape(-1, *[1] * len(sites))
+                said = np.log(p) - np.log(kind.shares).reshape(-1, *[1] * len(grid.shape))
                 cost = rate * UNIT * np.rint((said.max(0) - said) * STEPS) / STEPS
             cost = np.where(p > 0, np.minimum(cost, EXCLUDED), EXCLUDED)
             found.append(np.where(np.isnan(p), 0, cost).astype(np.float32))
         return np.concatenate(found)
 
+    def regions(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Return the region of each cell, -1 without probabilities, and the mean of these in each, (regions, kinds).
+
+        Cells of a region have the same probabilities of categories, in steps of 1/16, and are connected; parts of fewer
+        than `LEAST` cells are one region.
+        """
+        from scipy.ndimage import label  # only for maps, since it loads slowly
+
+        p = self.categories
+        assert p is not None
+        told, of = ~np.isnan(p[0]), np.full(p.shape[1:], -1, np.int32)
+        alike = np.unique(np.rint(p[:, told] * ALIKE), axis=1, return_inverse=True)[1].ravel()
+        number, first = np.full(p.shape[1:], -1), 0
+        number[told] = alike
+        for one in range(alike.max(initial=-1) + 1):
+            parts, _ = label(number == one)
+            large = np.bincount(parts.ravel()) >= LEAST
+            large[0] = False
+            of[number == one] = first + np.where(large, large.cumsum(), 0)[parts[number == one]]
+            first += 1 + int(large.sum())
+        _, of[told] = np.unique(of[told], return_inverse=True)
+        cells = np.bincount(of[told])
+        return of, np.stack([np.bincount(of[told], plane[told]) / cells for plane in p], 1)
+
     def _all(self, sample: Sample, source: NDArray[np.integer]) -> Iterator[Kind]:
         """Yield the kinds by category, and those by training image, if their probabilities are given."""
         inside = np.flatnonzero(sample.inside)
         if self.categories is not None:
-            categories = sample.pictures.categories(0)
-            assert categories is not None
-            of = np.searchsorted(categories, sample.own(np.concatenate([source, inside]))[:, 0])
-            yield Kind(of[: source.size], _shares(of[source.size :], len(categories)), self.categories)
+            shares = _shares(sample.category(inside), len(self.categories))
+            yield Kind(sample.category(source), shares, self.categories)
         if self.images is not None:
             shares = _shares(sample.picture_of(inside), len(self.images))
             yield Kind(sample.picture_of(source), shares, self.images)

@@ -475,6 +475,12 @@ class Sample:
         own: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return own
 
+    def category(self, source: NDArray[Any]) -> NDArray[np.intp]:
+        """Return the number of the category of the first variable of pixels (n,), in ascending order."""
+        categories = self.pictures.categories(0)
+        assert categories is not None
+        return np.searchsorted(categories, self.own(source)[:, 0])
+
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""
         lines = np.stack(self._coordinates(position[:, None] + reach))

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Penalties on use, so that the sample's sites are used equally often: a site that is used more costs more."""
+"""Penalties on use: of the sample's sites, so that they are used equally often, and of kinds, by the shares asked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
 
@@ -18,6 +19,12 @@ from simdtex.ops.neighbourhood import Field
 CAP = 4.0
 """Excess of use over the fair share above which the penalty is constant."""
 
+STEPS = 1024
+"""Steps of the penalty of a kind in N C sigma^2."""
+
+FEW = 4
+"""Sites of a region at which the change of a penalty is half of that of a large region with the same shares."""
+
 
 @dataclass(frozen=True, eq=False)
 class FairUse:
@@ -25,24 +32,55 @@ class FairUse:
 
     ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around``, the number of places from one to the edge
     of its neighbourhood; ``fair`` (places,) int64, the weight of each, 0 if it is no candidate, or None if all are
-    equal; ``listed``, whether numbers count the candidates only, or all places; ``kinds`` (places,), the category of
-    each, and ``wanted``, the required share of each category in the output, if any; ``strict``, the penalty of a
-    category that is used twice too often.
+    equal; ``listed``, whether numbers count the candidates only, or all places; ``wanted`` (regions, kinds) float64,
+    the share that is asked of each kind in each region of the output (`Regions`), if any; ``gain``, the most steps that
+    the penalty of a kind changes by after a sweep.
     """
 
     shape: tuple[int, ...]
     around: int
     fair: NDArray[np.int64] | None = None
     listed: bool = False
-    kinds: NDArray[np.intp] | None = None
-    wanted: tuple[float, ...] = ()
-    strict: float = 0.0
+    wanted: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    gain: int = 0
 
     @cached_property
     def due(self) -> tuple[NDArray[np.int64], int]:
         """The fair weight of the square around each place, and of all places."""
         fair = np.ones(self.shape, np.int64) if self.fair is None else self.fair.reshape(self.shape)
         return sums_around(fair, self.around), int(fair.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Regions of the output, and the share that is asked of each kind of candidates (category) in each.
+
+    ``wanted`` (regions, kinds) float64; ``kinds`` returns the kinds of pixels (n,) of the sample; ``of`` (H, W) int32,
+    the region of each pixel of the output, -1 without one, or None if all are of one; ``unit``, a step of a penalty.
+    """
+
+    wanted: NDArray[np.float64]
+    kinds: Callable[[NDArray[np.int32]], NDArray[np.intp]]
+    of: NDArray[np.int32] | None
+    unit: np.float32
+
+    def at(self, grid: Grid) -> NDArray[np.int32]:
+        """Return the region of each site of a lattice or a window of it."""
+        return np.zeros(grid.shape, np.int32) if self.of is None else grid.cut(grid.decimated(self.of))
+
+    def counts(self, field: Field, grid: Grid) -> NDArray[np.int64]:
+        """Return the number of sites with t < 1 and a source of each kind in each region, (regions x kinds,)."""
+        source, region = grid.latest(field.source), self.at(grid)
+        there = (grid.latest(field.temperature) < 1024) & (source >= 0) & (region >= 0)
+        number = region[there] * self.wanted.shape[1] + self.kinds(source[there])
+        return np.bincount(number, minlength=self.wanted.size)
+
+    def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
+        """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
+        regions, kinds = self.wanted.shape
+        each = np.append(penalty, np.zeros(kinds, np.float32)).reshape(regions + 1, kinds) * self.unit
+        found = soft[:kinds] + np.moveaxis(each[self.at(grid)], -1, 0)
+        return np.concatenate([found - found.min(0), soft[kinds:]])
 
 
 @Operation
@@ -69,41 +107,45 @@ def use_penalty(
     rate: float,
     before: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Return the penalty of each candidate during the next sweep, (n,) float32, to be added to its distance.
+    """Return penalties during the next sweep, float32: of each candidate, (n,), and of each kind in each region.
 
-    ``counts`` (n,) are from `use`; ``rate`` is lambda N C sigma^2, lambda times the sample's variance times neighbours
-    and channels, 0: no penalty; and ``before`` (n or more,) is the penalty during the last sweep. The penalty is
-    lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of the square around a candidate over its fair share.
-    With ``before``, the result is the mean of both, so that penalties converge. It is infinite at a place without a
-    candidate.
+    ``counts`` are from `use` and from `Regions`, one after the other; ``rate`` is lambda N C sigma^2, lambda times the
+    sample's variance times neighbours and channels, 0: no penalty of candidates; and ``before`` are the penalties
+    during the last sweep, at the beginning of a level those of the kinds. The penalty of a candidate is lambda N C
+    sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the mean with
+    that ``before``, so that penalties converge. It is infinite at a place without a candidate.
+
+    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M +
+    `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
 
     Penalties are the potentials of a transport problem: giving all output sites the nearest candidates, with every
     candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.
     """
+    kinds = fair_use.wanted.size
+    counts, of_kinds = counts[: counts.size - kinds], counts[counts.size - kinds :]
+    kept = np.zeros(kinds, np.float32) if before is None else before[before.size - kinds :]
+    before = None if before is None or before.size == kinds else before[: before.size - kinds]
+    kept = kept if before is None else kept + _changes(of_kinds, fair_use)
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     found = np.zeros(places, np.float32)
-    if total and (rate or fair_use.kinds is not None):
+    if total and rate:
         used = np.zeros(places, np.int64)
         used[there if fair_use.listed else slice(None)] = counts
         around, (due, whole) = sums_around(used.reshape(fair_use.shape), fair_use.around), fair_use.due
         excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
-        if fair_use.kinds is not None:
-            found += _of_kinds(used, fair_use)
     if fair_use.fair is not None:
         found = found[there] if fair_use.listed else np.where(there, found, np.float32(np.inf))
-    return found if before is None else (found + before[: found.size]) / np.float32(2)
+    return np.append(found if before is None else (found + before[: found.size]) / np.float32(2), kept)
 
 
-def _of_kinds(used: NDArray[np.int64], fair_use: FairUse) -> NDArray[np.float32]:
-    """Return the penalty of places whose category is used more than its share."""
-    assert fair_use.kinds is not None
-    counts = np.bincount(fair_use.kinds, used, minlength=len(fair_use.wanted))
-    cost = np.zeros(len(fair_use.wanted), np.float32)
-    for kind, share in enumerate(fair_use.wanted):
-        due = share / sum(fair_use.wanted) * int(used.sum())
-        excess = max(0.0, int(counts[kind]) / due - 1) if due else 1.0
-        cost[kind] = fair_use.strict * min(1.0, excess)
-    return cost[fair_use.kinds]
+def _changes(counts: NDArray[np.integer], fair_use: FairUse) -> NDArray[np.float32]:
+    """Return the changes of the penalties of kinds in regions, whole steps, (regions x kinds,)."""
+    counts = counts.reshape(fair_use.wanted.shape)
+    total = counts.sum(1, keepdims=True)
+    due = fair_use.wanted * total
+    excess = (counts - due) / np.maximum(np.maximum(counts, due), 1) * total / (total + FEW)
+    changes: NDArray[np.float32] = np.rint(fair_use.gain * excess).astype(np.float32).ravel()
+    return changes

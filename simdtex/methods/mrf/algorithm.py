@@ -49,15 +49,18 @@ class Run(Lattices):
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
         return self.enter(self.levels - 1, None)
 
-    def enter(self, number: int, above: Field | None) -> State:
-        """Return the state at the beginning of a level: sites of the level above have t = 0, all others t = 1."""
+    def enter(self, number: int, above: Field | None, penalty: NDArray[np.float32] | None = None) -> State:
+        """Return the state at the beginning of a level: sites of the level above have t = 0, all others t = 1.
+
+        ``penalty`` are those after the level above, of which the penalties of kinds are kept.
+        """
         level = self.level(number)  # 3, 4, 6.1
-        return first_state(level, first_field(self, level, above))
+        return first_state(level, first_field(self, level, above), penalty)
 
     def step(self, state: State, watch: Watch = ignore) -> tuple[State, Info]:
         """Run a sweep, or enter the next level if the current one is at equilibrium; return the state after it."""
         if self.at_equilibrium(state):  # 6
-            return self.enter(state.level - 1, state.field), Info(state.level - 1)
+            return self.enter(state.level - 1, state.field, state.penalty), Info(state.level - 1)
         level = self.level(state.level)
         state, chosen = sweep(level, state, watch)  # 6.2
         number = state.cooling + state.free
@@ -104,10 +107,11 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
     return run.conditions.entered(machine, level.number, grid, field)
 
 
-def first_state(level: Level, field: Field) -> State:
-    """Return the state of a level before its first sweep."""
+def first_state(level: Level, field: Field, penalty: NDArray[np.float32] | None = None) -> State:
+    """Return the state of a level before its first sweep; ``penalty`` as in `Run.enter`."""
     count, total = survey(level.machine, level.grid, field.temperature)
-    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, None)
+    kept = None if penalty is None else penalty[penalty.size - level.fair_use.wanted.size :]
+    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, kept)
     memory = level.schedule.init(level.setting)
     return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)
 
@@ -152,12 +156,12 @@ def run_steps(
 
 
 def use_counts(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
-    """Return the number of uses of each candidate, (n,); zeros if nothing depends on these."""
-    candidates = level.proposal.candidates
-    if not (level.rate or level.fair_use.kinds is not None):
-        return np.zeros(candidates.size, np.int32)
-    found: NDArray[np.int32] = use(level.machine, field, grid, candidates)
-    return found
+    """Return the uses of each candidate, zeros if none matters, and the number of sites of each kind in each region."""
+    candidates, machine, kinds = level.proposal.candidates, level.machine, np.zeros(0, np.int32)
+    found = use(machine, field, grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
+    if level.regions:
+        kinds = level.regions.counts(Field(*map(machine.get, field)), grid).astype(np.int32)
+    return np.append(found, kinds)
 
 
 def relax_parts(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:

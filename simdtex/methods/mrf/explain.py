@@ -30,7 +30,7 @@ MOST = 100
 class Moment(NamedTuple):
     """A moment of a run, on the host.
 
-    ``level``; ``sweep``, from 1; ``field`` before the relaxation; ``penalty`` of each candidate during the sweep; and
+    ``level``; ``sweep``, from 1; ``field`` before the relaxation; ``penalty`` of the state during the sweep; and
     ``turn``, the key of the random numbers.
     """
 

@@ -43,6 +43,15 @@ class Input:
     coarser: Input | None = None
 
     @property
+    def kinds(self) -> Soft | None:
+        """The soft data; proportions are the same probabilities everywhere, unless there is a map of these."""
+        wanted = self.options.proportions
+        if not wanted or (self.soft and self.soft.categories is not None):
+            return self.soft
+        everywhere = (np.array(wanted) / sum(wanted)).reshape(-1, *[1] * len(self.shape))
+        return Soft(everywhere, self.soft.images if self.soft else None)
+
+    @property
     def sizes(self) -> list[Input]:
         """All inputs, the finest first."""
         return [self, *(self.coarser.sizes if self.coarser else ())]

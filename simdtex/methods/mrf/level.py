@@ -27,7 +27,7 @@ from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import EXHAUSTIVE, IN_PHASE, AllCandidates, CandidateList, InPhase, Relaxation, alike, in_phase
 from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import TAIL, square_of
-from simdtex.ops.use import FairUse
+from simdtex.ops.use import STEPS, FairUse, Regions
 from simdtex.schedules import Setting
 
 WHOLE = 256
@@ -39,8 +39,8 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-STRICT = 0.5
-"""lambda of the penalty of a category that is used more often than its share."""
+GAIN = STEPS // 4
+"""The most steps by which the penalty of a category changes after a sweep of the coarsest level; twice that below."""
 
 TOGETHER = 2**16
 """Number of sites that one kernel relaxes between two checks of the clock."""
@@ -57,8 +57,9 @@ class State(NamedTuple):
         The source map: pixel indices in the sample, including its margin.
     temperature : (H, W) uint16 array of the machine
         t in units of 1/1024.
-    penalty : (n,) float32 array
-        Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`).
+    penalty : (n + regions x kinds,) float32 array
+        Penalties during the next sweep, of each candidate of the level and of each kind in each region
+        (`simdtex.ops.use.use_penalty`).
     schedule : tuple of arrays and numbers
         The schedule's own state.
     level : int
@@ -216,7 +217,7 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, number)
-        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(number))
+        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(number), self.regions)
 
     def choice(self, number: int) -> Choice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
@@ -233,7 +234,6 @@ class Lattices:
         costs = costs._replace(
             phased=costs.phased and waves and costs.phased._replace(sites=machine.put(waves.at(grid))),
             scattered=self._scattered(number, grid),
-            kinds=costs.kinds and costs.kinds._replace(sites=self._soft(grid)),
         )
         proposal = level.proposal
         if isinstance(proposal, CandidateList) and proposal.phases and waves:
@@ -249,6 +249,7 @@ class Lattices:
             in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
             evaluations=machine.put(np.zeros(grid.shape, np.int32)),
             movable=self.conditions.movable(machine, number, grid),
+            soft=self._soft(grid),
             lists={},
         )
 
@@ -270,16 +271,24 @@ class Lattices:
 
     def _kinds(self, candidates: Candidates) -> Kinds | None:
         """Return the kinds of candidates that soft data know; None without soft data."""
-        if self.plan.soft is None:
+        if self.plan.kinds is None:
             return None
-        those = self.plan.soft.kinds(self.sample, self.machine.get(candidates.positions))
+        those = self.plan.kinds.kinds(self.sample, self.machine.get(candidates.positions))
         return Kinds(self.machine.put(np.pad(those, ((0, 0), (0, TAIL)))), None)  # as many as `Phased` has
 
-    def _soft(self, grid: Grid) -> Array:
+    def _soft(self, grid: Grid) -> NDArray[np.float32] | None:
         """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, H, W)."""
-        assert self.plan.soft
-        costs = self.plan.soft.costs(self.sample, grid.step, self.options.soft_weight * self.typical_distance)
-        return self.machine.put(grid.cut(costs))
+        rate = self.options.soft_weight * self.typical_distance
+        return self.plan.kinds.costs(self.sample, grid, rate) if self.plan.kinds else None
+
+    @cached_property
+    def regions(self) -> Regions | None:
+        """The shares of categories that are asked: those of the whole, or of regions of a map of probabilities."""
+        soft, wanted = self.plan.kinds, self.options.proportions
+        if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
+            return None
+        of, shares = (None, np.array([wanted]) / sum(wanted)) if wanted else soft.regions()
+        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS))
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
@@ -331,12 +340,11 @@ class Lattices:
         """Return the positions of the candidates of a level, and the fair use of each."""
         step = self.spacing(number) if self.phases == "all" else 1
         places = self.places(number)
-        around, kinds = int(self.offsets[:, 1].max()) * step, None
-        categories, wanted = self.sample.pictures.categories(0), self.options.proportions
-        if categories is not None and wanted is not None:
-            kinds = np.searchsorted(categories, self.sample.own(places.everywhere)[..., 0])
+        around = int(self.offsets[:, 1].max()) * step
         fair, listed = self.sample.fair(places), not self.exhaustive(number)
-        return FairUse(places.shape, around, fair, listed, kinds, wanted or (), STRICT * self.typical_distance)
+        gain = GAIN if number == self.levels - 1 else 2 * GAIN
+        asked: dict[str, Any] = {"wanted": self.regions.wanted, "gain": gain} if self.regions else {}
+        return FairUse(places.shape, around, fair, listed, **asked)
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
@@ -389,12 +397,16 @@ class Level:
         lambda N C sigma^2: the cost of a candidate whose surroundings are used twice as often as their share.
     fair_use : simdtex.ops.use.FairUse
         The positions of the candidates, and the fair use of each.
+    regions : simdtex.ops.use.Regions, optional
+        The shares of categories that are asked.
     in_place : bool
         Whether sites of a step may be written while other sites of it are read: no two are neighbours.
     evaluations : (H, W) int32 array of the machine
         The number of candidates that each site has evaluated.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites with given values, which free sweeps do not change. None: every site may relax.
+    soft : (kinds, H, W) float32 array, optional
+        The cost of each kind by soft data, without the penalties of the kinds.
     lists : dict
         The schedule's lists of sites on the machine: each is copied there once.
     """
@@ -404,9 +416,11 @@ class Level:
     relaxation: Relaxation
     rate: float
     fair_use: FairUse
+    regions: Regions | None = None
     in_place: bool = False
     evaluations: Array = None
     movable: Array | None = None
+    soft: NDArray[np.float32] | None = None
     lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
 
     @property
@@ -448,9 +462,13 @@ class Level:
 
 
 def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
-    """Return the relaxation of the level in a sweep, with the penalty (n,) of each candidate."""
-    padded = level.machine.put(np.pad(penalty, (0, TAIL)))  # whole vectors are read, even at the end
-    return level.relaxation._replace(costs=level.relaxation.costs._replace(penalty=padded))
+    """Return the relaxation of the level in a sweep, with the penalties of candidates, and of kinds in regions."""
+    n, costs = penalty.size - level.fair_use.wanted.size, level.relaxation.costs
+    padded, kinds = level.machine.put(np.pad(penalty[:n], (0, TAIL))), costs.kinds  # whole vectors are read at the end
+    if kinds and level.soft is not None:
+        soft = level.regions.costs(level.soft, penalty[n:], level.grid) if level.regions else level.soft
+        kinds = kinds._replace(sites=level.machine.put(soft))
+    return level.relaxation._replace(costs=costs._replace(penalty=padded, kinds=kinds))
 
 
 class Active:

@@ -339,8 +339,8 @@ class Options:
     proportions: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Give the categories, in ascending order, these shares of the output, by a penalty",
-        none="no penalty; in a volume of one variable the shares of the sample",
+        "Give the categories, in ascending order, these shares of the output",
+        none="the mean of the probabilities; without, in a volume of one variable, the shares of the sample",
         shown=("simulate",),
     )
     data_weight: float = data(
@@ -355,8 +355,8 @@ class Options:
         Number(0),
         "Follow probabilities, and weights of training images, with this strength",
         more="Candidates of a category, or of a training image, with probability p and share q of the sample cost "
-        "w N C sigma^2 / 16 (m - ln(p / q)): w is the soft weight, and m the greatest ln(p / q) of the cell. With 0, "
-        "only probabilities of 0 count.",
+        "w N C sigma^2 / 16 (m - ln(p / q)): w is the soft weight, and m the greatest ln(p / q) of the cell. What a "
+        "region of the map has too often costs more after every sweep. With 0, only probabilities of 0 count.",
         shown=("simulate",),
     )
     guide_weight: float = data(

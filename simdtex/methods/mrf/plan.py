@@ -58,7 +58,7 @@ class Plan(Input):
         within_32_bits(self.shape, channels * copies, self.remedy)
         field, held = copies * (6 + 2 * channels), sum(one.sample.rows * one.sample.cols for one in self.sizes)
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
-        kinds = self.soft.rows if self.soft else 0
+        kinds = self.kinds.rows if self.kinds else 0
         phases = 12 * pixels + 56 * held if self.sample.waves else 0
         device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 80) + phases
         memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held + phases, self.remedy)
@@ -94,7 +94,9 @@ def plan(
     """
     pictures = options.of(pictures)
     check_categories(pictures, given, options.proportions)
-    options = options.resolved(pictures)
+    asked, options = options.proportions, options.resolved(pictures)
+    if soft and soft.categories is not None:
+        options = replace(options, proportions=asked)  # by default those of the map
     if pictures.deep:
         check_volume(pictures, options, guide)
     offsets = neighbourhood_offsets(options.neighbourhood, len(shape))

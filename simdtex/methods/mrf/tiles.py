@@ -46,8 +46,8 @@ class Framed(NamedTuple):
 class Tally(NamedTuple):
     """Counts of a tile's sites, which add up over tiles.
 
-    ``counts`` (n,), the number of uses of each candidate; ``active``, the number of active sites; ``temperature_sum``,
-    the sum of temperatures in units of 1/1024.
+    ``counts``, the uses of each candidate and the sites of each kind in each region; ``active``, the number of active
+    sites; ``temperature_sum``, the sum of temperatures in units of 1/1024.
     """
 
     counts: NDArray[Any]
@@ -86,12 +86,14 @@ def begin_tile(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[
     return _off(run.machine, field), _tally(level, field, level.grid)
 
 
-def run_level(run: Run, number: int, above: Field | None) -> Field:
-    """Return a level that is a single tile, after all its sweeps."""
-    state = run.enter(number, above and _on(run.machine, above))
+def run_level(
+    run: Run, number: int, above: Field | None, penalty: NDArray[np.float32] | None
+) -> tuple[Field, NDArray[np.float32]]:
+    """Return a level that is a single tile, after all its sweeps, and the penalties; ``penalty`` as in `Run.enter`."""
+    state = run.enter(number, above and _on(run.machine, above), penalty)
     while not run.at_equilibrium(state):
         state, _ = run.step(state)
-    return _off(run.machine, state.field)
+    return _off(run.machine, state.field), state.penalty
 
 
 def sweep_tile(
@@ -100,7 +102,7 @@ def sweep_tile(
     """Return a tile after a sweep, and its tally.
 
     ``frame`` is the tile in a window with a halo of the reach of the sweep, ``field`` the sites of the window before
-    the sweep, ``penalty`` (n,) the penalty of each candidate, ``done`` the number of earlier sweeps of the level, and
+    the sweep, ``penalty`` those of `State` during it, ``done`` the number of earlier sweeps of the level, and
     ``free`` whether it is a free sweep.
     """
     machine, level = run.machine, run.level(number, frame.window)
