@@ -161,6 +161,16 @@ def test_parts_of_a_picture_lie_apart(classify):
         assert training and test and not training & test
 
 
+def test_equalised_textures_have_the_flat_histogram_of_their_training_part(classify):
+    rng = np.random.default_rng(1)
+    ramp = classify.Texture(*(np.stack([rng.integers(low, 90, (32, 32))] * 3, -1).astype(np.uint8) for low in (40, 20)))
+    training, test = (classify.grey(one) for one in classify.equalised(ramp))
+    assert abs(np.sort(training.ravel()) - np.linspace(0, 255, 1024)).max() < 12
+    before = [classify.grey(one) for one in ramp]
+    assert all((test[before[1] == v] == training[before[0] == v][0]).all() for v in range(40, 90))
+    assert (test[before[1] < 40] == 0).all()
+
+
 def test_a_mosaic_shows_the_test_part_of_its_label(classify):
     known = {str(n): classify.parted(np.full((64, 64), n, np.uint8)) for n in range(7)}
     for mosaic in classify.drawn(known, 1, 5, 96):
@@ -192,8 +202,8 @@ def test_the_tables(classify, folder, monkeypatch):
     for name, value in (("data", small), ("SHOWN", 100), ("FIELDS", [(8, 2)])):
         monkeypatch.setattr(classify, name, value)
     parts = [part for part in classify.PARTS if part == "unknown" or find_spec("sklearn")]
-    words = ["--textures", folder, "--only", "*.png", "--draws", "1", "--side", "64", "--out", folder, "--parts", ",".join(parts)]
-    classify.main([*map(str, words)], standalone_mode=False)
+    words = ["--textures", folder, "--only", "*.png", "--draws", "1", "--side", "64", "--out", folder]
+    classify.main([*map(str, words), "--parts", ",".join(parts)], standalone_mode=False)
     for part in parts:
         with open(folder / f"{part}.csv", encoding="utf-8", newline="") as file:
             header, *rows = csv.reader(file)
