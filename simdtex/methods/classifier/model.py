@@ -151,7 +151,7 @@ def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) 
     return found
 
 
-def blurred(planes: NDArray[np.integer], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
+def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Return planes (..., rows, cols) averaged over the window of `gaussian`, mirrored beyond the border."""
     smooth = planes.astype(np.float64)  # exact for integers below 2**34 in magnitude
     for axis in (-2, -1):
