@@ -105,6 +105,7 @@ class ClassifierOptions(TypedDict, total=False):
     levels: int
     exemplars: int
     typical: float
+    smoothing: float
     coupling: float
     weight: float
     sweeps: int

@@ -290,10 +290,11 @@ ALIKE = [whole(stripes((16, 16), seed=1)), whole(stripes((40, 40), seed=2))]
 """One texture, of which one class shows nine times as much as the other."""
 
 
+@pytest.mark.parametrize("smoothing", [0.0, 1.5])
 @pytest.mark.parametrize("classes", [CLASSES, ALIKE], ids=["apart", "alike"])
-def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes):
-    picture = halves(20)[0][:, 20:40]
-    plan = planned(picture, classes, weight=0.0, unknown=0.0, levels=1, exemplars=2**14, typical=0.3, sweeps=0)
+def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoothing):
+    picture, given = halves(20)[0][:, 20:40], {"levels": 1, "exemplars": 2**14, "typical": 0.3, "smoothing": smoothing}
+    plan = planned(picture, classes, weight=0.0, unknown=0.0, sweeps=0, **given)
     labels = drive(plan, REFERENCE, 1)[0][..., 0]
     learned = learn(REFERENCE, classes, list(plan.names.values()), plan.options, 1)
     energy, share = [], np.array([0.35, 0.65])
@@ -305,6 +306,8 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes):
         fewer = 2 * np.log(learned.counts[c] / max(learned.counts)) / np.array([9, 13])
         energy.append(-(np.tensordot(share, logs, 1) + share @ fewer) / model.TEMPERATURE)
     gap = energy[1] - energy[0]
+    for axis in (0, 1) if smoothing else ():
+        gap = ndimage.correlate1d(gap, gaussian(smoothing) / TAPS, axis, mode="mirror")
     clear = abs(gap) > 0.05  # logarithms are rounded to 1/256, and divided by the temperature
     assert clear.mean() > 0.8
     assert (labels == np.where(gap > 0, 2, 1))[clear].all()

@@ -38,7 +38,7 @@ def classify(call: Classify) -> Work:
     Notes
     -----
     Equation (6) with the bandwidth of the nearest neighbour, of whole neighbourhoods, at up to three levels, raw and
-    with compressed contrast; a Potts field of labels; and Hotelling's test for unknown textures: see
+    with compressed contrast, averaged over a small window; a Potts field of labels; and Hotelling's test: see
     ``docs/classification.rst``. The labels are the same on every device. A turned, enlarged or differently lit texture
     is another texture, and strips narrower than the coupling vanish.
 

@@ -50,6 +50,14 @@ class Options:
         "With 1 only the distance beyond that mean counts.",
         shown=(),
     )
+    smoothing: float = option(
+        2.0,
+        Number(0, 20),
+        "Average the evidence over a Gaussian of this standard deviation: 0 keeps that of single neighbourhoods",
+        unit="pixels",
+        group="Field of labels",
+        shown=(),
+    )
     coupling: float = field(
         8.0,
         Number(0.5, 100),
@@ -58,7 +66,7 @@ class Options:
         slider=(1, 30, 1),
     )
     weight: float = field(
-        7.0,
+        2.0,
         Number(0, 100),
         "Set the weight of neighbouring labels: 0 labels each pixel by its own evidence",
         slider=(0, 20, 0.5),

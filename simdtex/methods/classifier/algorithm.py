@@ -18,7 +18,7 @@ from simdtex.checkpoint import like
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.classifier import Options
-from simdtex.methods.classifier.model import UNITS, Model, Null, Region, learn, prepared, windowed
+from simdtex.methods.classifier.model import UNITS, Model, Null, Region, blurred, learn, prepared, windowed
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
 from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window
@@ -149,15 +149,26 @@ class Run:
             values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
             found = machine.get(exemplars(machine, values, known))
             state.logs[e, :, state.done : end] = found.reshape(len(found), -1, cols)
-        state.labels[state.done : end] = self._evidence(state.logs[:, :, state.done : end]).argmax(0)
+        if end < self.grid.rows:
+            state.labels[state.done : end] = self._single(state.logs[:, :, state.done : end]).argmax(0)
+        else:
+            state.labels[:] = self._evidence(state.logs).argmax(0)
         return state._replace(done=end)
 
-    def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
-        """Return the evidence of each class, (classes, ...) int32 in 2**-18: equation (6) by the nearest neighbour."""
+    def _single(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
+        """Return the evidence of single neighbourhoods, (classes, ...) int32 in 2**-18: equation (6) by the nearest."""
         total = np.empty(logs.shape[1:], np.int32)
         total[:] = self.model.offsets.reshape(-1, *[1] * (total.ndim - 1))
         for expert, one in zip(self.model.experts, logs, strict=True):
             total -= np.int32(expert.factor) * one.astype(np.int32)
+        return total
+
+    def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
+        """Return the evidence of each class averaged over the window ``smoothing``, (classes, rows, cols) int32."""
+        total = self._single(logs)
+        if self.options.smoothing:
+            for one in total:
+                one[:] = blurred(one, gaussian(self.options.smoothing))
         return total
 
     @cached_property

@@ -147,12 +147,16 @@ def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) 
     planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
     found = [machine.put(planes.astype(np.uint16))]
     for level in range(1, levels):
-        smooth = planes.astype(np.float64)  # exact for the integers of both sums
-        taps = gaussian(SMOOTHING[level]).astype(np.float64)
-        for axis in (1, 2):
-            smooth = ndimage.correlate1d(smooth, taps, axis, mode="mirror")
-        found.append(machine.put((smooth.astype(np.int64) + UNITS // 2 >> 18).astype(np.uint16)))
+        found.append(machine.put(blurred(planes, gaussian(SMOOTHING[level])).astype(np.uint16)))
     return found
+
+
+def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Return planes (..., rows, cols) averaged over the window of `gaussian`, mirrored beyond the border."""
+    smooth = planes.astype(np.float64)  # exact for integers below 2**34 in magnitude
+    for axis in (-2, -1):
+        smooth = ndimage.correlate1d(smooth, taps.astype(np.float64), axis, mode="mirror")
+    return smooth.astype(np.int64) + UNITS // 2 >> 18
 
 
 def learn(
