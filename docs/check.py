@@ -3,7 +3,7 @@
 
 Every link within the pages leads to a page and a place on it, and no page loads anything from elsewhere. Where
 Chromium, its driver and Selenium are installed, a browser without a network opens the pages: formulas are drawn, the
-search finds pages, and at the width of a phone no page scrolls sideways.
+search finds pages, no line of code runs out of its box, and at the width of a phone no page scrolls sideways.
 """
 
 import argparse
@@ -99,8 +99,14 @@ def sideways(folder, width=PHONE):
     return faults
 
 
+LONG = """
+const wide = [...document.querySelectorAll("article pre")].filter(e => e.scrollWidth > e.clientWidth + 1);
+return wide.map(e => e.innerText.split("\\n").reduce((a, b) => a.length < b.length ? b : a).slice(0, 120));
+"""
+
+
 def opened(folder, words=("temperature", "neighbourhood", "seamless")):
-    """Sentences about formulas that are not drawn, loads that fail, and words that the search does not find."""
+    """Sentences about flat formulas, code wider than its box, loads that fail, and words that no search finds."""
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import WebDriverWait
 
@@ -113,6 +119,7 @@ def opened(folder, words=("temperature", "neighbourhood", "seamless")):
             )
             if flat:
                 faults.append(f"{path.name}: {flat} formulas are not drawn")
+            faults += [f"{path.name}: code runs out of its box: {line}" for line in driver.execute_script(LONG)]
             faults += [f"{path.name}: {entry['message']}" for entry in driver.get_log("browser")]
         for word in words:
             driver.get(f"{(folder / 'search.html').resolve().as_uri()}?q={word}")

@@ -57,7 +57,7 @@ numpydoc_show_class_members = False
 )
 (HERE / "generated" / "live" / "live.css").write_text(style(), encoding="utf-8")
 
-# The page of the study shows each table and all the pictures that benchmarks/study.py has written.
+# The page of measurements shows each table and all the pictures that benchmarks/study.py has written.
 for study in ("mrf", "multires", "pyramid"):
     results = [f".. csv-table::\n   :file: ../study/{study}.csv\n   :header-rows: 1\n"]
     for picture in sorted((HERE / "study").glob(f"{study}-*.png")):

@@ -197,13 +197,17 @@ def geoscience():
 
 
 def research():
-    """Run the blocks of the page for researchers from top to bottom, and keep what two of them print."""
+    """Run the blocks of the page for researchers from top to bottom, and keep what three of them print."""
     page = (HERE / "readers" / "research.rst").read_text(encoding="utf-8")
     names = {"__name__": "research"}
     for block in re.findall(r"^\.\. code-block:: python\n\n((?:(?:   .*)?\n)+)", page, re.MULTILINE):
         with redirect_stdout(io.StringIO()) as told:
             exec(compile(re.sub(r"^   ", "", block, flags=re.MULTILINE), "research.rst", "exec"), names)
-        for mark, name in (("sigma", "research-ising"), ("exact", "research-draw")):
+        for mark, name in (
+            ("multiply-adds", "research-cost"),
+            ("sigma", "research-ising"),
+            ("exact", "research-draw"),
+        ):
             if mark in told.getvalue():
                 (HERE / "readers" / f"{name}.txt").write_text(told.getvalue(), encoding="utf-8")
                 print(told.getvalue(), end="")

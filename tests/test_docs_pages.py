@@ -204,6 +204,15 @@ def test_a_page_that_is_too_wide_for_a_phone_is_told(folder, browser):
 
 
 @pytest.mark.slow
+def test_code_that_runs_out_of_its_box_is_told(folder, browser):
+    code = '<article><pre style="overflow: auto">{}</pre></article><h1'.format("x" * 300)
+    for style, faults in (("white-space: pre-wrap; overflow-wrap: anywhere", 0), ("", 1)):
+        page = GOOD.replace("<h1", f"<style>pre {{ {style} }}</style>{code}")
+        (folder / "one.html").write_text(page, encoding="utf-8")
+        assert sum("runs out of its box" in told for told in check.opened(folder, words=())) == faults
+
+
+@pytest.mark.slow
 def test_built_pages_are_sound_in_a_browser(browser):
     if not (BUILT / "index.html").is_file():
         pytest.skip("the documentation is not built (make docs)")
