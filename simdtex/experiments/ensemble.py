@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures of an ensemble of realisations: its uncertainty, and its likeness to the training image.
 
-An ensemble is an array (realisations, rows, cols). Categorical ones hold the values of categories, continuous ones
-integers or floats. The training image is (rows, cols), of the same kind and of any size. Axis 0 is down, axis 1 to the
-right, lags are pixels. No single figure suffices: see the page on ensembles.
+`probability`, `e_type`, `quantiles`, `connected_volume`, `vertical_proportions` and `standard_error` take an
+`xarray.DataArray` as `simdtex.simulate` returns it, a map or a volume, with its coordinates on the ground. The results
+keep its attributes, and have ``long_name`` and ``units``, which plots of xarray show. Cells outside of a region are
+NaN. Coordinates of a single value, such as z of a map, become attributes.
+
+For the other figures an ensemble is an array (realisations, rows, cols). Categorical ones hold the values of
+categories, continuous ones integers or floats. The training image is (rows, cols), of the same kind and of any size.
+Axis 0 is down, axis 1 to the right, lags are pixels. No single figure suffices: see the page on ensembles.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import nan, prod, sqrt
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,8 +29,13 @@ from scipy.stats import entropy
 from skimage.morphology import skeletonize
 
 from simdtex.experiments.quality import hashes
+from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.image import read
-from simdtex.options import moderate, unmasked
+from simdtex.io.rasters import axis_place
+from simdtex.options import moderate, require, unmasked
+
+if TYPE_CHECKING:
+    from xarray import DataArray
 
 Array = NDArray[Any]
 
@@ -617,18 +628,151 @@ def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
 
 
 __all__ = [
-    "Anodi",
-    "Connectivity",
-    "Summary",
-    "anodi",
-    "categories_of",
-    "channels",
-    "connectivity",
-    "copied",
-    "copies",
-    "dead_ends",
-    "summary",
+    *("Anodi", "Connectivity", "Summary", "anodi", "categories_of", "channels", "connected_volume", "connectivity"),
+    *("copied", "copies", "dead_ends", "e_type", "probability", "quantiles", "standard_error", "summary"),
+    "vertical_proportions",
 ]
+
+
+def probability(realisations: DataArray, category: float) -> DataArray:
+    """Return the share of the realisations in which each cell has a category, 0 to 1."""
+    found = _field(realisations, category).mean("realisation")
+    return _named(found, realisations, "probability", f"probability of {label(realisations, 'category')} {category}", "")
+
+
+def e_type(realisations: DataArray) -> DataArray:
+    """Return the mean of the realisations at each cell: the E-type estimate of a continuous variable."""
+    found = _field(realisations).mean("realisation")
+    return _named(found, realisations, "e_type", f"E-type of {label(realisations)}")
+
+
+def quantiles(realisations: DataArray, q: ArrayLike = (0.1, 0.5, 0.9)) -> DataArray:
+    """Return quantiles of a continuous variable at each cell, with the dimension ``quantile`` (`numpy.quantile`)."""
+    found = _field(realisations).quantile(q, "realisation")
+    return _named(found, realisations, "quantiles", f"quantile of {label(realisations)}")
+
+
+def connected_volume(realisations: DataArray, category: float, well: ArrayLike) -> DataArray:
+    """Return the volume of the bodies of a category that contain a cell of a well, for each realisation.
+
+    Parameters
+    ----------
+    realisations : DataArray, (realisation, [z,] y, x)
+    category : number
+    well : array_like, (2,), (3,), (n, 2) or (n, 3)
+        x and y on the ground, of all layers, or x, y and z. Bodies that several points meet count once.
+
+    Returns
+    -------
+    DataArray, (realisation,)
+        Cells times the size of a cell; of a map without the attribute ``cell_z`` it is an area. 0 where the well misses
+        the category. ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90, of which P10 is the small one; for reserves
+        the two are often called the other way round.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A point is outside of the cells, or the realisations have other dimensions.
+
+    Notes
+    -----
+    Cells are connected by their sides. Cost: two passes over each realisation.
+    """
+    field, wells = _field(realisations, category), np.atleast_2d(np.asarray(well, np.float64))
+    axes = [axis for axis in "zyx" if axis in realisations.dims]
+    if wells.shape[1] not in (2, 3) or {*realisations.dims} != {"realisation", *axes} or axes[-2:] != ["y", "x"]:
+        raise ValueError("give x, y and perhaps z of the well, and realisations of one variable with y and x")
+    used = "xyz"[: wells.shape[1]]
+    origin, cell = zip(*(axis_place(realisations, axis) for axis in used), strict=True)
+    sizes = [realisations.sizes[axis] for axis in axes if axis in used]
+    table = HardData(wells, np.ones((len(wells), 1)), ("well",))
+    hit = ~np.ma.getmaskarray(place_hard_data(table, sizes, origin=origin, cell=cell))
+
+    def cells(one: Array) -> int:
+        labels, _ = ndimage.label(one == 1)
+        bodies = np.unique(labels[np.broadcast_to(hit, labels.shape)])
+        return np.count_nonzero(np.isin(labels, bodies[bodies > 0]))
+
+    field = field.transpose("realisation", *axes)
+    sides = axes if "cell_z" not in realisations.attrs else "zyx"
+    counts = np.array([cells(one) for one in field.values])
+    volume = counts * prod(axis_place(realisations, axis)[1] for axis in sides)
+    units = [realisations.coords[axis].attrs.get("units", "") if axis in realisations.coords else "" for axis in sides]
+    unit = units[0] + " \u00b2\u00b3"[len(units) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
+    what = f"{'volume' if len(sides) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
+    found = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
+    return _named(found, realisations, "connected_volume", what, unit)
+
+
+def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] | None = None) -> DataArray:
+    """Return the share of each category in each layer, (category, [realisation,] z), of realisations or a volume.
+
+    Categories are those of the data by default. A plain array (layers, rows, cols) has its layers as z.
+    """
+    require("simulate", "xarray")
+    import xarray
+
+    data = data if isinstance(data, xarray.DataArray) else xarray.DataArray(np.asarray(data), dims=("z", "y", "x"))
+    if "z" not in data.dims:
+        raise ValueError("vertical proportions are of volumes; give one with the dimension z")
+    values = data.values[_known(data).transpose(*data.dims).values]
+    names = np.unique(values) if categories is None else np.asarray(categories)
+    shares = [_field(data, name, of="z").mean(("y", "x")) for name in names]
+    found = xarray.concat(shares, xarray.Variable("category", names))
+    return _named(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
+
+
+def standard_error(realisations: DataArray, category: float | None = None) -> DataArray:
+    """Return the standard error of the map after 2, 3, ... realisations, (realisations,), over all cells.
+
+    The map is `probability` or, without a category, `e_type`. A cell's error is the standard deviation of the first n
+    realisations over the root of n, since realisations are independent; the result is the root of the mean of its
+    square over the cells. For half the error four times as many realisations are needed.
+    """
+    require("simulate", "xarray")
+    import xarray
+
+    field = _field(realisations, category).transpose("realisation", ...)
+    first = field.values[0]
+    total, squares, errors = np.zeros(first.shape), np.zeros(first.shape), []
+    for n, one in enumerate(field.values, 1):
+        total, squares = total + (one - first), squares + (one - first) ** 2
+        if n > 1:
+            errors.append(sqrt(max(0.0, np.nanmean(squares - total**2 / n)) / (n * (n - 1))))
+    number = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
+    found = xarray.DataArray(errors, {"realisations": number}, ("realisations",))
+    units = None if category is None else ""
+    return _named(found, realisations, "standard_error", "standard error of the map", units)
+
+
+def _known(data: DataArray) -> DataArray:
+    """Return where the data are known: numbers, inside of the region if there is one."""
+    return data.notnull() & data.coords.get("region", True)
+
+
+def _field(data: DataArray, category: float | None = None, of: str = "realisation") -> DataArray:
+    """Return values, or the indicator of a category, as floats with NaN where they are unknown."""
+    if of not in getattr(data, "dims", ()):
+        raise TypeError(f"give an xarray.DataArray with the dimension {of}, as simdtex.simulate returns")
+    if category is None and json.loads(data.attrs.get("options", "{}")).get("categorical") is True:
+        raise ValueError("the realisations are of categories, which have no mean; use probability, or name a category")
+    return (data if category is None else data == category).astype(float).where(_known(data))
+
+
+def label(data: DataArray, unnamed: str = "the values") -> str:
+    """Return the name of a variable for plots; "simulation" is no name."""
+    return str(data.attrs.get("long_name") or (unnamed if data.name in (None, "simulation") else data.name))
+
+
+def _named(found: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
+    """Return a result with a name, and with the attributes of its data but ``long_name`` and ``units``."""
+    alone = {key: one.item() for key, one in found.coords.items() if one.ndim == 0 and key not in found.dims}
+    units = data.attrs.get("units", "") if units is None else units
+    found = found.reset_coords([*alone], drop=True).rename(name)
+    found.attrs = {**data.attrs, **alone, "long_name": long_name, "units": units}
+    for unused in {"missing", "spatial_ref", *([] if units else ["units"])} & {*found.attrs}:
+        del found.attrs[unused]
+    return found
 
 
 def channels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
