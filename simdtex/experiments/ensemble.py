@@ -637,7 +637,9 @@ __all__ = [
 def probability(realisations: DataArray, category: float) -> DataArray:
     """Return the share of the realisations in which each cell has a category, 0 to 1."""
     found = _field(realisations, category).mean("realisation")
-    return _named(found, realisations, "probability", f"probability of {label(realisations, 'category')} {category}", "")
+    return _named(
+        found, realisations, "probability", f"probability of {label(realisations, 'category')} {category}", ""
+    )
 
 
 def e_type(realisations: DataArray) -> DataArray:

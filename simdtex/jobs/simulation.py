@@ -195,7 +195,7 @@ def simulate(call: Simulate) -> Work:
         if inputs.given and inputs.given.outside is not None:
             coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
             attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
-        attributes |= sides_of_cells | described(call.given)
+        attributes |= sides_of_cells | described(call.given, known)
         result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
         if not call.source:
             return result

@@ -20,7 +20,7 @@ from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
 from simdtex.io.rasters import axis_place
-from simdtex.model.display import category_colours
+from simdtex.model.display import category_colours, extent, labelled
 from simdtex.options import require, whole
 
 try:
@@ -144,7 +144,7 @@ def draw(made: Any, number: int = 8) -> Figure:
         return _figure(made, [*titles, "entropy, bits"], planes, how)[0]
     if "variance" in maps:
         both = [made[name] for name in ("mean", "variance")]
-        return _figure(made, [_label(one) for one in both], [one.values for one in both], [{}, {}])[0]
+        return _figure(made, [labelled(one) for one in both], [one.values for one in both], [{}, {}])[0]
     if "realisation" in made.coords and not maps and {"y", "x"} <= set(made.dims):
         return _realisations(made, number)
     raise ValueError("there are no realisations and no estimate to draw; use plot.imshow of xarray")
@@ -172,16 +172,11 @@ def _realisations(made: Any, number: int) -> Figure:
         values, note = values[:, middle], f"{note}, z = {made.z.values[middle]:g}"
     titles = [f"realisation {k}{note}" for k in made.realisation.values[:number]]
     figure, bar = _figure(made, titles, values[:number], how)
-    bar.set_label("" if categorical else _label(made))
+    bar.setlabelled("" if categorical else labelled(made))
     if categorical:
         shares = [f"{name}: {share:.0f} %" for name, share in zip(names, 100 * counts / counts.sum(), strict=True)]
         bar.set_ticks(range(len(names)), labels=shares)
     return figure
-
-
-def _label(values: Any) -> str:
-    units = values.attrs.get("units")
-    return f"{values.attrs.get('long_name', values.name)}{f', {units}' if units else ''}"
 
 
 def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Figure, Colorbar]:
@@ -190,9 +185,7 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     Rows ascend to the north if the coordinates are on the ground, as in reports.
     """
     ground, rows, cols = "cell_y" in made.attrs, made.sizes["y"], made.sizes["x"]
-    (left, wide), (low, high) = axis_place(made, "x"), axis_place(made, "y")
-    ends = (low - high / 2, low + high * (rows - 0.5))
-    extent = (left - wide / 2, left + wide * (cols - 0.5), *(ends if ground else ends[::-1]))
+    (_, wide), (_, high) = axis_place(made, "x"), axis_place(made, "y")
     down = -(-len(titles) // ACROSS)
     across = -(-len(titles) // down)
     inches = MAP_INCHES / max(rows * high, cols * wide)
@@ -201,12 +194,12 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     grid = figure.subplots(down, across, squeeze=False).ravel()
     # smaller maps have a pixel for each cell
     smooth = "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
-    where = {"origin": "lower" if ground else "upper", "extent": extent, "interpolation": smooth}
+    where = {**extent(made, "y", "x"), "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
         own = how if isinstance(how, dict) else how[n]
         image = axes.imshow(planes[n], **where, **own)
         axes.set_title(title, fontsize=10)
-        axes.set(xlabel="x" if ground else "", ylabel="y" if ground else "")
+        axes.set(xlabel=labelled(made["x"]) if ground else "", ylabel=labelled(made["y"]) if ground else "")
         if own is not how:
             bar = figure.colorbar(image, ax=axes)
     for axes in grid[len(titles) :]:
@@ -241,9 +234,11 @@ class Results(xr.Dataset):  # type: ignore[no-untyped-call]
     plot = UncachedAccessor(_DatasetPlot)
 
 
-def described(training: Any) -> dict[str, str]:
-    """Return the attributes ``long_name`` and ``units`` of a training image of xarray, if it has them."""
-    if not hasattr(training, "coords"):
-        return {}
-    found = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+def described(training: Any, known: Any = None) -> dict[str, str]:
+    """Return the attributes ``long_name`` and ``units`` of a training image of xarray, or the name of one variable."""
+    names: Any = getattr(known, "names", ())  # of a table
+    found = {"long_name": names[0] if len(names) == 1 else "", "units": ""}
+    if hasattr(training, "coords"):
+        own = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+        found |= {name: value for name, value in own.items() if value}
     return {name: str(value) for name, value in found.items() if value}

@@ -7,19 +7,25 @@ import os
 from collections.abc import Sequence
 from dataclasses import fields
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.experiments import ensemble as measures
 from simdtex.experiments.ensemble import WINDOW, Summary, connectivity, copies, summary, variogram
 from simdtex.io.image import to_display
-from simdtex.model.display import category_colours, source_colours
+from simdtex.io.rasters import axis_place
+from simdtex.model.display import category_colours, extent, labelled, source_colours
+from simdtex.options import require
 from simdtex.report.page import FAINT, INK, Figure, Part, Section, check_folder, legend, new_figure, tidy, write_report
 from simdtex.report.sheet import LEAST_SIDE, contact_sheet
 from simdtex.report.tables import Table, number_text
+
+if TYPE_CHECKING:
+    from xarray import DataArray
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -29,7 +35,8 @@ MOST_PANELS = 6  # categories drawn, those with the largest shares of the traini
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
-ACROSS = {1: "to the right", 0: "down"}  # the axes of a picture
+QUANTILES = 0.1, 0.5, 0.9
+AXES = ("z", "y", "x")
 
 
 def write_ensemble(
@@ -40,7 +47,6 @@ def write_ensemble(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
     command: str = "",
-    upward: bool = False,
 ) -> None:
     """Write the report of an ensemble: ``index.html``, PNG pictures, ``results.json``.
 
@@ -50,7 +56,8 @@ def write_ensemble(
         See `simdtex.report.page.check_folder`.
     training : array_like, (rows, cols)
         The training image.
-    ensemble : array_like, (realisations, rows, cols)
+    ensemble : xarray.DataArray or array_like, (realisations, rows, cols)
+        That of `simdtex.simulate` with coordinates on the ground has them on all axes, and north at the top.
     data : array_like, (m, 3), optional
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
@@ -58,8 +65,6 @@ def write_ensemble(
         empty sequence means continuous values.
     command : str
         The command line, if there is one.
-    upward : bool
-        Draw row 0 at the bottom, as of a map, whose rows ascend to the north.
 
     Raises
     ------
@@ -71,17 +76,18 @@ def write_ensemble(
     The time is that of `simdtex.experiments.ensemble` and about 3 s for the pictures.
     """
     check_folder(folder)
-    found = summary(ensemble, training, data=data, categories=categories)
-    images, own = np.asarray(ensemble), np.asarray(training)
-    categorical = len(found.categories) > 0
-    shown = (images[:, ::-1], own[::-1]) if upward else (images, own)
-    with matplotlib.rc_context({"image.origin": "lower" if upward else "upper"}):
-        uncertainty = _uncertainty(found)
+    found = summary(np.asarray(ensemble), training, data=data, categories=categories)
+    made, own = _as_realisations(ensemble), np.asarray(training)
+    images, categorical, names = made.values, len(found.categories) > 0, found.categories[_mapped(found)].tolist()
+    shown = (images[:, ::-1], own[::-1]) if "cell_y" in made.attrs else (images, own)
+    points = _on_ground(made, found.data)
+    volumes, errors = measured = _connected(made, names, points), _errors(made, names)
     sections = [
         Section("The realisations", [_realisations(*shown, found)]),
-        Section("Uncertainty", uncertainty),
-        Section("Variograms", [_variograms(found)]),
-        *([Section("Connectivity of the categories", _connectivity(found))] if categorical else []),
+        Section("Uncertainty", _uncertainty(made, names, points, found)),
+        *(Section(title, parts) for title, parts, _ in measured if parts),
+        Section("Variograms", [_variograms(made, found)]),
+        *([Section("Connectivity of the categories", _connectivity(made, found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
         Section("Copies", _copies(*shown, found)),
     ]
@@ -94,6 +100,8 @@ def write_ensemble(
         **{one.name: getattr(found, one.name) for one in fields(Summary) if one.name not in ("maps", "open", "anodi")},
         "anodi": found.anodi._asdict(),
         "mean_open": found.open.mean(),
+        "connected_volumes": volumes[2],
+        "standard_error": errors[2],
         "shape": images.shape,
         "training_shape": own.shape,
     }
@@ -144,70 +152,206 @@ def _realisations(images: Array, own: Array, found: Summary) -> Figure:
     )
 
 
-def _uncertainty(found: Summary) -> list[Part]:
-    """Return maps of the mean or of the shares of categories, and of the entropy or the standard deviation."""
+def _as_realisations(ensemble: Any) -> DataArray:
+    """Return an array (realisations, [layers,] rows, cols) with the names of its axes, or one that has them."""
+    require("simulate", "xarray")
+    import xarray
+
+    if isinstance(ensemble, xarray.DataArray):
+        return ensemble
+    array = np.asarray(ensemble)
+    return xarray.DataArray(array, dims=("realisation", *AXES[4 - array.ndim :]))
+
+
+def _on_ground(made: DataArray, data: Floats) -> Floats:
+    """Return hard data, (m, 3 or 4), with the coordinates of their cells in place of column, row and layer."""
+    places = np.array([axis_place(made, axis) for axis in "xyz"[: data.shape[1] - 1]])
+    return np.c_[places[:, 0] + places[:, 1] * data[:, :-1], data[:, -1:]]
+
+
+def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary) -> list[Part]:
+    """Return maps of the mean and quantiles, or of probabilities, and of the standard deviation or the entropy."""
     dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
-    if len(found.categories) == 0:
-        values = found.data[:, 2]
-        limits = min([found.maps.min(), *values]), max([found.maps.max(), *values])
-        maps = _maps(found, {"mean of the realisations": (found.maps[0], values)}, "viridis", limits)
-        spread = _maps(found, {"standard deviation": (found.open, None)}, "magma", (0.0, found.open.max() or 1.0))
-        what = "The mean of the realisations at every pixel."
+    spread, values = made.isel(realisation=0, drop=True).copy(data=found.open), data[:, 2]
+    if not names:
+        cuts = measures.quantiles(made, QUANTILES)
+        planes = [measures.e_type(made), *cuts]
+        titles = [_titled(planes[0]), *(f"P{100 * q:.0f} of {_titled(made)}" for q in QUANTILES)]
+        panels = {title: (plane, values) for title, plane in zip(titles, planes, strict=True)}
+        limits = min([cuts.values.min(), *values]), max([cuts.values.max(), *values])
+        open_title, most = f"standard deviation of {_titled(made)}", found.open.max() or 1.0
+        what = "The mean of the realisations at every pixel (E-type), and the values below which a tenth (P10), a half "
+        what += "(P50) and nine tenths (P90) of them are."
         how = "The standard deviation of the realisations at every pixel, in the unit of the values"
     else:
-        panels = {}
-        for k in _mapped(found):
-            category = found.categories[k]
-            panels[f"share of category {category}"] = found.maps[k], (found.data[:, 2] == category).astype(float)
-        maps = _maps(found, panels, "viridis", (0.0, 1.0))
-        most = float(np.log2(max(2, len(found.categories))))
-        spread = _maps(found, {"entropy, bits": (found.open, None)}, "magma", (0.0, most))
+        planes = [measures.probability(made, name) for name in names]
+        shares = [(values == name).astype(float) for name in names]
+        panels = {_titled(plane): (plane, known) for plane, known in zip(planes, shares, strict=True)}
+        limits, open_title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
         what = "The share of the realisations in which a pixel has the category: its probability there."
         how = f"The entropy of every pixel over the categories, {found.open.mean():.2f} bits on average"
     return [
         Figure(
             "maps.png",
-            maps,
-            f"{what}{dots if len(found.data) else ''} Around data the map follows them; far from them it should be "
+            _maps(panels, data, "viridis", limits),
+            f"{what}{dots if len(data) else ''} Around data the map follows them; far from them it should be "
             "even, for nothing is known there. Structure far from any datum means that realisations repeat each other.",
         ),
         Figure(
             "entropy.png",
-            spread,
+            _maps({open_title: (spread, None)}, data, "magma", (0.0, most)),
             f"{how}: dark where all realisations agree, light where they differ most. It should be dark at hard data "
             "only, and grow with the distance from them over about the range of the variogram.",
         ),
     ]
 
 
+def _titled(values: DataArray) -> str:
+    """Return the name of a variable with its unit, for a title."""
+    return measures.label(values) + (f", {values.attrs['units']}" if values.attrs.get("units") else "")
+
+
 def _maps(
-    found: Summary, panels: dict[str, tuple[Floats, Floats | None]], colours: str, limits: tuple[float, float]
+    panels: dict[str, tuple[DataArray, Floats | None]],
+    data: Floats,
+    colours: str,
+    limits: tuple[float, float],
+    across: int | None = None,
 ) -> Plot:
-    """Plot maps by title, each with the hard data as dots in the colours of their values, or hollow if None."""
-    rows, cols = found.open.shape
-    across = 2 if len(panels) == 4 else min(3, len(panels))
+    """Plot planes by title, each with the hard data as dots in the colours of their values, or hollow if None.
+
+    Cells of a plane through layers are squares.
+    """
+    rows, cols = np.max([plane.shape for plane, _ in panels.values()], axis=0)
+    across = across or (2 if len(panels) == 4 else min(3, len(panels)))
     down = -(-len(panels) // across)
     wide, high = MAP_INCHES * cols / max(rows, cols), MAP_INCHES * rows / max(rows, cols)
-    figure = new_figure(across * max(wide, 1.6) + 1.2, down * (max(high, 1.0) + 0.45))
+    figure = new_figure(across * (max(wide, 1.6) + 0.4) + 1.2, down * (max(high, 1.0) + 0.65))
     grid = figure.subplots(down, across, squeeze=False).ravel()
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
-    x, y = found.data[:, 0], found.data[:, 1]
     low, high = limits
-    for axes, (title, (picture, values)) in zip(grid, panels.items(), strict=False):
-        image = axes.imshow(picture, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
+    for axes, (title, (plane, values)) in zip(grid, panels.items(), strict=False):
+        upward, along = plane.dims
+        (_, wide), (_, tall) = axis_place(plane, along), axis_place(plane, upward)
+        place = {
+            "aspect": 1 if upward == "y" else wide / tall,
+            "interpolation": "nearest",
+            **extent(plane, upward, along),
+        }
+        image = axes.imshow(plane, cmap=colours, vmin=low, vmax=high, **place)
         axes.set_title(title, loc="left", fontsize=10, color=INK)
+        axes.set(xlabel=labelled(plane[along]), ylabel=labelled(plane[upward]))
         axes.tick_params(colors=FAINT, labelcolor=INK, labelsize=8)
         inside: Any = "none"
         if values is not None:
             inside = matplotlib.colormaps[colours](np.clip((values - low) / ((high - low) or 1.0), 0, 1))
-        axes.scatter(x, y, s=26, c=inside, edgecolors="white", linewidths=1.8)
-        axes.scatter(x, y, s=34, c="none", edgecolors="black", linewidths=0.7)
+        axes.scatter(data[:, 0], data[:, 1], s=26, c=inside, edgecolors="white", linewidths=1.8)
+        axes.scatter(data[:, 0], data[:, 1], s=34, c="none", edgecolors="black", linewidths=0.7)
     figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02)
     return figure
 
 
-def _variograms(found: Summary) -> Figure:
+Measured = tuple[str, list[Part], Any]
+"""The title, the parts and the numbers of a section, which is left out if it has no parts."""
+
+
+def _connected(made: DataArray, names: list[Any], data: Floats) -> Measured:
+    """Return the distributions of the volumes of categories that are connected to wells, as hard data on the ground."""
+    title, rows, found = "Volumes connected to wells", [], {}
+    for name in names:
+        hits = data[data[:, -1] == name, :-1]
+        wells = np.unique(hits[:, :2], axis=0)
+        sets = {f"all {len(wells)}": hits} if len(wells) > 1 else {}
+        sets |= {f"x {x:g}, y {y:g}": hits[(hits[:, :2] == (x, y)).all(1)] for x, y in wells[:SHOWN]}
+        volumes = {well: measures.connected_volume(made, name, at) for well, at in sets.items()}
+        for well, one in volumes.items():
+            found.setdefault(str(name), (one, volumes))
+            cuts = zip(QUANTILES, one.quantile(QUANTILES).values, strict=True)
+            rows.append({"Category": str(name), "Well": well, **{f"P{100 * q:.0f}": number_text(v) for q, v in cuts}})
+    if not found:
+        return title, [], {}
+    figure = new_figure(1 + 3.4 * len(found), 3)
+    for axes, (name, (one, _)) in zip(figure.subplots(1, len(found), squeeze=False)[0], found.items(), strict=True):
+        axes.step(np.sort(one), np.arange(1, len(one) + 1) / len(one), where="post", color=THEIRS)
+        for q, value in zip(QUANTILES, one.quantile(QUANTILES).values, strict=True):
+            axes.axvline(value, color=OWN, linestyle="--", linewidth=1.2)
+            axes.annotate(f"P{100 * q:.0f}", (value, q), (3, -3), textcoords="offset points", fontsize=9, va="top")
+        what, unit = one.attrs["long_name"].split()[0], one.attrs.get("units")
+        tidy(axes, f"category {name}", f"{what}{f', {unit}' if unit else ''}", "share of the realisations below")
+    note = (
+        "A body counts if a well meets it; cells are connected by their sides. P10 is the value that a tenth of the "
+        "realisations do not reach, which for reserves is often called P90."
+    )
+    table = Table(f"{what.capitalize()}{f', {unit}' if unit else ''}", rows, note)
+    caption = (
+        f"Distribution of the {what} of the bodies that the wells in the category meet, over {len(one)} realisations."
+    )
+    numbers = {name: {well: each.values for well, each in every.items()} for name, (_, every) in found.items()}
+    return title, [Figure("volumes.png", figure, caption), table], numbers
+
+
+def _errors(made: DataArray, names: list[Any]) -> Measured:
+    """Return how the standard error of maps falls with the number of realisations."""
+    title, n = "How many realisations", made.sizes["realisation"]
+    if n < 2:
+        return title, [], {}
+    curves = {str(name): measures.standard_error(made, name) for name in names}
+    curves = curves or {measures.label(made): measures.standard_error(made)}
+    figure = new_figure(5.6, 3)
+    axes = figure.subplots()
+    for name, one in curves.items():
+        axes.plot(one["realisations"], one, marker=".", label=f"category {name}" if names else name)
+    unit = one.attrs.get("units")
+    tidy(axes, "", "number of realisations", f"standard error of the map{f', {unit}' if unit else ''}")
+    axes.set_ylim(0)
+    if len(curves) > 1:
+        axes.legend(frameon=False, fontsize=9)
+    most = max(float(one[-1]) for one in curves.values())
+    words = f"Standard error of the map above after 2 to {n} realisations, over all cells: after {n} it is "
+    words += f"{most:.2g}{f' {unit}' if unit else ''}, and half of that takes {4 * n} realisations."
+    return title, [Figure("error.png", figure, words)], {name: one.values for name, one in curves.items()}
+
+
+def _vertical(made: DataArray, training: Array, names: Array) -> Measured:
+    """Return the shares of categories layer by layer, of the realisations and of the training image."""
+    theirs, own = measures.vertical_proportions(made, names), measures.vertical_proportions(training, names)
+    shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
+    figure = new_figure(1 + 2.4 * len(shown), 3.6)
+    first, side = axis_place(made, "z")
+    ends = first - side / 2, first + side * (made.sizes["z"] - 0.5)
+    heights = [ends[0] + (ends[1] - ends[0]) * (np.arange(n) + 0.5) / n for n in (made.sizes["z"], len(training))]
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    for k, axes in zip(shown, panels, strict=True):
+        one = theirs.values[k]
+        axes.fill_betweenx(
+            heights[0], one.min(0), one.max(0), color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all"
+        )
+        axes.plot(one.mean(0), heights[0], color=THEIRS, label="realisations, mean")
+        axes.plot(own.values[k], heights[1], color=OWN, linestyle="--", label="training image")
+        tidy(axes, f"category {names[k]}", "share of the layer", labelled(made["z"]) if axes is panels[0] else "")
+    panels[0].set_ylim(*(ends if "cell_y" in made.attrs else ends[::-1]))
+    legend(figure, panels[0])
+    caption = "Vertical proportion curves: the share of each category in each layer, beside those of the training image"
+    caption += "." if len(training) == made.sizes["z"] else f", whose {len(training)} layers are stretched."
+    return (
+        "Vertical proportions",
+        [Figure("vertical.png", figure, caption)],
+        {"realisations": theirs.values, "own": own},
+    )
+
+
+def _ways(made: DataArray) -> dict[int, tuple[str, float, str]]:
+    """Return the name, the size of a cell and its unit for each axis of a realisation: the order of panels."""
+    axes, unit = [axis for axis in AXES if axis in made.dims], "voxels" if "z" in made.dims else "pixels"
+    if "cell_y" in made.attrs or len(axes) > 2:
+        ground = {axis: made[axis].attrs.get("units", "") if "cell_y" in made.attrs else unit for axis in axes}
+        found = {n: (f"along {axis}", axis_place(made, axis)[1], ground[axis]) for n, axis in enumerate(axes)}
+        return found if len(axes) > 2 else dict(reversed(found.items()))
+    return {1: ("to the right", 1.0, unit), 0: ("down", 1.0, unit)}
+
+
+def _variograms(made: DataArray, found: Summary) -> Figure:
     if len(found.categories) == 0:
         table, names, of = found.variograms, [""], "the values"
     else:
@@ -216,33 +360,38 @@ def _variograms(found: Summary) -> Figure:
         of = "each category's indicator" + (" (of two categories both are the same)" if len(shown) == 1 else "")
     return Figure(
         "variograms.png",
-        _lagged(found.lags, table, names, "variogram", ACROSS, "pixels"),
+        _lagged(found.lags, table, names, "variogram", _ways(made)),
         f"Variograms of {of} along both axes: half the mean squared difference of two pixels at a lag. The training "
         "image's line should run inside the band of the realisations. A band that rises later means bodies that are "
         "too large, one that rises earlier bodies that are too small or noise; waves are regular distances.",
     )
 
 
-def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, ways: dict[int, str], unit: str) -> Plot:
+def _lagged(
+    lags: Array, table: Floats, names: Sequence[str], label: str, ways: dict[int, tuple[str, float, str]]
+) -> Plot:
     """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each of some axes."""
     figure = new_figure(2.2 + 3.0 * len(ways), 0.5 + 2.35 * len(names))
-    grid = figure.subplots(len(names), len(ways), sharey="row", sharex=True, squeeze=False)
+    grid = figure.subplots(len(names), len(ways), sharey="row", sharex="col", squeeze=False)
     for row, (name, panels) in enumerate(zip(names, grid, strict=True)):
-        for (axis, way), axes in zip(ways.items(), panels, strict=True):
+        for (axis, (way, side, unit)), axes in zip(ways.items(), panels, strict=True):
             theirs, own = table[axis, row, :-1], table[axis, row, -1]
             known = np.isfinite(theirs).any(axis=0)
             low, middle, high = (how(theirs[:, known], axis=0) for how in (np.nanmin, np.nanmedian, np.nanmax))
-            axes.fill_between(lags[known], low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all")
-            axes.plot(lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
-            axes.plot(lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
+            axes.fill_between(
+                side * lags[known], low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all"
+            )
+            axes.plot(side * lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
+            axes.plot(side * lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
             title = f"{name}, {way}" if name else way
-            tidy(axes, title, f"lag, {unit}" if row == len(names) - 1 else "", label if axes is panels[0] else "")
+            below = f"lag, {unit}".rstrip(", ") if row == len(names) - 1 else ""
+            tidy(axes, title, below, label if axes is panels[0] else "")
         panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
     legend(figure, grid[0, 0])
     return figure
 
 
-def _connectivity(found: Summary) -> list[Part]:
+def _connectivity(made: DataArray, found: Summary) -> list[Part]:
     shown = _drawn(found)
     names = [f"category {found.categories[k]}" for k in shown]
     figures = {
@@ -255,7 +404,7 @@ def _connectivity(found: Summary) -> list[Part]:
     return [
         Figure(
             "connectivity.png",
-            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", ACROSS, "pixels"),
+            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", _ways(made)),
             "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
             "connected component (pixels are connected by their sides). A variogram cannot tell whole channels from "
             "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
@@ -357,53 +506,66 @@ def _decimal(value: float) -> str:
 SLICED = 2
 """Realisations whose slices are shown."""
 
-AXES = ("z", "y", "x")
-
 
 def write_volumes(
     folder: str | os.PathLike[str],
     training: NDArray[Any],
-    ensemble: NDArray[Any],
+    ensemble: Any,
     categorical: bool,
     command: str = "",
-    upward: bool = False,
+    data: Floats | None = None,
 ) -> None:
     """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
 
-    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols). Of categories the last is
-    drawn. ``upward``: y, or z, is drawn upward, as of a map. Cost: a few passes over each realisation for every lag, up
-    to a third of the shortest side.
+    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols), or that of
+    `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
+    row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
     """
-    images, names = [*ensemble, training], np.unique(training) if categorical else np.zeros(0, training.dtype)
-    fields = [(one == names[-1] if categorical else one).astype(np.float64) for one in images]
-    what = f"category {names[-1]}" if categorical else "the values"
+    made = _as_realisations(ensemble)
+    names = np.unique(training) if categorical else np.zeros(0, training.dtype)
+    images, drawn = [*made.values, training], names[-1] if categorical else None
+    fields = [(one == drawn if categorical else one).astype(np.float64) for one in images]
+    what = f"category {drawn}" if categorical else "the values"
     limits = (float(fields[-1].min()), float(fields[-1].max()))
-    shown = {"training image": fields[-1], f"mean of {len(ensemble)}": np.mean(fields[:-1], 0)}
-    shown |= {f"realisation {k}": one for k, one in enumerate(fields[:-1][:SLICED])}
-    sheet = [
-        (f"{name}, {AXES[axis]} = {n // 2}", to_display(one.take(n // 2, axis)[:: -1 if upward else 1], limits))
-        for name, one in shown.items()
-        for axis, n in enumerate(one.shape)
-    ]
-    lags = np.arange(max(1, min(*training.shape, *ensemble.shape[1:]) // 3) + 1)
-    along = {axis: f"along {name}" for axis, name in enumerate(AXES)}
+    image = _as_realisations(fields[-1][None])[0].assign_attrs(made.attrs)
+    shown = {"training image": image}
+    if categorical:
+        shown |= {"probability": measures.probability(made, drawn)}
+    else:
+        shown |= {"E-type": measures.e_type(made)}
+        shown |= {f"P{100 * q:.0f}": one for q, one in zip(QUANTILES, measures.quantiles(made), strict=True)}
+    shown |= {f"realisation {k}": one.copy(data=field) for k, (one, field) in enumerate(zip(made[:SLICED], fields))}
+    panels = {}
+    for name, one in shown.items():
+        for axis in AXES:
+            plane = one.isel({axis: one.sizes[axis] // 2})
+            at = axis_place(one, axis)
+            title = f"{name}, {axis} = {at[0] + at[1] * (one.sizes[axis] // 2):g} {one[axis].attrs.get('units', '')}"
+            panels[title.rstrip()] = plane, None
+    lags = np.arange(max(1, min(*training.shape, *made.shape[1:]) // 3) + 1)
 
     def lagged(label: str, functions: list[Any]) -> Figure:
         table = np.moveaxis(np.array(functions), 1, 0)[:, None]
         caption = (
             f"{label.capitalize()} of {what} along z, y and x. The training image's line should run inside the band."
         )
-        return Figure(f"{label}.png", _lagged(lags, table, [""], label, along, "voxels"), caption)
+        return Figure(f"{label}.png", _lagged(lags, table, [""], label, _ways(made)), caption)
 
     variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]
     slices = Figure(
         "slices.png",
-        contact_sheet(sheet, columns=3, scale=-(-LEAST_SIDE // max(training.shape))),
-        f"The middle slices across z, y and x of {what}: the training image, the mean of the realisations, and "
-        "realisations. In the mean, grey is uncertain.",
+        _maps(panels, np.empty((0, 2)), "viridis", limits, 3),
+        f"The middle slices across z, y and x of {what}: the training image, the uncertainty of the realisations, and "
+        "realisations.",
     )
-    sections = [Section("Slices", [slices]), Section("Variograms", [lagged("variograms", variograms)])]
-    results: dict[str, Any] = {"shape": ensemble.shape, "training_shape": training.shape}
+    points = np.empty((0, 4)) if data is None else _on_ground(made, data)
+    measured = {"connected_volumes": _connected(made, names.tolist(), points)}
+    measured |= {"standard_error": _errors(made, names[-1:].tolist())}
+    measured |= {"vertical_proportions": _vertical(made, training, names)} if categorical else {}
+    sections = [Section("Slices", [slices]), *(Section(title, parts) for title, parts, _ in measured.values() if parts)]
+    sections.append(Section("Variograms", [lagged("variograms", variograms)]))
+    results: dict[str, Any] = {"shape": made.shape, "training_shape": training.shape}
+    results |= {name: numbers for name, (_, _, numbers) in measured.items()}
     results["variograms"] = [variograms[-1], *variograms[:-1]]
     if categorical:
         found = [[connectivity(one, name, len(lags) - 1) for one in images] for name in names]
@@ -416,6 +578,6 @@ def write_volumes(
         table = _figures(names, figures, " Voxels are connected by their faces.")
         sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table]))
         results |= {"connectivity": [functions[-1], *functions[:-1]], "categories": names}
-    size = " x ".join(str(side) for side in ensemble.shape[:0:-1])
-    lead = f"{len(ensemble)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
+    size = " x ".join(str(side) for side in made.shape[:0:-1])
+    lead = f"{len(made)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
     write_report(folder, "Realisations of a volume", lead, sections, results, command)
