@@ -53,9 +53,7 @@ def main():
         keep(driver, "arrangement")
         script("page.go('paint'); page.showLayer('picture'); page.painting.width = 40")
         until(lambda: script("return page.seen") == "picture")
-        script(
-            "const { brush } = page.painting; for (const at of [[150, 120], [260, 110]]) brush.begin(at), brush.add([90, 160])"
-        )
+        script("const { brush } = page.painting; for (const at of [[150, 120], [260, 110]]) brush.begin(at), brush.add([90, 160])")
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)
         script("page.go('make'); page.view.fit(); scrollTo(0, 0)")
@@ -82,7 +80,8 @@ def main():
         made(before + 2)
         for count, schedule in enumerate(("coloring", "checkerboard"), before + 3):
             script(
-                "page.width = page.height = 128;page.options.mrf.values = {schedule: arguments[0]}; page.make()",
+                "page.width = page.height = 128;"
+                "page.options.mrf.values = {schedule: arguments[0]}; page.make()",
                 schedule,
             )
             made(count)

@@ -637,7 +637,7 @@ __all__ = [
 def probability(realisations: DataArray, category: float) -> DataArray:
     """Return the share of the realisations in which each cell has a category, 0 to 1."""
     found = _field(realisations, category).mean("realisation")
-    return _named(
+    return _described(
         found, realisations, "probability", f"probability of {label(realisations, 'category')} {category}", ""
     )
 
@@ -645,13 +645,13 @@ def probability(realisations: DataArray, category: float) -> DataArray:
 def e_type(realisations: DataArray) -> DataArray:
     """Return the mean of the realisations at each cell: the E-type estimate of a continuous variable."""
     found = _field(realisations).mean("realisation")
-    return _named(found, realisations, "e_type", f"E-type of {label(realisations)}")
+    return _described(found, realisations, "e_type", f"E-type of {label(realisations)}")
 
 
 def quantiles(realisations: DataArray, q: ArrayLike = (0.1, 0.5, 0.9)) -> DataArray:
     """Return quantiles of a continuous variable at each cell, with the dimension ``quantile`` (`numpy.quantile`)."""
     found = _field(realisations).quantile(q, "realisation")
-    return _named(found, realisations, "quantiles", f"quantile of {label(realisations)}")
+    return _described(found, realisations, "quantiles", f"quantile of {label(realisations)}")
 
 
 def connected_volume(realisations: DataArray, category: float, well: ArrayLike) -> DataArray:
@@ -667,9 +667,8 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     Returns
     -------
     DataArray, (realisation,)
-        Cells times the size of a cell; of a map without the attribute ``cell_z`` it is an area. 0 where the well misses
-        the category. ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90, of which P10 is the small one; for reserves
-        the two are often called the other way round.
+        Cells times the size of a cell, of a map an area; 0 where the well misses the category.
+        ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90. P10 is the small one, which is P90 of many reserves.
 
     Raises
     ------
@@ -693,35 +692,30 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     def cells(one: Array) -> int:
         labels, _ = ndimage.label(one == 1)
         bodies = np.unique(labels[np.broadcast_to(hit, labels.shape)])
-        return np.count_nonzero(np.isin(labels, bodies[bodies > 0]))
+        return int(np.isin(labels, bodies[bodies > 0]).sum())
 
     field = field.transpose("realisation", *axes)
-    sides = axes if "cell_z" not in realisations.attrs else "zyx"
+    units = [realisations[axis].attrs.get("units", "") for axis in axes]
+    unit = units[0] + " \u00b2\u00b3"[len(axes) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
+    what = f"{'volume' if len(axes) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
     counts = np.array([cells(one) for one in field.values])
-    volume = counts * prod(axis_place(realisations, axis)[1] for axis in sides)
+    volume = counts * prod(axis_place(realisations, axis)[1] for axis in axes)
     units = [realisations.coords[axis].attrs.get("units", "") if axis in realisations.coords else "" for axis in sides]
     unit = units[0] + " \u00b2\u00b3"[len(units) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
     what = f"{'volume' if len(sides) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
     found = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
-    return _named(found, realisations, "connected_volume", what, unit)
+    return _described(found, realisations, "connected_volume", what, unit)
 
 
 def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] | None = None) -> DataArray:
     """Return the share of each category in each layer, (category, [realisation,] z), of realisations or a volume.
 
-    Categories are those of the data by default. A plain array (layers, rows, cols) has its layers as z.
+    Categories are those of the data by default. A plain array is (z, y, x).
     """
-    require("simulate", "xarray")
-    import xarray
-
-    data = data if isinstance(data, xarray.DataArray) else xarray.DataArray(np.asarray(data), dims=("z", "y", "x"))
-    if "z" not in data.dims:
-        raise ValueError("vertical proportions are of volumes; give one with the dimension z")
-    values = data.values[_known(data).transpose(*data.dims).values]
-    names = np.unique(values) if categories is None else np.asarray(categories)
-    shares = [_field(data, name, of="z").mean(("y", "x")) for name in names]
-    found = xarray.concat(shares, xarray.Variable("category", names))
-    return _named(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
+    data = named(data, "z", "y", "x")
+    names = np.unique(data.values[_known(data).values]) if categories is None else np.asarray(categories)
+    found = _field(data, named(names, "category", coords={"category": names}), of="z").mean(("y", "x"))
+    return _described(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
 
 
 def standard_error(realisations: DataArray, category: float | None = None) -> DataArray:
@@ -731,20 +725,27 @@ def standard_error(realisations: DataArray, category: float | None = None) -> Da
     realisations over the root of n, since realisations are independent; the result is the root of the mean of its
     square over the cells. For half the error four times as many realisations are needed.
     """
-    require("simulate", "xarray")
-    import xarray
-
     field = _field(realisations, category).transpose("realisation", ...)
-    first = field.values[0]
-    total, squares, errors = np.zeros(first.shape), np.zeros(first.shape), []
-    for n, one in enumerate(field.values, 1):
-        total, squares = total + (one - first), squares + (one - first) ** 2
+    total = squares = np.zeros(field.shape[1:])
+    errors = []
+    for n, one in enumerate(field.values - field.values[0], 1):
+        total, squares = total + one, squares + one**2
         if n > 1:
             errors.append(sqrt(max(0.0, np.nanmean(squares - total**2 / n)) / (n * (n - 1))))
     number = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
-    found = xarray.DataArray(errors, {"realisations": number}, ("realisations",))
-    units = None if category is None else ""
-    return _named(found, realisations, "standard_error", "standard error of the map", units)
+    found = named(errors, "realisations", coords={"realisations": number})
+    return _described(
+        found, realisations, "standard_error", "standard error of the map", None if category is None else ""
+    )
+
+
+def named(data: Any, *dims: str, **about: Any) -> DataArray:
+    """Return an array of xarray as it is, and a plain one with the names of its axes."""
+    require("simulate", "xarray")
+    import xarray
+
+    found: DataArray = data if isinstance(data, xarray.DataArray) else xarray.DataArray(data, dims=dims, **about)
+    return found
 
 
 def _known(data: DataArray) -> DataArray:
@@ -752,13 +753,14 @@ def _known(data: DataArray) -> DataArray:
     return data.notnull() & data.coords.get("region", True)
 
 
-def _field(data: DataArray, category: float | None = None, of: str = "realisation") -> DataArray:
+def _field(data: DataArray, category: Any = None, of: str = "realisation") -> DataArray:
     """Return values, or the indicator of a category, as floats with NaN where they are unknown."""
     if of not in getattr(data, "dims", ()):
         raise TypeError(f"give an xarray.DataArray with the dimension {of}, as simdtex.simulate returns")
     if category is None and json.loads(data.attrs.get("options", "{}")).get("categorical") is True:
         raise ValueError("the realisations are of categories, which have no mean; use probability, or name a category")
-    return (data if category is None else data == category).astype(float).where(_known(data))
+    found: DataArray = (data if category is None else category == data).astype(float).where(_known(data))
+    return found
 
 
 def label(data: DataArray, unnamed: str = "the values") -> str:
@@ -766,7 +768,7 @@ def label(data: DataArray, unnamed: str = "the values") -> str:
     return str(data.attrs.get("long_name") or (unnamed if data.name in (None, "simulation") else data.name))
 
 
-def _named(found: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
+def _described(found: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
     """Return a result with a name, and with the attributes of its data but ``long_name`` and ``units``."""
     alone = {key: one.item() for key, one in found.coords.items() if one.ndim == 0 and key not in found.dims}
     units = data.attrs.get("units", "") if units is None else units

@@ -15,7 +15,6 @@ import PIL.Image
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import Metadata, pillow_bytes, read, split_alpha, to_display, write
-from simdtex.io.rasters import axis_place
 
 Picture = NDArray[np.uint8]
 
@@ -36,20 +35,6 @@ def temperature_colours(temperature: ArrayLike) -> Picture:
     """
     share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
     return _temperature_table()[np.round(share * 255.0).astype(np.intp)]
-
-
-def extent(plane: Any, upward: str, along: str) -> dict[str, Any]:
-    """Return the keywords of ``imshow`` for an array of xarray: rows ascend upward if cells are on the ground."""
-    (left, wide), (low, high) = axis_place(plane, along), axis_place(plane, upward)
-    ends, ground = (low - high / 2, low + high * (plane.sizes[upward] - 0.5)), "cell_y" in plane.attrs
-    found = (left - wide / 2, left + wide * (plane.sizes[along] - 0.5), *(ends if ground else ends[::-1]))
-    return {"origin": "lower" if ground else "upper", "extent": found}
-
-
-def labelled(values: Any) -> str:
-    """Return the name of an array of xarray with its unit, for an axis or a title."""
-    units = values.attrs.get("units")
-    return f"{values.attrs.get('long_name', values.name)}{f', {units}' if units else ''}"
 
 
 @cache

@@ -20,7 +20,7 @@ from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
 from simdtex.io.rasters import axis_place
-from simdtex.model.display import category_colours, extent, labelled
+from simdtex.model.display import category_colours
 from simdtex.options import require, whole
 
 try:
@@ -144,7 +144,7 @@ def draw(made: Any, number: int = 8) -> Figure:
         return _figure(made, [*titles, "entropy, bits"], planes, how)[0]
     if "variance" in maps:
         both = [made[name] for name in ("mean", "variance")]
-        return _figure(made, [labelled(one) for one in both], [one.values for one in both], [{}, {}])[0]
+        return _figure(made, [_label(one) for one in both], [one.values for one in both], [{}, {}])[0]
     if "realisation" in made.coords and not maps and {"y", "x"} <= set(made.dims):
         return _realisations(made, number)
     raise ValueError("there are no realisations and no estimate to draw; use plot.imshow of xarray")
@@ -172,11 +172,16 @@ def _realisations(made: Any, number: int) -> Figure:
         values, note = values[:, middle], f"{note}, z = {made.z.values[middle]:g}"
     titles = [f"realisation {k}{note}" for k in made.realisation.values[:number]]
     figure, bar = _figure(made, titles, values[:number], how)
-    bar.setlabelled("" if categorical else labelled(made))
+    bar.set_label("" if categorical else _label(made))
     if categorical:
         shares = [f"{name}: {share:.0f} %" for name, share in zip(names, 100 * counts / counts.sum(), strict=True)]
         bar.set_ticks(range(len(names)), labels=shares)
     return figure
+
+
+def _label(values: Any) -> str:
+    units = values.attrs.get("units")
+    return f"{values.attrs.get('long_name', values.name)}{f', {units}' if units else ''}"
 
 
 def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Figure, Colorbar]:
@@ -185,7 +190,9 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     Rows ascend to the north if the coordinates are on the ground, as in reports.
     """
     ground, rows, cols = "cell_y" in made.attrs, made.sizes["y"], made.sizes["x"]
-    (_, wide), (_, high) = axis_place(made, "x"), axis_place(made, "y")
+    (left, wide), (low, high) = axis_place(made, "x"), axis_place(made, "y")
+    ends = (low - high / 2, low + high * (rows - 0.5))
+    extent = (left - wide / 2, left + wide * (cols - 0.5), *(ends if ground else ends[::-1]))
     down = -(-len(titles) // ACROSS)
     across = -(-len(titles) // down)
     inches = MAP_INCHES / max(rows * high, cols * wide)
@@ -194,12 +201,12 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     grid = figure.subplots(down, across, squeeze=False).ravel()
     # smaller maps have a pixel for each cell
     smooth = "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
-    where = {**extent(made, "y", "x"), "interpolation": smooth}
+    where = {"origin": "lower" if ground else "upper", "extent": extent, "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
         own = how if isinstance(how, dict) else how[n]
         image = axes.imshow(planes[n], **where, **own)
         axes.set_title(title, fontsize=10)
-        axes.set(xlabel=labelled(made["x"]) if ground else "", ylabel=labelled(made["y"]) if ground else "")
+        axes.set(xlabel=_label(made["x"]) if ground else "", ylabel=_label(made["y"]) if ground else "")
         if own is not how:
             bar = figure.colorbar(image, ax=axes)
     for axes in grid[len(titles) :]:

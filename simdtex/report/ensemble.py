@@ -18,10 +18,9 @@ from simdtex.experiments import ensemble as measures
 from simdtex.experiments.ensemble import WINDOW, Summary, connectivity, copies, summary, variogram
 from simdtex.io.image import to_display
 from simdtex.io.rasters import axis_place
-from simdtex.model.display import category_colours, extent, labelled, source_colours
-from simdtex.options import require
+from simdtex.model.display import category_colours, source_colours
 from simdtex.report.page import FAINT, INK, Figure, Part, Section, check_folder, legend, new_figure, tidy, write_report
-from simdtex.report.sheet import LEAST_SIDE, contact_sheet
+from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
 
 if TYPE_CHECKING:
@@ -37,6 +36,7 @@ MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
 QUANTILES = 0.1, 0.5, 0.9
 AXES = ("z", "y", "x")
+CUTS = "", ", P10", ", P50", ", P90"
 
 
 def write_ensemble(
@@ -77,15 +77,14 @@ def write_ensemble(
     """
     check_folder(folder)
     found = summary(np.asarray(ensemble), training, data=data, categories=categories)
-    made, own = _as_realisations(ensemble), np.asarray(training)
+    made, own = measures.named(ensemble, "realisation", "y", "x"), np.asarray(training)
     images, categorical, names = made.values, len(found.categories) > 0, found.categories[_mapped(found)].tolist()
     shown = (images[:, ::-1], own[::-1]) if "cell_y" in made.attrs else (images, own)
     points = _on_ground(made, found.data)
-    volumes, errors = measured = _connected(made, names, points), _errors(made, names)
     sections = [
         Section("The realisations", [_realisations(*shown, found)]),
         Section("Uncertainty", _uncertainty(made, names, points, found)),
-        *(Section(title, parts) for title, parts, _ in measured if parts),
+        *_measured(made, names, points),
         Section("Variograms", [_variograms(made, found)]),
         *([Section("Connectivity of the categories", _connectivity(made, found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
@@ -100,8 +99,6 @@ def write_ensemble(
         **{one.name: getattr(found, one.name) for one in fields(Summary) if one.name not in ("maps", "open", "anodi")},
         "anodi": found.anodi._asdict(),
         "mean_open": found.open.mean(),
-        "connected_volumes": volumes[2],
-        "standard_error": errors[2],
         "shape": images.shape,
         "training_shape": own.shape,
     }
@@ -152,42 +149,34 @@ def _realisations(images: Array, own: Array, found: Summary) -> Figure:
     )
 
 
-def _as_realisations(ensemble: Any) -> DataArray:
-    """Return an array (realisations, [layers,] rows, cols) with the names of its axes, or one that has them."""
-    require("simulate", "xarray")
-    import xarray
-
-    if isinstance(ensemble, xarray.DataArray):
-        return ensemble
-    array = np.asarray(ensemble)
-    return xarray.DataArray(array, dims=("realisation", *AXES[4 - array.ndim :]))
-
-
-def _on_ground(made: DataArray, data: Floats) -> Floats:
+def _on_ground(made: DataArray, data: Floats | None) -> Floats:
     """Return hard data, (m, 3 or 4), with the coordinates of their cells in place of column, row and layer."""
-    places = np.array([axis_place(made, axis) for axis in "xyz"[: data.shape[1] - 1]])
-    return np.c_[places[:, 0] + places[:, 1] * data[:, :-1], data[:, -1:]]
+    places = np.array([axis_place(made, axis) for axis in "xyz"[: made.ndim - 1]])
+    data = np.empty((0, made.ndim)) if data is None else data
+    return np.column_stack([places[:, 0] + places[:, 1] * data[:, :-1], data[:, -1]])
 
 
 def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary) -> list[Part]:
     """Return maps of the mean and quantiles, or of probabilities, and of the standard deviation or the entropy."""
     dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
-    spread, values = made.isel(realisation=0, drop=True).copy(data=found.open), data[:, 2]
+    spread, values = made[0].copy(data=found.open), data[:, 2]
     if not names:
-        cuts = measures.quantiles(made, QUANTILES)
-        planes = [measures.e_type(made), *cuts]
-        titles = [_titled(planes[0]), *(f"P{100 * q:.0f} of {_titled(made)}" for q in QUANTILES)]
-        panels = {title: (plane, values) for title, plane in zip(titles, planes, strict=True)}
-        limits = min([cuts.values.min(), *values]), max([cuts.values.max(), *values])
-        open_title, most = f"standard deviation of {_titled(made)}", found.open.max() or 1.0
-        what = "The mean of the realisations at every pixel (E-type), and the values below which a tenth (P10), a half "
-        what += "(P50) and nine tenths (P90) of them are."
+        planes = [measures.e_type(made), *measures.quantiles(made, QUANTILES)]
+        panels = {plane.attrs["long_name"] + cut: (plane, values) for plane, cut in zip(planes, CUTS, strict=True)}
+        every = np.concatenate([values, *(plane.values.ravel() for plane in planes)])
+        limits = float(every.min()), float(every.max())
+        title, most = f"standard deviation of {measures.label(made)}", found.open.max() or 1.0
+        what = (
+            "The mean of the realisations at every pixel (E-type), and the values that a tenth (P10), a half (P50) and "
+        )
+        what += "nine tenths (P90) of them do not exceed."
         how = "The standard deviation of the realisations at every pixel, in the unit of the values"
     else:
         planes = [measures.probability(made, name) for name in names]
-        shares = [(values == name).astype(float) for name in names]
-        panels = {_titled(plane): (plane, known) for plane, known in zip(planes, shares, strict=True)}
-        limits, open_title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
+        panels = {
+            plane.attrs["long_name"]: (plane, (values == name) * 1.0) for plane, name in zip(planes, names, strict=True)
+        }
+        limits, title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
         what = "The share of the realisations in which a pixel has the category: its probability there."
         how = f"The entropy of every pixel over the categories, {found.open.mean():.2f} bits on average"
     return [
@@ -199,24 +188,15 @@ def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary
         ),
         Figure(
             "entropy.png",
-            _maps({open_title: (spread, None)}, data, "magma", (0.0, most)),
+            _maps({title: (spread, None)}, data, "magma", (0.0, most)),
             f"{how}: dark where all realisations agree, light where they differ most. It should be dark at hard data "
             "only, and grow with the distance from them over about the range of the variogram.",
         ),
     ]
 
 
-def _titled(values: DataArray) -> str:
-    """Return the name of a variable with its unit, for a title."""
-    return measures.label(values) + (f", {values.attrs['units']}" if values.attrs.get("units") else "")
-
-
 def _maps(
-    panels: dict[str, tuple[DataArray, Floats | None]],
-    data: Floats,
-    colours: str,
-    limits: tuple[float, float],
-    across: int | None = None,
+    panels: dict[str, Any], data: Floats, colours: str, limits: tuple[float, float], across: int | None = None
 ) -> Plot:
     """Plot planes by title, each with the hard data as dots in the colours of their values, or hollow if None.
 
@@ -232,123 +212,90 @@ def _maps(
         axes.set_axis_off()
     low, high = limits
     for axes, (title, (plane, values)) in zip(grid, panels.items(), strict=False):
-        upward, along = plane.dims
-        (_, wide), (_, tall) = axis_place(plane, along), axis_place(plane, upward)
-        place = {
-            "aspect": 1 if upward == "y" else wide / tall,
-            "interpolation": "nearest",
-            **extent(plane, upward, along),
-        }
-        image = axes.imshow(plane, cmap=colours, vmin=low, vmax=high, **place)
+        how = {"cmap": colours, "vmin": low, "vmax": high, "add_colorbar": False}
+        image = plane.plot.imshow(ax=axes, yincrease="cell_y" in plane.attrs, **how)
+        (_, up), (_, along) = (axis_place(plane, axis) for axis in plane.dims)
+        axes.set_aspect(1 if "y" in plane.dims[:1] else along / up)
+        axes.set_title("")
         axes.set_title(title, loc="left", fontsize=10, color=INK)
-        axes.set(xlabel=labelled(plane[along]), ylabel=labelled(plane[upward]))
         axes.tick_params(colors=FAINT, labelcolor=INK, labelsize=8)
         inside: Any = "none"
         if values is not None:
             inside = matplotlib.colormaps[colours](np.clip((values - low) / ((high - low) or 1.0), 0, 1))
         axes.scatter(data[:, 0], data[:, 1], s=26, c=inside, edgecolors="white", linewidths=1.8)
         axes.scatter(data[:, 0], data[:, 1], s=34, c="none", edgecolors="black", linewidths=0.7)
-    figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02)
+    unit = plane.attrs.get("units", "")
+    figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02, label=unit)
     return figure
 
 
-Measured = tuple[str, list[Part], Any]
-"""The title, the parts and the numbers of a section, which is left out if it has no parts."""
-
-
-def _connected(made: DataArray, names: list[Any], data: Floats) -> Measured:
-    """Return the distributions of the volumes of categories that are connected to wells, as hard data on the ground."""
-    title, rows, found = "Volumes connected to wells", [], {}
+def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
+    """Return volumes of categories at wells, which are hard data on the ground, and the standard error of maps."""
+    rows: list[dict[str, str]] = []
+    drawn: dict[str, Any] = {}
+    sections = []
     for name in names:
         hits = data[data[:, -1] == name, :-1]
-        wells = np.unique(hits[:, :2], axis=0)
-        sets = {f"all {len(wells)}": hits} if len(wells) > 1 else {}
-        sets |= {f"x {x:g}, y {y:g}": hits[(hits[:, :2] == (x, y)).all(1)] for x, y in wells[:SHOWN]}
-        volumes = {well: measures.connected_volume(made, name, at) for well, at in sets.items()}
-        for well, one in volumes.items():
-            found.setdefault(str(name), (one, volumes))
-            cuts = zip(QUANTILES, one.quantile(QUANTILES).values, strict=True)
-            rows.append({"Category": str(name), "Well": well, **{f"P{100 * q:.0f}": number_text(v) for q, v in cuts}})
-    if not found:
-        return title, [], {}
-    figure = new_figure(1 + 3.4 * len(found), 3)
-    for axes, (name, (one, _)) in zip(figure.subplots(1, len(found), squeeze=False)[0], found.items(), strict=True):
-        axes.step(np.sort(one), np.arange(1, len(one) + 1) / len(one), where="post", color=THEIRS)
-        for q, value in zip(QUANTILES, one.quantile(QUANTILES).values, strict=True):
-            axes.axvline(value, color=OWN, linestyle="--", linewidth=1.2)
-            axes.annotate(f"P{100 * q:.0f}", (value, q), (3, -3), textcoords="offset points", fontsize=9, va="top")
-        what, unit = one.attrs["long_name"].split()[0], one.attrs.get("units")
-        tidy(axes, f"category {name}", f"{what}{f', {unit}' if unit else ''}", "share of the realisations below")
-    note = (
-        "A body counts if a well meets it; cells are connected by their sides. P10 is the value that a tenth of the "
-        "realisations do not reach, which for reserves is often called P90."
-    )
-    table = Table(f"{what.capitalize()}{f', {unit}' if unit else ''}", rows, note)
-    caption = (
-        f"Distribution of the {what} of the bodies that the wells in the category meet, over {len(one)} realisations."
-    )
-    numbers = {name: {well: each.values for well, each in every.items()} for name, (_, every) in found.items()}
-    return title, [Figure("volumes.png", figure, caption), table], numbers
+        wells = [(f"x {x:g}, y {y:g}", hits[(hits[:, :2] == (x, y)).all(1)]) for x, y in np.unique(hits[:, :2], axis=0)]
+        for well, at in [(f"all {len(wells)}", hits), *wells[:SHOWN]] if wells else []:
+            one = measures.connected_volume(made, name, at)
+            drawn.setdefault(str(name), one)
+            cuts = map(number_text, one.quantile(QUANTILES).values)
+            rows.append({"Category": str(name), "Well": well} | dict(zip(("P10", "P50", "P90"), cuts, strict=True)))
+    if drawn:
+        figure = new_figure(1 + 3.4 * len(drawn), 3)
+        for axes, one in zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.values(), strict=True):
+            one.plot.hist(ax=axes, color=THEIRS)
+            tidy(axes, "", axes.get_xlabel(), "realisations")
+            for cut in one.quantile(QUANTILES).values:
+                axes.axvline(cut, color=OWN, linestyle="--")
+        caption = (
+            "Volumes, or areas, of the bodies of a category that all its wells meet, in the realisations; the dashed "
+        )
+        caption += "lines are P10, P50 and P90. Cells are connected by their sides."
+        note = "P10 is the value that a tenth of the realisations do not exceed; for reserves that is often called P90."
+        parts: list[Part] = [Figure("volumes.png", figure, caption), Table("Connected volumes", rows, note)]
+        sections.append(Section("Volumes connected to wells", parts))
+    if (n := len(made)) > 1:
+        curves: list[Any] = [measures.standard_error(made, name) for name in names or [None]]
+        figure = new_figure(5.6, 3)
+        axes = figure.subplots()
+        for name, one in zip(names or [None], curves, strict=True):
+            one.plot(ax=axes, marker=".", label=name)
+        tidy(axes, "", axes.get_xlabel(), axes.get_ylabel())
+        axes.set_ylim(0)
+        if len(curves) > 1:
+            axes.legend(title="category", frameon=False)
+        most = max(float(one[-1]) for one in curves)
+        caption = (
+            f"Standard error of the map after 2 to {n} realisations, over all cells: after {n} it is {most:.2g}, and "
+        )
+        caption += f"half of that takes {4 * n} realisations."
+        sections.append(Section("How many realisations", [Figure("error.png", figure, caption)]))
+    return sections
 
 
-def _errors(made: DataArray, names: list[Any]) -> Measured:
-    """Return how the standard error of maps falls with the number of realisations."""
-    title, n = "How many realisations", made.sizes["realisation"]
-    if n < 2:
-        return title, [], {}
-    curves = {str(name): measures.standard_error(made, name) for name in names}
-    curves = curves or {measures.label(made): measures.standard_error(made)}
-    figure = new_figure(5.6, 3)
-    axes = figure.subplots()
-    for name, one in curves.items():
-        axes.plot(one["realisations"], one, marker=".", label=f"category {name}" if names else name)
-    unit = one.attrs.get("units")
-    tidy(axes, "", "number of realisations", f"standard error of the map{f', {unit}' if unit else ''}")
-    axes.set_ylim(0)
-    if len(curves) > 1:
-        axes.legend(frameon=False, fontsize=9)
-    most = max(float(one[-1]) for one in curves.values())
-    words = f"Standard error of the map above after 2 to {n} realisations, over all cells: after {n} it is "
-    words += f"{most:.2g}{f' {unit}' if unit else ''}, and half of that takes {4 * n} realisations."
-    return title, [Figure("error.png", figure, words)], {name: one.values for name, one in curves.items()}
-
-
-def _vertical(made: DataArray, training: Array, names: Array) -> Measured:
+def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     """Return the shares of categories layer by layer, of the realisations and of the training image."""
-    theirs, own = measures.vertical_proportions(made, names), measures.vertical_proportions(training, names)
+    both: list[Any] = [measures.vertical_proportions(one, names.tolist()) for one in (made, training)]
+    theirs, own = both
+    own = own.assign_coords(z=np.linspace(*made["z"].values[[0, -1]], len(training)))
     shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
     figure = new_figure(1 + 2.4 * len(shown), 3.6)
-    first, side = axis_place(made, "z")
-    ends = first - side / 2, first + side * (made.sizes["z"] - 0.5)
-    heights = [ends[0] + (ends[1] - ends[0]) * (np.arange(n) + 0.5) / n for n in (made.sizes["z"], len(training))]
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for k, axes in zip(shown, panels, strict=True):
-        one = theirs.values[k]
-        axes.fill_betweenx(
-            heights[0], one.min(0), one.max(0), color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all"
-        )
-        axes.plot(one.mean(0), heights[0], color=THEIRS, label="realisations, mean")
-        axes.plot(own.values[k], heights[1], color=OWN, linestyle="--", label="training image")
-        tidy(axes, f"category {names[k]}", "share of the layer", labelled(made["z"]) if axes is panels[0] else "")
-    panels[0].set_ylim(*(ends if "cell_y" in made.attrs else ends[::-1]))
+        for one in theirs[k]:
+            one.plot(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
+        own[k].plot(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
+        tidy(axes, f"category {names[k]}", "share of the layer", axes.get_ylabel() if axes is panels[0] else "")
+    if "cell_y" not in made.attrs:
+        axes.invert_yaxis()
     legend(figure, panels[0])
-    caption = "Vertical proportion curves: the share of each category in each layer, beside those of the training image"
-    caption += "." if len(training) == made.sizes["z"] else f", whose {len(training)} layers are stretched."
-    return (
-        "Vertical proportions",
-        [Figure("vertical.png", figure, caption)],
-        {"realisations": theirs.values, "own": own},
+    caption = (
+        "Vertical proportion curves: the share of each category in each layer, beside the training image's, whose "
     )
-
-
-def _ways(made: DataArray) -> dict[int, tuple[str, float, str]]:
-    """Return the name, the size of a cell and its unit for each axis of a realisation: the order of panels."""
-    axes, unit = [axis for axis in AXES if axis in made.dims], "voxels" if "z" in made.dims else "pixels"
-    if "cell_y" in made.attrs or len(axes) > 2:
-        ground = {axis: made[axis].attrs.get("units", "") if "cell_y" in made.attrs else unit for axis in axes}
-        found = {n: (f"along {axis}", axis_place(made, axis)[1], ground[axis]) for n, axis in enumerate(axes)}
-        return found if len(axes) > 2 else dict(reversed(found.items()))
-    return {1: ("to the right", 1.0, unit), 0: ("down", 1.0, unit)}
+    caption += "layers are stretched to those of the realisations if there are more or fewer."
+    return Section("Vertical proportions", [Figure("vertical.png", figure, caption)])
 
 
 def _variograms(made: DataArray, found: Summary) -> Figure:
@@ -360,21 +307,22 @@ def _variograms(made: DataArray, found: Summary) -> Figure:
         of = "each category's indicator" + (" (of two categories both are the same)" if len(shown) == 1 else "")
     return Figure(
         "variograms.png",
-        _lagged(found.lags, table, names, "variogram", _ways(made)),
+        _lagged(found.lags, table, names, "variogram", made),
         f"Variograms of {of} along both axes: half the mean squared difference of two pixels at a lag. The training "
         "image's line should run inside the band of the realisations. A band that rises later means bodies that are "
         "too large, one that rises earlier bodies that are too small or noise; waves are regular distances.",
     )
 
 
-def _lagged(
-    lags: Array, table: Floats, names: Sequence[str], label: str, ways: dict[int, tuple[str, float, str]]
-) -> Plot:
-    """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each of some axes."""
+def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, made: DataArray) -> Plot:
+    """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each axis of a realisation."""
+    ways = made.dims[1:]
+    unit = "" if "cell_y" in made.attrs else "voxels" if len(ways) > 2 else "pixels"
     figure = new_figure(2.2 + 3.0 * len(ways), 0.5 + 2.35 * len(names))
     grid = figure.subplots(len(names), len(ways), sharey="row", sharex="col", squeeze=False)
     for row, (name, panels) in enumerate(zip(names, grid, strict=True)):
-        for (axis, (way, side, unit)), axes in zip(ways.items(), panels, strict=True):
+        for axis, (way, axes) in enumerate(zip(ways, panels, strict=True)):
+            side = axis_place(made, str(way))[1]
             theirs, own = table[axis, row, :-1], table[axis, row, -1]
             known = np.isfinite(theirs).any(axis=0)
             low, middle, high = (how(theirs[:, known], axis=0) for how in (np.nanmin, np.nanmedian, np.nanmax))
@@ -383,8 +331,8 @@ def _lagged(
             )
             axes.plot(side * lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
             axes.plot(side * lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
-            title = f"{name}, {way}" if name else way
-            below = f"lag, {unit}".rstrip(", ") if row == len(names) - 1 else ""
+            title = f"{name}, along {way}" if name else f"along {way}"
+            below = f"lag, {made[way].attrs.get('units', unit)}".rstrip(", ") if row == len(names) - 1 else ""
             tidy(axes, title, below, label if axes is panels[0] else "")
         panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
     legend(figure, grid[0, 0])
@@ -404,7 +352,7 @@ def _connectivity(made: DataArray, found: Summary) -> list[Part]:
     return [
         Figure(
             "connectivity.png",
-            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", _ways(made)),
+            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", made),
             "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
             "connected component (pixels are connected by their sides). A variogram cannot tell whole channels from "
             "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
@@ -521,27 +469,27 @@ def write_volumes(
     `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
     row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
     """
-    made = _as_realisations(ensemble)
+    made = measures.named(ensemble, "realisation", *AXES)
     names = np.unique(training) if categorical else np.zeros(0, training.dtype)
     images, drawn = [*made.values, training], names[-1] if categorical else None
     fields = [(one == drawn if categorical else one).astype(np.float64) for one in images]
     what = f"category {drawn}" if categorical else "the values"
     limits = (float(fields[-1].min()), float(fields[-1].max()))
-    image = _as_realisations(fields[-1][None])[0].assign_attrs(made.attrs)
-    shown = {"training image": image}
-    if categorical:
-        shown |= {"probability": measures.probability(made, drawn)}
-    else:
-        shown |= {"E-type": measures.e_type(made)}
-        shown |= {f"P{100 * q:.0f}": one for q, one in zip(QUANTILES, measures.quantiles(made), strict=True)}
-    shown |= {f"realisation {k}": one.copy(data=field) for k, (one, field) in enumerate(zip(made[:SLICED], fields))}
-    panels = {}
-    for name, one in shown.items():
+    along = {axis: axis_place(made, axis)[1] * np.arange(n) for axis, n in zip(AXES, training.shape, strict=True)}
+    own = measures.named(fields[-1], *AXES, coords=along, attrs=made.attrs)
+    cuts = [] if categorical else measures.quantiles(made, QUANTILES)
+    middle = [measures.probability(made, names[-1])] if categorical else [measures.e_type(made), *cuts]
+    shown = [
+        ("training image", own),
+        *((f"{one.attrs['long_name']}{cut}", one) for one, cut in zip(middle, CUTS, strict=False)),
+    ]
+    shown += [(f"realisation {k}", made[k].copy(data=fields[k])) for k in range(min(SLICED, len(made)))]
+    panels: dict[str, Any] = {}
+    for name, one in shown:
         for axis in AXES:
-            plane = one.isel({axis: one.sizes[axis] // 2})
-            at = axis_place(one, axis)
-            title = f"{name}, {axis} = {at[0] + at[1] * (one.sizes[axis] // 2):g} {one[axis].attrs.get('units', '')}"
-            panels[title.rstrip()] = plane, None
+            at = one[axis][one.sizes[axis] // 2]
+            title = f"{name}, {axis} = {float(at):g} {at.attrs.get('units', '')}".rstrip()
+            panels[title] = one.isel({axis: one.sizes[axis] // 2}), None
     lags = np.arange(max(1, min(*training.shape, *made.shape[1:]) // 3) + 1)
 
     def lagged(label: str, functions: list[Any]) -> Figure:
@@ -549,7 +497,7 @@ def write_volumes(
         caption = (
             f"{label.capitalize()} of {what} along z, y and x. The training image's line should run inside the band."
         )
-        return Figure(f"{label}.png", _lagged(lags, table, [""], label, _ways(made)), caption)
+        return Figure(f"{label}.png", _lagged(lags, table, [""], label, made), caption)
 
     variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]
     slices = Figure(
@@ -558,14 +506,10 @@ def write_volumes(
         f"The middle slices across z, y and x of {what}: the training image, the uncertainty of the realisations, and "
         "realisations.",
     )
-    points = np.empty((0, 4)) if data is None else _on_ground(made, data)
-    measured = {"connected_volumes": _connected(made, names.tolist(), points)}
-    measured |= {"standard_error": _errors(made, names[-1:].tolist())}
-    measured |= {"vertical_proportions": _vertical(made, training, names)} if categorical else {}
-    sections = [Section("Slices", [slices]), *(Section(title, parts) for title, parts, _ in measured.values() if parts)]
+    sections = [Section("Slices", [slices]), *_measured(made, names[-1:].tolist(), _on_ground(made, data))]
+    sections += [_vertical(made, training, names)] if categorical else []
     sections.append(Section("Variograms", [lagged("variograms", variograms)]))
     results: dict[str, Any] = {"shape": made.shape, "training_shape": training.shape}
-    results |= {name: numbers for name, (_, _, numbers) in measured.items()}
     results["variograms"] = [variograms[-1], *variograms[:-1]]
     if categorical:
         found = [[connectivity(one, name, len(lags) - 1) for one in images] for name in names]
