@@ -700,9 +700,6 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     what = f"{'volume' if len(axes) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
     counts = np.array([cells(one) for one in field.values])
     volume = counts * prod(axis_place(realisations, axis)[1] for axis in axes)
-    units = [realisations.coords[axis].attrs.get("units", "") if axis in realisations.coords else "" for axis in sides]
-    unit = units[0] + " \u00b2\u00b3"[len(units) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
-    what = f"{'volume' if len(sides) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
     found = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
     return _described(found, realisations, "connected_volume", what, unit)
 

@@ -287,6 +287,7 @@ def _vertical(made: DataArray, training: Array, names: Array) -> Section:
         for one in theirs[k]:
             one.plot(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
         own[k].plot(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
+        axes.set_title("")
         tidy(axes, f"category {names[k]}", "share of the layer", axes.get_ylabel() if axes is panels[0] else "")
     if "cell_y" not in made.attrs:
         axes.invert_yaxis()
