@@ -63,12 +63,13 @@ one.plot(*well, "r^")
 one.set(title="Mean over the layers, and the well", aspect=1)
 shares.plot.line(y="z", ax=two, add_legend=False, color="tab:blue", alpha=0.4)
 own.plot(y="z", ax=two, color="tab:orange", linestyle="--")
-two.set(title="Share of sand, and the training image's (dashed)", xlabel="share of the layer")
+two.set(title="Share of sand (dashed: training image)", xlabel="share of the layer")
 volume.plot.hist(ax=three)
+three.locator_params(axis="x", nbins=5)
 for value in (p10, p50, p90):
     three.axvline(value, color="tab:orange", linestyle="--")
 three.set(title=f"P10 {p10:,.0f}, P50 {p50:,.0f}, P90 {p90:,.0f} m³", ylabel="realisations")
-error.plot(ax=four, marker=".")
+error.plot.line(ax=four, marker=".")
 four.set(title=f"{float(error[-1]):.2f} after {len(maps)} realisations", ylim=(0, None))
 digest = maps.attrs["training_image"][:12]
 figure.supxlabel(

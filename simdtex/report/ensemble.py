@@ -261,7 +261,7 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
         figure = new_figure(5.6, 3)
         axes = figure.subplots()
         for name, one in zip(names or [None], curves, strict=True):
-            one.plot(ax=axes, marker=".", label=name)
+            one.plot.line(ax=axes, marker=".", label=name)
         tidy(axes, "", axes.get_xlabel(), axes.get_ylabel())
         axes.set_ylim(0)
         if len(curves) > 1:
@@ -285,8 +285,8 @@ def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for k, axes in zip(shown, panels, strict=True):
         for one in theirs[k]:
-            one.plot(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
-        own[k].plot(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
+            one.plot.line(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
+        own[k].plot.line(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
         axes.set_title("")
         tidy(axes, f"category {names[k]}", "share of the layer", axes.get_ylabel() if axes is panels[0] else "")
     if "cell_y" not in made.attrs:
