@@ -71,10 +71,7 @@ for value in (p10, p50, p90):
 three.set(title=f"P10 {p10:,.0f}, P50 {p50:,.0f}, P90 {p90:,.0f} m³", ylabel="realisations")
 error.plot.line(ax=four, marker=".")
 four.set(title=f"{float(error[-1]):.2f} after {len(maps)} realisations", ylim=(0, None))
-digest = maps.attrs["training_image"][:12]
-figure.supxlabel(
-    f"simdtex {maps.attrs['version']}, seed {maps.attrs['seed']}, training image {digest}    Signed: ____________________",
-    fontsize=9,
-)
+about = f"simdtex {maps.attrs['version']}, seed {maps.attrs['seed']}, image {maps.attrs['training_image'][:12]}"
+figure.supxlabel(f"{about}      Signed: ____________________", fontsize=9)
 figure.savefig(folder / "sheet.png", dpi=110)
 print(f"P10 {p10:,.0f}, P50 {p50:,.0f}, P90 {p90:,.0f} m³; sheet.png and wells.csv are in {folder}")

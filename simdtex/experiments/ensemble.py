@@ -731,9 +731,8 @@ def standard_error(realisations: DataArray, category: float | None = None) -> Da
             errors.append(sqrt(max(0.0, np.nanmean(squares - total**2 / n)) / (n * (n - 1))))
     number = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
     found = named(errors, "realisations", coords={"realisations": number})
-    return _described(
-        found, realisations, "standard_error", "standard error of the map", None if category is None else ""
-    )
+    unit = None if category is None else ""
+    return _described(found, realisations, "standard_error", "standard error of the map", unit)
 
 
 def named(data: Any, *dims: str, **about: Any) -> DataArray:
@@ -747,7 +746,8 @@ def named(data: Any, *dims: str, **about: Any) -> DataArray:
 
 def _known(data: DataArray) -> DataArray:
     """Return where the data are known: numbers, inside of the region if there is one."""
-    return data.notnull() & data.coords.get("region", True)
+    known: DataArray = data.notnull() & data.coords.get("region", True)
+    return known
 
 
 def _field(data: DataArray, category: Any = None, of: str = "realisation") -> DataArray:

@@ -166,16 +166,12 @@ def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary
         every = np.concatenate([values, *(plane.values.ravel() for plane in planes)])
         limits = float(every.min()), float(every.max())
         title, most = f"standard deviation of {measures.label(made)}", found.open.max() or 1.0
-        what = (
-            "The mean of the realisations at every pixel (E-type), and the values that a tenth (P10), a half (P50) and "
-        )
-        what += "nine tenths (P90) of them do not exceed."
+        what = "The mean of the realisations at every pixel (E-type), and their quantiles 0.1, 0.5 and 0.9."
         how = "The standard deviation of the realisations at every pixel, in the unit of the values"
     else:
         planes = [measures.probability(made, name) for name in names]
-        panels = {
-            plane.attrs["long_name"]: (plane, (values == name) * 1.0) for plane, name in zip(planes, names, strict=True)
-        }
+        known = [(values == name) * 1.0 for name in names]
+        panels = {plane.attrs["long_name"]: (plane, of) for plane, of in zip(planes, known, strict=True)}
         limits, title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
         what = "The share of the realisations in which a pixel has the category: its probability there."
         how = f"The entropy of every pixel over the categories, {found.open.mean():.2f} bits on average"
@@ -198,10 +194,7 @@ def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary
 def _maps(
     panels: dict[str, Any], data: Floats, colours: str, limits: tuple[float, float], across: int | None = None
 ) -> Plot:
-    """Plot planes by title, each with the hard data as dots in the colours of their values, or hollow if None.
-
-    Cells of a plane through layers are squares.
-    """
+    """Plot planes by title, each with the hard data as dots in the colours of their values, or hollow if None."""
     rows, cols = np.max([plane.shape for plane, _ in panels.values()], axis=0)
     across = across or (2 if len(panels) == 4 else min(3, len(panels)))
     down = -(-len(panels) // across)
@@ -215,6 +208,7 @@ def _maps(
         how = {"cmap": colours, "vmin": low, "vmax": high, "add_colorbar": False}
         image = plane.plot.imshow(ax=axes, yincrease="cell_y" in plane.attrs, **how)
         (_, up), (_, along) = (axis_place(plane, axis) for axis in plane.dims)
+        # cells of a plane through layers are squares
         axes.set_aspect(1 if "y" in plane.dims[:1] else along / up)
         axes.set_title("")
         axes.set_title(title, loc="left", fontsize=10, color=INK)
@@ -224,8 +218,7 @@ def _maps(
             inside = matplotlib.colormaps[colours](np.clip((values - low) / ((high - low) or 1.0), 0, 1))
         axes.scatter(data[:, 0], data[:, 1], s=26, c=inside, edgecolors="white", linewidths=1.8)
         axes.scatter(data[:, 0], data[:, 1], s=34, c="none", edgecolors="black", linewidths=0.7)
-    unit = plane.attrs.get("units", "")
-    figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02, label=unit)
+    figure.colorbar(image, ax=[*grid[: len(panels)]], shrink=0.85, pad=0.02, label=plane.attrs.get("units", ""))
     return figure
 
 
@@ -249,12 +242,12 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
             tidy(axes, "", axes.get_xlabel(), "realisations")
             for cut in one.quantile(QUANTILES).values:
                 axes.axvline(cut, color=OWN, linestyle="--")
-        caption = (
-            "Volumes, or areas, of the bodies of a category that all its wells meet, in the realisations; the dashed "
+        caption = "Volumes (areas of a map) of all bodies that a well meets. The dashed lines are P10, P50 and P90."
+        note = (
+            "Cells are connected by their sides. A tenth of the realisations are below P10, which is P90 of reserves."
         )
-        caption += "lines are P10, P50 and P90. Cells are connected by their sides."
-        note = "P10 is the value that a tenth of the realisations do not exceed; for reserves that is often called P90."
-        parts: list[Part] = [Figure("volumes.png", figure, caption), Table("Connected volumes", rows, note)]
+        table = Table(f"Connected volumes, {one.attrs.get('units', '')}".rstrip(", "), rows, note)
+        parts: list[Part] = [Figure("volumes.png", figure, caption), table]
         sections.append(Section("Volumes connected to wells", parts))
     if (n := len(made)) > 1:
         curves: list[Any] = [measures.standard_error(made, name) for name in names or [None]]
@@ -268,9 +261,8 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
             axes.legend(title="category", frameon=False)
         most = max(float(one[-1]) for one in curves)
         caption = (
-            f"Standard error of the map after 2 to {n} realisations, over all cells: after {n} it is {most:.2g}, and "
+            f"Standard error of the map, over all cells: {most:.2g} after {n} realisations, half of it after {4 * n}."
         )
-        caption += f"half of that takes {4 * n} realisations."
         sections.append(Section("How many realisations", [Figure("error.png", figure, caption)]))
     return sections
 
@@ -279,7 +271,7 @@ def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     """Return the shares of categories layer by layer, of the realisations and of the training image."""
     both: list[Any] = [measures.vertical_proportions(one, names.tolist()) for one in (made, training)]
     theirs, own = both
-    own = own.assign_coords(z=np.linspace(*made["z"].values[[0, -1]], len(training)))
+    own = own.assign_coords(z=np.linspace(float(made["z"][0]), float(made["z"][-1]), len(training)))
     shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
     figure = new_figure(1 + 2.4 * len(shown), 3.6)
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
