@@ -636,10 +636,8 @@ __all__ = [
 
 def probability(realisations: DataArray, category: float) -> DataArray:
     """Return the share of the realisations in which each cell has a category, 0 to 1."""
-    found = _field(realisations, category).mean("realisation")
-    return _described(
-        found, realisations, "probability", f"probability of {label(realisations, 'category')} {category}", ""
-    )
+    found, what = _field(realisations, category).mean("realisation"), label(realisations, "category")
+    return _described(found, realisations, "probability", f"probability of {what} {category}", "")
 
 
 def e_type(realisations: DataArray) -> DataArray:
@@ -667,25 +665,21 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     Returns
     -------
     DataArray, (realisation,)
-        Cells times the size of a cell, of a map an area; 0 where the well misses the category.
+        Cells times the size of a cell, of a map an area; 0 where the well misses the category. Cells are connected by
+        their sides.
         ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90. P10 is the small one, which is P90 of many reserves.
 
     Raises
     ------
     ValueError, TypeError
         A point is outside of the cells, or the realisations have other dimensions.
-
-    Notes
-    -----
-    Cells are connected by their sides. Cost: two passes over each realisation.
     """
     field, wells = _field(realisations, category), np.atleast_2d(np.asarray(well, np.float64))
     axes = [axis for axis in "zyx" if axis in realisations.dims]
     if wells.shape[1] not in (2, 3) or {*realisations.dims} != {"realisation", *axes} or axes[-2:] != ["y", "x"]:
         raise ValueError("give x, y and perhaps z of the well, and realisations of one variable with y and x")
-    used = "xyz"[: wells.shape[1]]
-    origin, cell = zip(*(axis_place(realisations, axis) for axis in used), strict=True)
-    sizes = [realisations.sizes[axis] for axis in axes if axis in used]
+    origin, cell = zip(*(axis_place(realisations, axis) for axis in "xyz"[: wells.shape[1]]), strict=True)
+    sizes = [realisations.sizes[axis] for axis in axes][-wells.shape[1] :]
     table = HardData(wells, np.ones((len(wells), 1)), ("well",))
     hit = ~np.ma.getmaskarray(place_hard_data(table, sizes, origin=origin, cell=cell))
 
