@@ -12,6 +12,7 @@ from scipy.special import kl_div
 import simdtex
 from simdtex.experiments import ensemble
 from simdtex.experiments.ensemble import MARGIN, variogram
+from simdtex.model.show import Realisations
 
 
 def noise(seed, shape=(6, 40, 50), values=2):
@@ -296,7 +297,7 @@ def reservoir():
     axes = {"z": -2 + 0.5 * np.arange(3), "y": 5 + 20.0 * np.arange(4), "x": 100 + 10.0 * np.arange(5)}
     coords = {"realisation": [4, 9], **{name: (name, place, {"units": "m"}) for name, place in axes.items()}}
     sides = {"cell_x": 10.0, "cell_y": 20.0, "cell_z": 0.5}
-    return xarray.DataArray(cells, coords, ("realisation", "z", "y", "x"), "facies", sides)
+    return Realisations(cells, coords, ("realisation", "z", "y", "x"), "facies", sides)
 
 
 @pytest.mark.parametrize(

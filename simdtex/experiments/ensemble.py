@@ -705,7 +705,11 @@ def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] 
     """
     data = named(data, "z", "y", "x")
     names = np.unique(data.values[_known(data).values]) if categories is None else np.asarray(categories)
-    found = _field(data, named(names, "category", coords={"category": names}), of="z").mean(("y", "x"))
+    found = (
+        _field(data, named(names, "category", coords={"category": names}), of="z")
+        .mean(("y", "x"))
+        .transpose("category", ...)
+    )
     return _described(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
 
 
