@@ -135,10 +135,11 @@ def overloads(job, function, name, switch):
 
 def stub():
     """The text of the file."""
-    public = {function for _, function, *_ in FUNCTIONS} | {"explain", "replay", "quality"}
+    public = {function for _, function, *_ in FUNCTIONS} | {"explain", "replay", "ensemble", "quality"}
     homes = {one: home for home, names in simdtex._NAMES.items() for one in names if one not in public}
     found = [f"from {home} import {one} as {one}" for one, home in homes.items()]
-    found += ["from simdtex.experiments import quality as quality", *USED.splitlines()]
+    found += [f"from simdtex.experiments import {one} as {one}" for one in ("ensemble", "quality")]
+    found += [*USED.splitlines()]
     found.sort(key=lambda line: (line.split()[1], " as " in line, line))
     written = fill(str(list(SCHEDULES))[1:-1], 116).replace("\n", "\n    ")
     lines = [HEAD.replace("IMPORTS", "\n".join(found)).replace("SCHEDULES", written)]

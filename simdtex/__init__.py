@@ -5,7 +5,7 @@ from __future__ import annotations
 
 _NAMES = {
     "simdtex.checkpoint": ("Checkpoint",),
-    "simdtex.experiments": ("quality",),
+    "simdtex.experiments": ("ensemble", "quality"),
     "simdtex.io.grids": ("read_grid", "write_grid"),
     "simdtex.io.hard_data": ("place_hard_data", "read_hard_data"),
     "simdtex.jobs.classification": ("TextureClassifier", "classify"),
@@ -41,7 +41,7 @@ def __getattr__(name: str) -> object:
     elif home:
         from importlib import import_module
 
-        found = import_module(f"{home}.{name}") if name == "quality" else getattr(import_module(home), name)
+        found = import_module(f"{home}.{name}") if home == "simdtex.experiments" else getattr(import_module(home), name)
     else:
         from difflib import get_close_matches
 

@@ -12,6 +12,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint as Checkpoint
+from simdtex.experiments import ensemble as ensemble
 from simdtex.experiments import quality as quality
 from simdtex.io.grids import read_grid as read_grid
 from simdtex.io.grids import write_grid as write_grid

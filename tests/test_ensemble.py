@@ -2,13 +2,17 @@
 
 import hashlib
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray
 from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
+import simdtex
 from simdtex.experiments import ensemble
 from simdtex.experiments.ensemble import MARGIN, variogram
+from simdtex.model.show import Realisations
 
 
 def noise(seed, shape=(6, 40, 50), values=2):
@@ -281,3 +285,104 @@ def test_copies_of_the_image_itself_and_of_floats():
     places = ensemble.copies(values[np.newaxis, 2:19, 3:20], values)
     assert places.tolist() == [[[43, 44], [63, 64]]]
     assert (ensemble.copies(np.nextafter(values, 9)[np.newaxis], values) == -1).all()
+
+
+# -- Uncertainty: two realisations of three layers of 0.5 m, with cells of 10 x 20 m.
+
+
+def reservoir():
+    """A body of 7 cells along the first column and row, one of 2 in the last layer, and an empty realisation."""
+    cells = np.zeros((2, 3, 4, 5), np.uint8)
+    cells[0, :, 0, 0] = cells[0, 0, 0, :] = cells[0, 2, 3, 3:] = cells[1, 1, 1, 1] = 3
+    axes = {"z": -2 + 0.5 * np.arange(3), "y": 5 + 20.0 * np.arange(4), "x": 100 + 10.0 * np.arange(5)}
+    coords = {"realisation": [4, 9], **{name: (name, place, {"units": "m"}) for name, place in axes.items()}}
+    sides = {"cell_x": 10.0, "cell_y": 20.0, "cell_z": 0.5}
+    return Realisations(cells, coords, ("realisation", "z", "y", "x"), "facies", sides)
+
+
+@pytest.mark.parametrize(
+    ("well", "cells"),
+    [
+        ((100, 5), (7, 0)),  # a column of all layers
+        ((104.9, -4.9, -1.76), (7, 0)),  # in the cell
+        ((110, 25), (0, 1)),
+        ([(100, 5, -2), (140, 65, -1), (130, 65, -1)], (9, 0)),  # a body counts once
+        ((120, 25, -2), (0, 0)),
+    ],
+)
+def test_the_volume_of_known_bodies_at_a_well(well, cells):
+    found = ensemble.connected_volume(reservoir(), 3, well)
+    assert found.values.tolist() == [100 * n for n in cells] and found.realisation.values.tolist() == [4, 9]
+    assert (found.attrs["long_name"], found.attrs["units"]) == ("volume of facies 3 at the well", "m\u00b3")
+    upside = reservoir().transpose("x", "realisation", "z", "y")
+    xarray.testing.assert_identical(ensemble.connected_volume(upside, 3, well), found)
+    area = ensemble.connected_volume(reservoir().isel(z=0), 3, (100, 5))
+    assert area.values.tolist() == [1000, 0] and area.attrs["units"] == "m\u00b2" and area.attrs["z"] == -2
+    assert found.quantile(0.5) == 50 * cells[0] + 50 * cells[1]
+
+
+def test_maps_and_shares_of_a_known_ensemble():
+    maps = reservoir()
+    probability = ensemble.probability(maps, 3)
+    np.testing.assert_array_equal(probability, (maps.values == 3).mean(0))
+    assert probability.attrs["long_name"] == "probability of facies 3" and probability.attrs["cell_x"] == 10
+    shares = ensemble.vertical_proportions(maps)
+    assert shares.dims == ("category", "realisation", "z") and shares.category.values.tolist() == [0, 3]
+    np.testing.assert_allclose(shares.sel(category=3), [[5 / 20, 1 / 20, 3 / 20], [0, 1 / 20, 0]])
+    np.testing.assert_allclose(ensemble.vertical_proportions(maps.values[0], [3, 8]), [[5 / 20, 0.05, 0.15], [0] * 3])
+    values = xarray.DataArray(np.random.default_rng(1).normal(1e6, 1, (7, 5, 6)), dims=("realisation", "y", "x"))
+    values = values.assign_attrs(long_name="porosity", units="%")
+    np.testing.assert_allclose(ensemble.quantiles(values), np.quantile(values, (0.1, 0.5, 0.9), axis=0))
+    np.testing.assert_allclose(ensemble.e_type(values), values.mean("realisation"))
+    assert ensemble.e_type(values).attrs == {"long_name": "E-type of porosity", "units": "%"}
+    expected = [np.sqrt((values[:n].var("realisation", ddof=1) / n).mean()) for n in range(2, 8)]
+    error = ensemble.standard_error(values)
+    np.testing.assert_allclose(error, expected)
+    assert error.realisations.values.tolist() == [2, 3, 4, 5, 6, 7] and error.attrs["units"] == "%"
+    assert ensemble.standard_error(maps, 3)[0] == pytest.approx(np.sqrt(10 / 60 / 4))  # cells of which one has 3
+
+
+def test_unknown_cells_count_for_nothing():
+    maps = reservoir().assign_coords(region=(("z", "y", "x"), np.arange(60).reshape(3, 4, 5) % 20 < 10))
+    maps[:, :, 2:] = 255
+    assert np.isnan(ensemble.probability(maps, 3)[:, 2:]).all()
+    shares = ensemble.vertical_proportions(maps)
+    assert shares.category.values.tolist() == [0, 3] and shares.sel(category=3)[0, 0] == 0.5
+    assert ensemble.e_type(maps)[0, 0, 1] == 1.5 and ensemble.connected_volume(maps, 255, (100, 65)).values.max() == 0
+
+
+@pytest.mark.parametrize("ground", [False, True])
+def test_plots_of_xarray_have_names_units_and_north_up(ground):
+    options = {"origin": (5, 5, 0), "cell": (10, 10, 1)} if ground else {}
+    made = simdtex.simulate(
+        ensemble.channels()[0][:24, :24],
+        2,
+        shape=(9, 8),
+        categorical=True,
+        order=2,
+        rng=1,
+        device="reference",
+        **options,
+    )
+    image = ensemble.probability(made, 1).plot()
+    assert image.axes.get_title() == "" and image.colorbar.ax.get_ylabel() == "probability of category 1"
+    low, high = image.axes.get_ylim()
+    assert (low, high) == ((0, 90) if ground else (-0.5, 8.5))
+    plt.close("all")
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ensemble.probability(np.zeros((2, 3, 3)), 1), "with the dimension realisation"),
+        (lambda: ensemble.e_type(reservoir().assign_attrs(options='{"categorical": true}')), "are of categories"),
+        (lambda: ensemble.connected_volume(reservoir(), 3, (90, 5)), "outside"),
+        (lambda: ensemble.connected_volume(reservoir(), 3, (90,)), "x, y and perhaps z of the well"),
+        (lambda: ensemble.connected_volume(reservoir().isel(x=0), 3, (100, 5)), "one variable with y and x"),
+        (lambda: ensemble.vertical_proportions(reservoir()[:, 0]), "with the dimension z"),
+        (lambda: ensemble.connected_volume(reservoir()[..., ::-1], 3, (100, 5)), "evenly spaced in ascending order"),
+    ],
+)
+def test_what_has_no_uncertainty_is_refused(call, words):
+    with pytest.raises((TypeError, ValueError), match=words):
+        call()

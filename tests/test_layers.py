@@ -182,6 +182,16 @@ def test_data_are_honoured_and_pixels_are_the_samples():
     assert found.shape == known.shape
 
 
+def test_a_guide_of_a_volume_may_be_unknown():
+    """An eighth of the places, all between the sites of the coarse levels, lead those around them."""
+    own = np.broadcast_to(np.arange(9)[:, None, None] < 4, (9, 20, 22))
+    wanted = np.broadcast_to(np.arange(22) < 11, own.shape)
+    sparse = np.full(own.shape, np.nan)
+    sparse[1::2, 1::2, 1::2] = wanted[1::2, 1::2, 1::2]
+    found = simulated(own.astype(np.uint8), guide=(own.astype(float), sparse), shape=own.shape, levels=3)
+    assert (found == wanted).all()
+
+
 def test_soft_data_and_a_region_have_layers():
     found = simulated(probabilities=np.stack([1 - sloping(), sloping()]), shape=(8, 14, 15))
     assert (found[0] == 0).all() and (found[-1] == 1).all() and found[:4].mean() < 0.4 < 0.6 < found[4:].mean()
@@ -237,7 +247,6 @@ def test_a_callback_sees_volumes():
             "order 40 does not fit the sample of 9 layers x 20 rows x 22 columns; the largest order that fits",
         ),
         ({"known": np.full((4, 4), np.nan)}, "known is 2-dimensional; give .layers, rows, cols."),
-        ({"guide": (guided()["guide"][0], np.full((9, 20, 22), np.nan))}, "the guide of a volume has NaN"),
         ({"rotation": np.zeros((9, 20, 22))}, "rotation is for training images of two axes; leave it out for a volume"),
         ({"probabilities": np.full((2, 9, 20, 22), 0.4)}, "the probabilities of layer 0, row 0, column 0 are 0.4, 0.4"),
     ],

@@ -443,6 +443,7 @@ def test_a_method_without_sources_has_a_report_without_them(folder):
 # -- The report of an ensemble says what the figures say.
 
 ALWAYS = {"index.html", "results.json", "realisations.png", "maps.png", "entropy.png", "variograms.png"}
+SEVERAL, WELLS = {"error.png"}, {"volumes.png"}
 COPIES = {"copies.png"}  # where images hold a window
 OF_CATEGORIES = {"connectivity.png"}
 
@@ -453,7 +454,7 @@ def test_a_report_of_categories(tmp_path):
     training = training[:64, :56]
     data = [(10, 20, images[0, 20, 10]), (59, 47, images[0, 47, 59])]
     write_ensemble(tmp_path / "r", training, images, data=data, command="simdtex simulate <ti>")
-    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES | OF_CATEGORIES
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES | OF_CATEGORIES | SEVERAL | WELLS
     page = read_page(tmp_path / "r" / "index.html")
     assert_needs_nothing_else(page)
     assert "3 realisations of 60 x 48 pixels, 2 categories, and a training image of 56 x 64" in page.text
@@ -489,7 +490,7 @@ def test_the_index_map_shows_each_copied_pixel_where_it_is_from():
 def test_a_report_of_continuous_values(tmp_path):
     images = np.random.default_rng(1).normal(size=(2, 20, 24))
     write_ensemble(tmp_path / "r", images[0], images, data=[(3, 4, 0), (9, 1, 0)])
-    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES | SEVERAL
     text = read_page(tmp_path / "r" / "index.html").text
     assert "continuous values" in text and "standard deviation of the realisations" in text
     assert "Not every realisation keeps the 2 hard data" in text

@@ -24,6 +24,7 @@ HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas", "pyvista", "vtkmodules", "Open
 HEAVY |= {"rasterio", "sklearn", "joblib"}
 PUBLIC = {
     *("DeviceError", "Live", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality"),
+    "ensemble",
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),
     "explain",
     "replay",

@@ -161,18 +161,17 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
     from simdtex.report.ensemble import write_ensemble, write_volumes
 
     pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
-    shown: dict[str, Any] = {"command": command_line(), "upward": "cell_y" in made.attrs}
-    if material.deep:
-        write_volumes(folder, pixels, made.values, categorical, **shown)
-        return
     data = None
     if known is not None:
         table = isinstance(known, HardData)
         known = place_hard_data(known, made.shape[1:], **place) if table else np.ma.masked_invalid(known)
-        row, col = np.nonzero(~np.ma.getmaskarray(known))
-        data = np.stack([col, row, known.data[row, col].astype(np.float64)], -1)
-    categories: list[Any] | None = None if categorical else []
-    write_ensemble(folder, pixels, made.values, data=data, categories=categories, **shown)
+        cells = np.nonzero(~np.ma.getmaskarray(known))
+        data = np.stack([*cells[::-1], known.data[cells].astype(np.float64)], -1)
+    shown: dict[str, Any] = {"data": data, "command": command_line()}
+    if material.deep:
+        write_volumes(folder, pixels, made, categorical, **shown)
+    else:
+        write_ensemble(folder, pixels, made, categories=None if categorical else [], **shown)
 
 
 def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:

@@ -206,7 +206,7 @@ def simulate(call: Simulate) -> Work:
             reached = np.array([(told == one).sum() for one in categories])
             for name, those in (("asked", asked), ("reached", reached)) if told.size else ():
                 attributes[f"shares_{name}"] = " ".join(f"{one:.3f}" for one in those / those.sum())
-        attributes |= sides_of_cells | described(call.given)
+        attributes |= sides_of_cells | described(call.given, known)
         result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
         if not call.source:
             return result

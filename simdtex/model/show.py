@@ -206,7 +206,7 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
         own = how if isinstance(how, dict) else how[n]
         image = axes.imshow(planes[n], **where, **own)
         axes.set_title(title, fontsize=10)
-        axes.set(xlabel="x" if ground else "", ylabel="y" if ground else "")
+        axes.set(xlabel=_label(made["x"]) if ground else "", ylabel=_label(made["y"]) if ground else "")
         if own is not how:
             bar = figure.colorbar(image, ax=axes)
     for axes in grid[len(titles) :]:
@@ -241,9 +241,11 @@ class Results(xr.Dataset):  # type: ignore[no-untyped-call]
     plot = UncachedAccessor(_DatasetPlot)
 
 
-def described(training: Any) -> dict[str, str]:
-    """Return the attributes ``long_name`` and ``units`` of a training image of xarray, if it has them."""
-    if not hasattr(training, "coords"):
-        return {}
-    found = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+def described(training: Any, known: Any = None) -> dict[str, str]:
+    """Return the attributes ``long_name`` and ``units`` of a training image of xarray, or the name of one variable."""
+    names: Any = getattr(known, "names", ())  # of a table
+    found = {"long_name": names[0] if len(names) == 1 else "", "units": ""}
+    if hasattr(training, "coords"):
+        own = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+        found |= {name: value for name, value in own.items() if value}
     return {name: str(value) for name, value in found.items() if value}

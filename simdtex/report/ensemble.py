@@ -7,19 +7,24 @@ import os
 from collections.abc import Sequence
 from dataclasses import fields
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.experiments import ensemble as measures
 from simdtex.experiments.ensemble import WINDOW, Summary, connectivity, copies, summary, variogram
 from simdtex.io.image import to_display
+from simdtex.io.rasters import axis_place
 from simdtex.model.display import category_colours, source_colours
 from simdtex.report.page import FAINT, INK, Figure, Part, Section, check_folder, legend, new_figure, tidy, write_report
-from simdtex.report.sheet import LEAST_SIDE, contact_sheet
+from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
+
+if TYPE_CHECKING:
+    from xarray import DataArray
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
@@ -29,7 +34,9 @@ MOST_PANELS = 6  # categories drawn, those with the largest shares of the traini
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
-ACROSS = {1: "to the right", 0: "down"}  # the axes of a picture
+QUANTILES = 0.1, 0.5, 0.9
+AXES = ("z", "y", "x")
+CUTS = "", ", P10", ", P50", ", P90"
 
 
 def write_ensemble(
@@ -40,7 +47,6 @@ def write_ensemble(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
     command: str = "",
-    upward: bool = False,
 ) -> None:
     """Write the report of an ensemble: ``index.html``, PNG pictures, ``results.json``.
 
@@ -50,7 +56,8 @@ def write_ensemble(
         See `simdtex.report.page.check_folder`.
     training : array_like, (rows, cols)
         The training image.
-    ensemble : array_like, (realisations, rows, cols)
+    ensemble : xarray.DataArray or array_like, (realisations, rows, cols)
+        That of `simdtex.simulate` with coordinates on the ground has them on all axes, and north at the top.
     data : array_like, (m, 3), optional
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
@@ -58,8 +65,6 @@ def write_ensemble(
         empty sequence means continuous values.
     command : str
         The command line, if there is one.
-    upward : bool
-        Draw row 0 at the bottom, as of a map, whose rows ascend to the north.
 
     Raises
     ------
@@ -71,17 +76,17 @@ def write_ensemble(
     The time is that of `simdtex.experiments.ensemble` and about 3 s for the pictures.
     """
     check_folder(folder)
-    found = summary(ensemble, training, data=data, categories=categories)
-    images, own = np.asarray(ensemble), np.asarray(training)
-    categorical = len(found.categories) > 0
-    shown = (images[:, ::-1], own[::-1]) if upward else (images, own)
-    with matplotlib.rc_context({"image.origin": "lower" if upward else "upper"}):
-        uncertainty = _uncertainty(found)
+    found = summary(np.asarray(ensemble), training, data=data, categories=categories)
+    made, own = measures.named(ensemble, "realisation", "y", "x"), np.asarray(training)
+    images, categorical, names = made.values, len(found.categories) > 0, found.categories[_mapped(found)].tolist()
+    shown = (images[:, ::-1], own[::-1]) if "cell_y" in made.attrs else (images, own)
+    points = _on_ground(made, found.data)
     sections = [
         Section("The realisations", [_realisations(*shown, found)]),
-        Section("Uncertainty", uncertainty),
-        Section("Variograms", [_variograms(found)]),
-        *([Section("Connectivity of the categories", _connectivity(found))] if categorical else []),
+        Section("Uncertainty", _uncertainty(made, names, points, found)),
+        *_measured(made, names, points),
+        Section("Variograms", [_variograms(made, found)]),
+        *([Section("Connectivity of the categories", _connectivity(made, found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
         Section("Copies", _copies(*shown, found)),
     ]
@@ -144,36 +149,42 @@ def _realisations(images: Array, own: Array, found: Summary) -> Figure:
     )
 
 
-def _uncertainty(found: Summary) -> list[Part]:
-    """Return maps of the mean or of the shares of categories, and of the entropy or the standard deviation."""
+def _on_ground(made: DataArray, data: Floats | None) -> Floats:
+    """Return hard data, (m, 3 or 4), with the coordinates of their cells in place of column, row and layer."""
+    places = np.array([axis_place(made, axis) for axis in "xyz"[: made.ndim - 1]])
+    data = np.empty((0, made.ndim)) if data is None else data
+    return np.column_stack([places[:, 0] + places[:, 1] * data[:, :-1], data[:, -1]])
+
+
+def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary) -> list[Part]:
+    """Return maps of the mean and quantiles, or of probabilities, and of the standard deviation or the entropy."""
     dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
-    if len(found.categories) == 0:
-        values = found.data[:, 2]
-        limits = min([found.maps.min(), *values]), max([found.maps.max(), *values])
-        maps = _maps(found, {"mean of the realisations": (found.maps[0], values)}, "viridis", limits)
-        spread = _maps(found, {"standard deviation": (found.open, None)}, "magma", (0.0, found.open.max() or 1.0))
-        what = "The mean of the realisations at every pixel."
+    spread, values = made[0].copy(data=found.open), data[:, 2]
+    if not names:
+        planes = [measures.e_type(made), *measures.quantiles(made, QUANTILES)]
+        panels = {plane.attrs["long_name"] + cut: (plane, values) for plane, cut in zip(planes, CUTS, strict=True)}
+        every = np.concatenate([values, *(plane.values.ravel() for plane in planes)])
+        limits = float(every.min()), float(every.max())
+        title, most = f"standard deviation of {measures.label(made)}", found.open.max() or 1.0
+        what = "The mean of the realisations at every pixel (E-type), and their quantiles 0.1, 0.5 and 0.9."
         how = "The standard deviation of the realisations at every pixel, in the unit of the values"
     else:
-        panels = {}
-        for k in _mapped(found):
-            category = found.categories[k]
-            panels[f"share of category {category}"] = found.maps[k], (found.data[:, 2] == category).astype(float)
-        maps = _maps(found, panels, "viridis", (0.0, 1.0))
-        most = float(np.log2(max(2, len(found.categories))))
-        spread = _maps(found, {"entropy, bits": (found.open, None)}, "magma", (0.0, most))
+        planes = [measures.probability(made, name) for name in names]
+        known = [(values == name) * 1.0 for name in names]
+        panels = {plane.attrs["long_name"]: (plane, of) for plane, of in zip(planes, known, strict=True)}
+        limits, title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
         what = "The share of the realisations in which a pixel has the category: its probability there."
         how = f"The entropy of every pixel over the categories, {found.open.mean():.2f} bits on average"
     return [
         Figure(
             "maps.png",
-            maps,
-            f"{what}{dots if len(found.data) else ''} Around data the map follows them; far from them it should be "
+            _maps(panels, data, "viridis", limits),
+            f"{what}{dots if len(data) else ''} Around data the map follows them; far from them it should be "
             "even, for nothing is known there. Structure far from any datum means that realisations repeat each other.",
         ),
         Figure(
             "entropy.png",
-            spread,
+            _maps({title: (spread, None)}, data, "magma", (0.0, most)),
             f"{how}: dark where all realisations agree, light where they differ most. It should be dark at hard data "
             "only, and grow with the distance from them over about the range of the variogram.",
         ),
@@ -181,33 +192,106 @@ def _uncertainty(found: Summary) -> list[Part]:
 
 
 def _maps(
-    found: Summary, panels: dict[str, tuple[Floats, Floats | None]], colours: str, limits: tuple[float, float]
+    panels: dict[str, Any], data: Floats, colours: str, limits: tuple[float, float], across: int | None = None
 ) -> Plot:
-    """Plot maps by title, each with the hard data as dots in the colours of their values, or hollow if None."""
-    rows, cols = found.open.shape
-    across = 2 if len(panels) == 4 else min(3, len(panels))
+    """Plot planes by title, each with the hard data as dots in the colours of their values, or hollow if None."""
+    rows, cols = np.max([plane.shape for plane, _ in panels.values()], axis=0)
+    across = across or (2 if len(panels) == 4 else min(3, len(panels)))
     down = -(-len(panels) // across)
     wide, high = MAP_INCHES * cols / max(rows, cols), MAP_INCHES * rows / max(rows, cols)
-    figure = new_figure(across * max(wide, 1.6) + 1.2, down * (max(high, 1.0) + 0.45))
+    figure = new_figure(across * (max(wide, 1.6) + 0.4) + 1.2, down * (max(high, 1.0) + 0.65))
     grid = figure.subplots(down, across, squeeze=False).ravel()
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
-    x, y = found.data[:, 0], found.data[:, 1]
     low, high = limits
-    for axes, (title, (picture, values)) in zip(grid, panels.items(), strict=False):
-        image = axes.imshow(picture, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
+    for axes, (title, (plane, values)) in zip(grid, panels.items(), strict=False):
+        how = {"cmap": colours, "vmin": low, "vmax": high, "add_colorbar": False}
+        image = plane.plot.imshow(ax=axes, yincrease="cell_y" in plane.attrs, **how)
+        (_, up), (_, along) = (axis_place(plane, axis) for axis in plane.dims)
+        # cells of a plane through layers are squares
+        axes.set_aspect(1 if "y" in plane.dims[:1] else along / up)
+        axes.set_title("")
         axes.set_title(title, loc="left", fontsize=10, color=INK)
         axes.tick_params(colors=FAINT, labelcolor=INK, labelsize=8)
         inside: Any = "none"
         if values is not None:
             inside = matplotlib.colormaps[colours](np.clip((values - low) / ((high - low) or 1.0), 0, 1))
-        axes.scatter(x, y, s=26, c=inside, edgecolors="white", linewidths=1.8)
-        axes.scatter(x, y, s=34, c="none", edgecolors="black", linewidths=0.7)
-    figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02)
+        axes.scatter(data[:, 0], data[:, 1], s=26, c=inside, edgecolors="white", linewidths=1.8)
+        axes.scatter(data[:, 0], data[:, 1], s=34, c="none", edgecolors="black", linewidths=0.7)
+    figure.colorbar(image, ax=[*grid[: len(panels)]], shrink=0.85, pad=0.02, label=plane.attrs.get("units", ""))
     return figure
 
 
-def _variograms(found: Summary) -> Figure:
+def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
+    """Return volumes of categories at wells, which are hard data on the ground, and the standard error of maps."""
+    rows: list[dict[str, str]] = []
+    drawn: dict[str, Any] = {}
+    sections = []
+    for name in names:
+        hits = data[data[:, -1] == name, :-1]
+        wells = [(f"x {x:g}, y {y:g}", hits[(hits[:, :2] == (x, y)).all(1)]) for x, y in np.unique(hits[:, :2], axis=0)]
+        for well, at in [(f"all {len(wells)}", hits), *wells[:SHOWN]] if wells else []:
+            one = measures.connected_volume(made, name, at)
+            drawn.setdefault(str(name), one)
+            cuts = map(number_text, one.quantile(QUANTILES).values)
+            rows.append({"Category": str(name), "Well": well} | dict(zip(("P10", "P50", "P90"), cuts, strict=True)))
+    if drawn:
+        figure = new_figure(1 + 3.4 * len(drawn), 3)
+        for axes, one in zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.values(), strict=True):
+            one.plot.hist(ax=axes, color=THEIRS)
+            tidy(axes, "", axes.get_xlabel(), "realisations")
+            for cut in one.quantile(QUANTILES).values:
+                axes.axvline(cut, color=OWN, linestyle="--")
+        caption = "Volumes (areas of a map) of all bodies that a well meets. The dashed lines are P10, P50 and P90."
+        note = (
+            "Cells are connected by their sides. A tenth of the realisations are below P10, which is P90 of reserves."
+        )
+        table = Table(f"Connected volumes, {one.attrs.get('units', '')}".rstrip(", "), rows, note)
+        parts: list[Part] = [Figure("volumes.png", figure, caption), table]
+        sections.append(Section("Volumes connected to wells", parts))
+    if (n := len(made)) > 1:
+        curves: list[Any] = [measures.standard_error(made, name) for name in names or [None]]
+        figure = new_figure(5.6, 3)
+        axes = figure.subplots()
+        for name, one in zip(names or [None], curves, strict=True):
+            one.plot.line(ax=axes, marker=".", label=name)
+        tidy(axes, "", axes.get_xlabel(), axes.get_ylabel())
+        axes.set_ylim(0)
+        if len(curves) > 1:
+            axes.legend(title="category", frameon=False)
+        most = max(float(one[-1]) for one in curves)
+        caption = (
+            f"Standard error of the map, over all cells: {most:.2g} after {n} realisations, half of it after {4 * n}."
+        )
+        sections.append(Section("How many realisations", [Figure("error.png", figure, caption)]))
+    return sections
+
+
+def _vertical(made: DataArray, training: Array, names: Array) -> Section:
+    """Return the shares of categories layer by layer, of the realisations and of the training image."""
+    both: list[Any] = [measures.vertical_proportions(one, names.tolist()) for one in (made, training)]
+    theirs, own = both
+    own = own.assign_coords(z=np.linspace(float(made["z"][0]), float(made["z"][-1]), len(training)))
+    shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
+    figure = new_figure(1 + 2.4 * len(shown), 3.6)
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    for k, axes in zip(shown, panels, strict=True):
+        for one in theirs[k]:
+            one.plot.line(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
+        own[k].plot.line(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
+        axes.set_title("")
+        tidy(axes, f"category {names[k]}", "share of the layer", axes.get_ylabel() if axes is panels[0] else "")
+    if "cell_y" not in made.attrs:
+        axes.invert_yaxis()
+    legend(figure, panels[0])
+    caption = (
+        "Vertical proportion curves: the share of each category in each layer, beside the training image's, whose "
+    )
+    caption += "layers are stretched to those of the realisations if there are more or fewer."
+    return Section("Vertical proportions", [Figure("vertical.png", figure, caption)])
+
+
+def _variograms(made: DataArray, found: Summary) -> Figure:
     if len(found.categories) == 0:
         table, names, of = found.variograms, [""], "the values"
     else:
@@ -216,33 +300,39 @@ def _variograms(found: Summary) -> Figure:
         of = "each category's indicator" + (" (of two categories both are the same)" if len(shown) == 1 else "")
     return Figure(
         "variograms.png",
-        _lagged(found.lags, table, names, "variogram", ACROSS, "pixels"),
+        _lagged(found.lags, table, names, "variogram", made),
         f"Variograms of {of} along both axes: half the mean squared difference of two pixels at a lag. The training "
         "image's line should run inside the band of the realisations. A band that rises later means bodies that are "
         "too large, one that rises earlier bodies that are too small or noise; waves are regular distances.",
     )
 
 
-def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, ways: dict[int, str], unit: str) -> Plot:
-    """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each of some axes."""
+def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, made: DataArray) -> Plot:
+    """Plot functions of the lag, (axes, K, n + 1, L): a row for each name, a column for each axis of a realisation."""
+    ways = made.dims[1:]
+    unit = "" if "cell_y" in made.attrs else "voxels" if len(ways) > 2 else "pixels"
     figure = new_figure(2.2 + 3.0 * len(ways), 0.5 + 2.35 * len(names))
-    grid = figure.subplots(len(names), len(ways), sharey="row", sharex=True, squeeze=False)
+    grid = figure.subplots(len(names), len(ways), sharey="row", sharex="col", squeeze=False)
     for row, (name, panels) in enumerate(zip(names, grid, strict=True)):
-        for (axis, way), axes in zip(ways.items(), panels, strict=True):
+        for axis, (way, axes) in enumerate(zip(ways, panels, strict=True)):
+            side = axis_place(made, str(way))[1]
             theirs, own = table[axis, row, :-1], table[axis, row, -1]
             known = np.isfinite(theirs).any(axis=0)
             low, middle, high = (how(theirs[:, known], axis=0) for how in (np.nanmin, np.nanmedian, np.nanmax))
-            axes.fill_between(lags[known], low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all")
-            axes.plot(lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
-            axes.plot(lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
-            title = f"{name}, {way}" if name else way
-            tidy(axes, title, f"lag, {unit}" if row == len(names) - 1 else "", label if axes is panels[0] else "")
+            axes.fill_between(
+                side * lags[known], low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all"
+            )
+            axes.plot(side * lags[known], middle, color=THEIRS, linewidth=1.3, label="realisations, median")
+            axes.plot(side * lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
+            title = f"{name}, along {way}" if name else f"along {way}"
+            below = f"lag, {made[way].attrs.get('units', unit)}".rstrip(", ") if row == len(names) - 1 else ""
+            tidy(axes, title, below, label if axes is panels[0] else "")
         panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
     legend(figure, grid[0, 0])
     return figure
 
 
-def _connectivity(found: Summary) -> list[Part]:
+def _connectivity(made: DataArray, found: Summary) -> list[Part]:
     shown = _drawn(found)
     names = [f"category {found.categories[k]}" for k in shown]
     figures = {
@@ -255,7 +345,7 @@ def _connectivity(found: Summary) -> list[Part]:
     return [
         Figure(
             "connectivity.png",
-            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", ACROSS, "pixels"),
+            _lagged(found.lags, found.connectivity[:, shown], names, "connectivity", made),
             "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
             "connected component (pixels are connected by their sides). A variogram cannot tell whole channels from "
             "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
@@ -357,53 +447,62 @@ def _decimal(value: float) -> str:
 SLICED = 2
 """Realisations whose slices are shown."""
 
-AXES = ("z", "y", "x")
-
 
 def write_volumes(
     folder: str | os.PathLike[str],
     training: NDArray[Any],
-    ensemble: NDArray[Any],
+    ensemble: Any,
     categorical: bool,
     command: str = "",
-    upward: bool = False,
+    data: Floats | None = None,
 ) -> None:
     """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
 
-    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols). Of categories the last is
-    drawn. ``upward``: y, or z, is drawn upward, as of a map. Cost: a few passes over each realisation for every lag, up
-    to a third of the shortest side.
+    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols), or that of
+    `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
+    row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
     """
-    images, names = [*ensemble, training], np.unique(training) if categorical else np.zeros(0, training.dtype)
-    fields = [(one == names[-1] if categorical else one).astype(np.float64) for one in images]
-    what = f"category {names[-1]}" if categorical else "the values"
+    made = measures.named(ensemble, "realisation", *AXES)
+    names = np.unique(training) if categorical else np.zeros(0, training.dtype)
+    images, drawn = [*made.values, training], names[-1] if categorical else None
+    fields = [(one == drawn if categorical else one).astype(np.float64) for one in images]
+    what = f"category {drawn}" if categorical else "the values"
     limits = (float(fields[-1].min()), float(fields[-1].max()))
-    shown = {"training image": fields[-1], f"mean of {len(ensemble)}": np.mean(fields[:-1], 0)}
-    shown |= {f"realisation {k}": one for k, one in enumerate(fields[:-1][:SLICED])}
-    sheet = [
-        (f"{name}, {AXES[axis]} = {n // 2}", to_display(one.take(n // 2, axis)[:: -1 if upward else 1], limits))
-        for name, one in shown.items()
-        for axis, n in enumerate(one.shape)
+    along = {axis: axis_place(made, axis)[1] * np.arange(n) for axis, n in zip(AXES, training.shape, strict=True)}
+    own = measures.named(fields[-1], *AXES, coords=along, attrs=made.attrs)
+    cuts = [] if categorical else measures.quantiles(made, QUANTILES)
+    middle = [measures.probability(made, names[-1])] if categorical else [measures.e_type(made), *cuts]
+    shown = [
+        ("training image", own),
+        *((f"{one.attrs['long_name']}{cut}", one) for one, cut in zip(middle, CUTS, strict=False)),
     ]
-    lags = np.arange(max(1, min(*training.shape, *ensemble.shape[1:]) // 3) + 1)
-    along = {axis: f"along {name}" for axis, name in enumerate(AXES)}
+    shown += [(f"realisation {k}", made[k].copy(data=fields[k])) for k in range(min(SLICED, len(made)))]
+    panels: dict[str, Any] = {}
+    for name, one in shown:
+        for axis in AXES:
+            at = one[axis][one.sizes[axis] // 2]
+            title = f"{name}, {axis} = {float(at):g} {at.attrs.get('units', '')}".rstrip()
+            panels[title] = one.isel({axis: one.sizes[axis] // 2}), None
+    lags = np.arange(max(1, min(*training.shape, *made.shape[1:]) // 3) + 1)
 
     def lagged(label: str, functions: list[Any]) -> Figure:
         table = np.moveaxis(np.array(functions), 1, 0)[:, None]
         caption = (
             f"{label.capitalize()} of {what} along z, y and x. The training image's line should run inside the band."
         )
-        return Figure(f"{label}.png", _lagged(lags, table, [""], label, along, "voxels"), caption)
+        return Figure(f"{label}.png", _lagged(lags, table, [""], label, made), caption)
 
     variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]
     slices = Figure(
         "slices.png",
-        contact_sheet(sheet, columns=3, scale=-(-LEAST_SIDE // max(training.shape))),
-        f"The middle slices across z, y and x of {what}: the training image, the mean of the realisations, and "
-        "realisations. In the mean, grey is uncertain.",
+        _maps(panels, np.empty((0, 2)), "viridis", limits, 3),
+        f"The middle slices across z, y and x of {what}: the training image, the uncertainty of the realisations, and "
+        "realisations.",
     )
-    sections = [Section("Slices", [slices]), Section("Variograms", [lagged("variograms", variograms)])]
-    results: dict[str, Any] = {"shape": ensemble.shape, "training_shape": training.shape}
+    sections = [Section("Slices", [slices]), *_measured(made, names[-1:].tolist(), _on_ground(made, data))]
+    sections += [_vertical(made, training, names)] if categorical else []
+    sections.append(Section("Variograms", [lagged("variograms", variograms)]))
+    results: dict[str, Any] = {"shape": made.shape, "training_shape": training.shape}
     results["variograms"] = [variograms[-1], *variograms[:-1]]
     if categorical:
         found = [[connectivity(one, name, len(lags) - 1) for one in images] for name in names]
@@ -416,6 +515,6 @@ def write_volumes(
         table = _figures(names, figures, " Voxels are connected by their faces.")
         sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table]))
         results |= {"connectivity": [functions[-1], *functions[:-1]], "categories": names}
-    size = " x ".join(str(side) for side in ensemble.shape[:0:-1])
-    lead = f"{len(ensemble)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
+    size = " x ".join(str(side) for side in made.shape[:0:-1])
+    lead = f"{len(made)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
     write_report(folder, "Realisations of a volume", lead, sections, results, command)

@@ -22,7 +22,7 @@ from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import CATEGORIES as MOST
-from simdtex.model.pictures import NothingUsable, Pictures, unknown_in
+from simdtex.model.pictures import NothingUsable, Pictures
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import Sample
 from simdtex.ops.finish import gaussian_offsets
@@ -98,7 +98,7 @@ def plan(
     if soft and soft.categories is not None:
         options = replace(options, proportions=asked)  # by default those of the map
     if pictures.deep:
-        check_volume(pictures, options, guide)
+        check_volume(pictures, options)
     offsets = neighbourhood_offsets(options.neighbourhood, len(shape))
     sides = [picture.shape[:-1] for picture in pictures.pixels]
     if soft and soft.images is not None:  # each picture must serve the sites that it is probable at
@@ -223,8 +223,8 @@ def sampled(
     return fewer, sample
 
 
-def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surroundings | None) -> None:
-    """Raise if a volume has a guide or an option that only pictures support."""
+def check_volume(pictures: Pictures, options: Options) -> None:
+    """Raise if a volume has an option that only pictures support."""
     if len(pictures.pixels) > 1:
         raise ValueError("several samples are pictures; give one volume")
     flat = {
@@ -234,8 +234,6 @@ def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surrou
     }
     for name in filter(flat.get, flat):
         raise ValueError(f"{name}={vars(options)[name]} is for pictures; leave it out for a volume")
-    if isinstance(guide, tuple) and unknown_in(guide[1]).any():
-        raise ValueError("the guide of a volume has NaN; give a number everywhere")
 
 
 def check_categories(pictures: Pictures, given: Given | None, proportions: Sequence[float] | None = None) -> None:
