@@ -10,11 +10,14 @@ name; without names all are written.
 import argparse
 import io
 import re
+import subprocess
 import sys
+import tempfile
 from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
+import PIL.Image
 from skimage import data
 from skimage.transform import downscale_local_mean
 
@@ -213,11 +216,21 @@ def research():
                 print(told.getvalue(), end="")
 
 
+def reservoir():
+    """Run the example of a volume, and keep its sheet."""
+    with tempfile.TemporaryDirectory() as folder:
+        example = HERE.parent / "examples" / "volume_of_a_reservoir.py"
+        subprocess.run([sys.executable, example, folder, "--realisations", "20"], check=True)
+        with PIL.Image.open(Path(folder) / "sheet.png") as sheet:
+            sheet.convert("RGB").quantize(64).save(HERE / "readers" / "reservoir.png", optimize=True)
+
+
 WISHES = (
     *(balance, novelty, structure, order, period, finish, tile, hole, some),
     *(proportions, shares, methods, alpha, paper),
 )
 READERS = (materials, maps, geoscience)
+RUN = {"research": research, "reservoir": reservoir}
 
 
 def main():
@@ -225,10 +238,10 @@ def main():
         make.__name__: (folder, make) for folder, some in (("wishes", WISHES), ("readers", READERS)) for make in some
     }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, "research"]))
-    for name in parser.parse_args().names or [*known, "research"]:
-        if name == "research":
-            research()
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, *RUN]))
+    for name in parser.parse_args().names or [*known, *RUN]:
+        if name in RUN:
+            RUN[name]()
             continue
         folder, make = known[name]
         path = HERE / folder / f"{name}.png"

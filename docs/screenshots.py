@@ -54,7 +54,8 @@ def main():
         script("page.go('paint'); page.showLayer('picture'); page.painting.width = 40")
         until(lambda: script("return page.seen") == "picture")
         script(
-            "const { brush } = page.painting; for (const at of [[150, 120], [260, 110]]) brush.begin(at), brush.add([90, 160])"
+            "const { brush } = page.painting; brush.begin([90, 160]); brush.add([150, 120]); brush.add([260, 110]);"
+            "page.view.draw()"
         )
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)
@@ -70,7 +71,8 @@ def main():
         for label in (1, 2, 3):
             script(
                 "page.painting.label = arguments[0]; page.painting.width = 24; const x = 180 * arguments[0] - 90;"
-                "const { brush } = page.painting; brush.begin([x, 60]); brush.add([x - 30, 180]); brush.add([x + 30, 300])",
+                "const { brush } = page.painting;"
+                "brush.begin([x, 60]); brush.add([x - 30, 180]); brush.add([x + 30, 300])",
                 label,
             )
         before = script("return page.results.size")

@@ -476,7 +476,8 @@ def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
     page.script("page.send({kind: 'resume'})")
     until(lambda: page.status == "Result 2 is ready; result 1 is shown.")
     page.script(
-        "document.querySelector('.columns').style.paddingBottom = '2000px'; scrollTo(0, 1e6); page.options.mrf.values = {finish: 99}"
+        "document.querySelector('.columns').style.paddingBottom = '2000px'; scrollTo(0, 1e6);"
+        "page.options.mrf.values = {finish: 99}"
     )
     page.script("page.make()")
     until(lambda: page.alert.startswith("Soften seams (finish) is 99; "))
