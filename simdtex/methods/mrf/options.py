@@ -340,7 +340,7 @@ class Options:
         None,
         Numbers(),
         "Give the categories, in ascending order, these shares of the output",
-        none="the mean of the probabilities; without, in a volume of one variable, the shares of the sample",
+        none="the mean of the probabilities; without these and a guide, in a volume of one variable, the sample's shares",
         shown=("simulate",),
     )
     data_weight: float = data(

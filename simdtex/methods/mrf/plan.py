@@ -95,8 +95,8 @@ def plan(
     pictures = options.of(pictures)
     check_categories(pictures, given, options.proportions)
     asked, options = options.proportions, options.resolved(pictures)
-    if soft and soft.categories is not None:
-        options = replace(options, proportions=asked)  # by default those of the map
+    if guide or (soft and soft.categories is not None):
+        options = replace(options, proportions=asked)  # a guide, and a map of probabilities, say how much of each
     if pictures.deep:
         check_volume(pictures, options)
     offsets = neighbourhood_offsets(options.neighbourhood, len(shape))
