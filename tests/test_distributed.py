@@ -221,7 +221,7 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
         distributed.resume(tmp_path / "b.zarr")
     for name, other, words in (
         ("version", lambda name: "v", "is of simdtex v and this is .*; go on with the code of simdtex v that wrote"),
-        ("FORMAT", 0, "is of format 0 and this simdtex reads \\d+; go on with the code of simdtex .* that wrote it, or"),
+        ("FORMAT", 0, "is of format 0 and this simdtex reads \\d+; go on with the code of simdtex .* that wrote it"),
     ):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, name, other)

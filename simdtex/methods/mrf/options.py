@@ -340,7 +340,7 @@ class Options:
         None,
         Numbers(),
         "Give the categories, in ascending order, these shares of the output",
-        none="the mean of the probabilities; without these and a guide, in a volume of one variable, the sample's shares",
+        none="the mean of the probabilities; in a volume of one variable without these and a guide the sample's shares",
         shown=("simulate",),
     )
     data_weight: float = data(
