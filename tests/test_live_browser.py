@@ -243,6 +243,9 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
         hole, before, after = (
             np.array(PIL.Image.open(archive.open(name))) for name in ("hole.png", "result-1.png", "texture.png")
         )
+    page.button("Make").click()
+    page.script("return new Promise((done) => setTimeout(done, 300))")
+    assert not page.script("return page.running") and page.results == 2, "another place is no change of the settings"
     assert 0 < (hole > 0).mean() < 0.2
     assert (before[hole == 0] == after[hole == 0]).all()
     assert (before[hole > 0] != after[hole > 0]).any()

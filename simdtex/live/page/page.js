@@ -208,19 +208,19 @@ class Page {
   }
 
   go(place) {
-    if (place in this.last && TASKS[this.task].place !== place) this.setTask(this.last[place]);
+    if (place in this.last && TASKS[this.task].place !== place) this.setTask(this.last[place], false);
     if (place === "why" && this.found) this.task = this.taskOf(this.found.settings);
     this.place = place;
   }
 
-  setTask(task) {
+  setTask(task, run = true) {
     this.place = TASKS[task].place;
     this.last[this.place] = this.task = task;
     this.hint = "";
     if (this.place === "paint" && this.layer === "labels" && task !== "classes") this.showLayer("sample");
     if (["hole", "guide"].includes(task) && this.shown === null && !this.running) this.showLayer("sample");
     if (task === "classes" && this.layer !== "labels") this.showLayer("sample");
-    if (!["hole", "guide"].includes(task)) this.changed();
+    if (run && !["hole", "guide"].includes(task)) this.changed();
   }
 
   setMethod(method) {
