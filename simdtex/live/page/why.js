@@ -2,7 +2,7 @@
 
 // -- the line of time, films, words and links of a look inside ---------------------------------------------------
 
-const TICKS = 24; // sets of a sweep that are told apart on the line of time, at most
+const TICKS = 24; // on the line of time for the sets of a sweep, at most
 const BEAT = 260; // milliseconds for a picture of a film
 
 /** All sweeps of a run, level by level, and the present moment in them. */
