@@ -75,8 +75,8 @@ def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
     field, penalty = tiles.run_level(here.run, turn.level, _above(here, turn, tile), here.store.penalty(turn))
     here.store.write(turn, tile, field)
-    kinds = here.run.of(turn.level).fair_use(turn.level).wanted.size
-    return Tally(penalty[penalty.size - kinds :].astype(np.int64), 0, 0)  # whole steps
+    _, kinds = here.run.of(turn.level).fair_use(turn.level).split(penalty)
+    return Tally(kinds.astype(np.int64), 0, 0)  # whole steps
 
 
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
@@ -207,7 +207,7 @@ class Turns:
                 return store.save(after, penalty)
         if turn.level:
             below = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1)
-            return store.save(below, penalty[penalty.size - fair_use.wanted.size :])
+            return store.save(below, fair_use.split(penalty)[1])
         return store.save(Turn(number, "show", 0))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,11 @@ class FairUse:
         """The fair weight of the square around each place, and of all places."""
         fair = np.ones(self.shape, np.int64) if self.fair is None else self.fair.reshape(self.shape)
         return sums_around(fair, self.around), int(fair.sum())
+
+    def split(self, each: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return counts or penalties of candidates, and those of kinds in regions, which follow them."""
+        first = each.size - self.wanted.size
+        return each[:first], each[first:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +128,9 @@ def use_penalty(
     candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.
     """
-    kinds = fair_use.wanted.size
-    counts, of_kinds = counts[: counts.size - kinds], counts[counts.size - kinds :]
-    kept = np.zeros(kinds, np.float32) if before is None else before[before.size - kinds :]
-    before = None if before is None or before.size == kinds else before[: before.size - kinds]
-    kept = kept if before is None else kept + _changes(of_kinds, fair_use)
+    counts, of_kinds = fair_use.split(counts)
+    before, kept = fair_use.split(np.zeros(fair_use.wanted.size, np.float32) if before is None else before)
+    kept = kept + _changes(of_kinds, fair_use) if before.size else kept
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     found = np.zeros(places, np.float32)
@@ -138,7 +142,7 @@ def use_penalty(
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
     if fair_use.fair is not None:
         found = found[there] if fair_use.listed else np.where(there, found, np.float32(np.inf))
-    return np.append(found if before is None else (found + before[: found.size]) / np.float32(2), kept)
+    return np.append((found + before[: found.size]) / np.float32(2) if before.size else found, kept)
 
 
 def _changes(counts: NDArray[np.integer], fair_use: FairUse) -> NDArray[np.float32]:

@@ -70,7 +70,7 @@ class Socket {
   }
 
   send(message, buffers = []) {
-    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    if (this.socket.readyState !== WebSocket.OPEN) return;
     this.socket.send(JSON.stringify({ ...message, buffers: buffers.map((buffer) => buffer.length) }));
     for (const buffer of buffers)
       for (let begin = 0; begin < buffer.length; begin += PIECE) this.socket.send(buffer.subarray(begin, begin + PIECE));

@@ -110,7 +110,7 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
 def first_state(level: Level, field: Field, penalty: NDArray[np.float32] | None = None) -> State:
     """Return the state of a level before its first sweep; ``penalty`` as in `Run.enter`."""
     count, total = survey(level.machine, level.grid, field.temperature)
-    kept = None if penalty is None else penalty[penalty.size - level.fair_use.wanted.size :]
+    kept = None if penalty is None else level.fair_use.split(penalty)[1]
     penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, kept)
     memory = level.schedule.init(level.setting)
     return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)

@@ -463,10 +463,10 @@ class Level:
 
 def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     """Return the relaxation of the level in a sweep, with the penalties of candidates, and of kinds in regions."""
-    n, costs = penalty.size - level.fair_use.wanted.size, level.relaxation.costs
-    padded, kinds = level.machine.put(np.pad(penalty[:n], (0, TAIL))), costs.kinds  # whole vectors are read at the end
+    (own, of_kinds), costs = level.fair_use.split(penalty), level.relaxation.costs
+    padded, kinds = level.machine.put(np.pad(own, (0, TAIL))), costs.kinds  # whole vectors are read at the end
     if kinds and level.soft is not None:
-        soft = level.regions.costs(level.soft, penalty[n:], level.grid) if level.regions else level.soft
+        soft = level.regions.costs(level.soft, of_kinds, level.grid) if level.regions else level.soft
         kinds = kinds._replace(sites=level.machine.put(soft))
     return level.relaxation._replace(costs=costs._replace(penalty=padded, kinds=kinds))
 
