@@ -235,14 +235,15 @@ def test_of_rare_callbacks_all_time_counts(clock):
     assert found == [None, None, None, pytest.approx(12 + 10 / 0.5 * 0.5)]
 
 
-@pytest.mark.parametrize("whole", [50.0, 90.0])
-def test_a_long_run_is_said_once_and_lines_follow_every_ten_seconds(clock, capsys, whole):
+@pytest.mark.parametrize(("whole", "at"), [(50.0, range(2, 25, 2)), (400.0, (2.25, 6, 10.25, 14, 18.25, 22))])
+def test_a_long_run_is_said_once_and_lines_follow_for_each_per_cent(clock, capsys, whole, at):
     with job.progress_bar(quiet=False) as show:
         for clock[0] in np.arange(0, 25, 0.25):
             show(Progress(fraction=clock[0] / whole, doing="level 2", image=print))
-    said = ["simdtex: this is expected to last about 90.0 s"] * (whole > 60)
-    lines = [f"{now / whole:.0%}, level 2; after {now} s about {whole - now:.1f} s left" for now in (10, 20)]
-    assert capsys.readouterr().err.splitlines() == said + lines
+    said = [f"simdtex: this is expected to last about {whole / 60:.1f} min"] * (whole > 60)
+    lines = [f"{now / whole:.0%}, level 2; after {now:.0f} s about" for now in at]
+    found = capsys.readouterr().err.splitlines()
+    assert found[: len(said)] == said and [line.split(" about")[0] + " about" for line in found[len(said) :]] == lines
 
 
 def test_a_random_seed_is_short_and_printed(inputs):

@@ -34,8 +34,8 @@ SMOOTH, ROUGH = 0.5, 10.0
 LONG = 60.0
 """Seconds beyond which the expected duration of a run is said."""
 
-EVERY = 10.0
-"""Seconds between two lines of progress without a terminal."""
+EVERY = 2.0
+"""The fewest seconds between two lines of progress without a terminal, each of which says another per cent."""
 
 
 class Task(NamedTuple):
@@ -257,17 +257,17 @@ def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) ->
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Show a progress bar on a terminal; elsewhere print a line every ten seconds, and whenever another job begins.
+    """Show a progress bar on a terminal; elsewhere print a line every two seconds, for each per cent at most.
 
     Yields the callback that shows a progress. Once, it says how long a long run is expected to last.
     """
     if quiet:
         yield lambda progress: None
         return
-    forecast, last, said, next_line = Forecast(), None, False, time.perf_counter() + EVERY
+    forecast, last, said, next_line, per_cent = Forecast(), None, False, time.perf_counter() + EVERY, "0%"
 
     def tell(progress: Progress) -> None:
-        nonlocal last, said, next_line
+        nonlocal last, said, next_line, per_cent
         if (job := progress.details.get("job")) != last and not bar:
             click.echo(job, err=True)
         last, seconds = job, forecast.seconds(progress.fraction)
@@ -277,9 +277,9 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
             said = True
             echo(f"simdtex: this is expected to last {duration(seconds)}")
         now = time.perf_counter()
-        if now >= next_line and not bar:
-            next_line, past = now + EVERY, now - forecast.began
-            line = f"{progress.fraction:.0%}, {progress.doing}; after {past:.0f} s {duration(seconds - past)} left"
+        if now >= next_line and per_cent != (reached := f"{progress.fraction:.0%}") and not bar:
+            next_line, per_cent, past = now + EVERY, reached, now - forecast.began
+            line = f"{reached}, {progress.doing}; after {past:.0f} s {duration(seconds - past)} left"
             click.echo(line, err=True)
 
     def duration(seconds: float) -> str:
