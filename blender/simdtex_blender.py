@@ -2,7 +2,7 @@
 """Blender add-on: make the maps of a material tile, make them larger, or fill the selected faces, with simdtex.
 
 In Blender choose Edit > Preferences > Add-ons > Install, and this file. It runs the program ``simdtex``, which
-``pip install simdtex`` installs, and tells Blender's own Python nothing else: it needs no package.
+``pip install simdtex`` installs; Blender's own Python needs no package.
 """
 
 import math
@@ -58,8 +58,8 @@ class Settings(bpy.types.PropertyGroup):
 
 def program():
     """Return the path of the program simdtex; raise a ValueError if there is none."""
-    addon = bpy.context.preferences.addons.get(__name__)
-    found = shutil.which(bpy.path.abspath(addon.preferences.program) if addon and addon.preferences.program else "simdtex")
+    asked = bpy.context.preferences.addons[__name__].preferences.program
+    found = shutil.which(bpy.path.abspath(asked) if asked else "simdtex")
     if not found:
         raise ValueError("the program simdtex was not found: install it, or give its path in the add-on's preferences")
     return found
@@ -91,9 +91,8 @@ class Maps:
     """
 
     def __init__(self, context):
-        thing = context.object
-        material = thing.active_material if thing and thing.active_material and thing.active_material.use_nodes else None
-        nodes = list(textures(material.node_tree)) if material else []
+        material = context.object.active_material if context.object else None
+        nodes = list(textures(material.node_tree)) if material and material.use_nodes else []
         self.material, self.normals = material.name if nodes else None, set()
         if context.area and context.area.type == "IMAGE_EDITOR":
             shown = context.space_data.image
@@ -168,11 +167,11 @@ def spans(corners, width, height):
     heights = [y for _, y in corners]
     for row in range(math.ceil(min(heights) - 0.5), math.ceil(max(heights) - 0.5)):
         middle, cuts = row + 0.5, []
-        for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1]):
+        for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1], strict=True):
             if (y0 <= middle) != (y1 <= middle):
                 cuts.append(x0 + (middle - y0) / (y1 - y0) * (x1 - x0))
         cuts.sort()
-        for left, right in zip(cuts[::2], cuts[1::2]):
+        for left, right in zip(cuts[::2], cuts[1::2], strict=True):
             yield row, math.ceil(left - 0.5), math.ceil(right - 0.5)
 
 
@@ -250,8 +249,9 @@ class Run:
     def finish(self):
         """Put what the run made, packed into the file, in the place of the maps; return what it said."""
         try:
+            failed = self.process.wait()
             said = self.said.read_text("utf-8", "replace").strip()
-            if self.process.wait():
+            if failed:
                 raise ValueError(said.rpartition("Error: ")[2] or "simdtex failed")
             made = {}
             for name, path in self.files.items():
@@ -267,7 +267,7 @@ class Run:
                 new.filepath_raw = f"//textures/{new.name}{path.suffix}"  # where Blender would unpack it
                 made[name] = new
             self.maps.put(made)
-            return said.splitlines()[-1] if said else ""
+            return f"{', '.join(made)}: {said.splitlines()[-1].partition(': ')[2]}"
         finally:
             shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -275,7 +275,7 @@ class Run:
 class Operation:
     """What the three operators share: a run beside Blender that Esc cancels, or one that a script waits for."""
 
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads it)
     run, done = None, 0.0  # one at a time
 
     @classmethod
