@@ -368,7 +368,7 @@ class Panel:
         except ValueError as error:
             layout.label(text=str(error), icon="INFO")
             return
-        what = f"{maps.material}: {len(maps.images)} maps, led by {maps.images[0]}" if maps.material else maps.images[0]
+        what = f"{maps.material}, {len(maps.images)} maps" if maps.material else maps.images[0]
         layout.label(text=what, icon="MATERIAL" if maps.material else "IMAGE_DATA")
         layout.prop(settings, "seed")
         layout.prop(settings, "more")

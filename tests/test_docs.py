@@ -197,7 +197,7 @@ def test_example_runs(any_device, example, tmp_path, monkeypatch, capsys):
 
 SCRIPTS = [
     *sorted((ROOT / "benchmarks").glob("*.py")),
-    *(ROOT / "docs" / f"{n}.py" for n in ("pictures", "screenshots")),
+    *(ROOT / "docs" / f"{n}.py" for n in ("blender_window", "pictures", "screenshots")),
 ]
 
 
