@@ -30,10 +30,10 @@ sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
+    "ignore_pattern": "volume_of_a_reservoir",  # docs/readers/geoscience.rst shows it
     "run_stale_examples": True,
-    "image_scrapers": ("pictures.written",),
+    "image_scrapers": ("pictures.named",),
     "reset_modules": (),
-    "notebook_extensions": set(),  # the scripts read a command line, which a notebook has not
     "download_all_examples": False,
     "write_computation_times": False,
     "show_signature": False,

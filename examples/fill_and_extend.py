@@ -3,48 +3,34 @@
 Filling holes and extending a picture
 =====================================
 
-Fill holes in a picture of gravel, extend it to the right, and make it seamless:
-``python fill_and_extend.py [FOLDER] [--size 256]``.
-
-The given pixels do not change; only the missing ones are synthesised.
+Fill holes in a picture, and extend it to the right. The given pixels do not change.
 """
 
-import argparse
-import tempfile
-from pathlib import Path
-
+import matplotlib.pyplot as plt
 import numpy as np
 from skimage import data, draw
 
 import simdtex
-from simdtex.io.image import write
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
-parser.add_argument("--size", type=int, default=256, help="side of the picture")
-args = parser.parse_args()
-folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
-folder.mkdir(exist_ok=True)
+picture = data.immunohistochemistry()[300:460, 40:200]
+hole = np.zeros(picture.shape[:2], bool)
+hole[draw.ellipse(55, 55, 20, 32)] = True
+hole[draw.line(90, 90, 150, 155)] = True
 
-gravel, side = data.gravel()[: args.size, : args.size], args.size
-hole = np.zeros(gravel.shape, bool)
-hole[draw.ellipse(side // 3, side // 3, side // 8, side // 5)] = True
-hole[draw.line(side // 2, side // 2, side - 9, side - 2)] = True
+filled = simdtex.fill(picture, hole, rng=1, channel_axis=-1)
+wider = simdtex.extend(picture, right=80, rng=1, channel_axis=-1)
+assert (filled[~hole] == picture[~hole]).all()
+assert (wider[:, :160] == picture).all()
 
-filled = simdtex.fill(gravel, hole, rng=1)
-assert (filled[~hole] == gravel[~hole]).all()
-wider = simdtex.extend(gravel, right=side // 2, rng=1)
-assert (wider[:, :side] == gravel).all()
-tile = simdtex.extend(gravel, seamless=True, rng=1)
-for label, picture in (("before", gravel), ("after", tile)):
-    print(f"seam {label}: {simdtex.quality.seam(picture):.2f} times as strong as the steps between neighbour pixels")
+shown = np.where(hole[..., None], 255, picture).astype(np.uint8)
+figure = simdtex.show(shown, filled, wider, titles=["holes", "filled", "80 pixels wider"])
 
-write(folder / "filled.png", filled)
-write(folder / "wider.png", wider)
-write(folder / "tile.png", tile)
-shown = np.where(hole, 255, gravel).astype(np.uint8)
-sheet = simdtex.show(shown, filled, wider, titles=["holes", "filled", "continued to the right"])
-sheet.savefig(folder / "sheet.png")
-sheet = simdtex.show(gravel, tile, titles=["as it is, 3 x 3", "seamless, 3 x 3"], tiled=True)
-sheet.savefig(folder / "tile-sheet.png")
-print(f"filled.png, wider.png, tile.png and two sheets are in {folder}")
+# %%
+# `simdtex.extend` with ``seamless`` replaces a band along the edges, so that the picture tiles. The figure ``seam`` is
+# the step across the seam as a multiple of the steps between neighbouring pixels.
+
+tile = simdtex.extend(picture, seamless=True, rng=1, channel_axis=-1)
+for label, one in (("before", picture), ("after", tile)):
+    print(f"seam {label}: {simdtex.quality.seam(one):.2f}")
+figure = simdtex.show(picture, tile, titles=["as it is, 3 x 3", "seamless, 3 x 3"], tiled=True)
+plt.show()

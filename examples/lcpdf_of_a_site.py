@@ -3,45 +3,32 @@
 LCPDF of a site
 ===============
 
-Compute the probability of each pixel of a picture given its neighbours:
-``python lcpdf_of_a_site.py [FOLDER] [--size 128]``.
-
-Half of the picture is grass, like the sample, and half is gravel. Pixels of grass tend to be more likely. surprise.png
-shows -log P of every pixel: dark pixels are likely.
+Compute the probability of each pixel given its neighbours, equation (8). Half of the picture is brick, like the sample,
+and half is grass. The map shows -log P of every pixel: pixels of brick are more likely.
 """
 
-import argparse
-import tempfile
-from pathlib import Path
-
+import matplotlib.pyplot as plt
 import numpy as np
 from skimage import data
 
 import simdtex
-from simdtex.io.image import write
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
-parser.add_argument("--size", type=int, default=128, help="side of the picture and of the sample")
-args = parser.parse_args()
-folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
-folder.mkdir(exist_ok=True)
-
-size = args.size
-sample = data.grass()[:size, :size] // 16  # 16 grey levels
-picture = np.hstack([data.grass()[-size:, : size // 2], data.gravel()[:size, : size - size // 2]]) // 16
-
-row, col = size // 2, size // 4
-site = simdtex.lcpdf(picture, sample, [(row, col)], order=8, greys=16)[0]
-print(f"site ({row}, {col}) is {picture[row, col]}; its LCPDF over the 16 levels:")
-print(" ".join(f"{p:.3f}" for p in site))
+sample = data.brick()[:128, :128] // 16  # 16 grey levels
+picture = np.hstack([data.brick()[-128:, -64:], data.grass()[:128, :64]]) // 16
 
 sites = np.argwhere(np.ones(picture.shape, bool))
 table = simdtex.lcpdf(picture, sample, sites, order=8, greys=16, boundary="open")
 likely = table[np.arange(len(sites)), picture.ravel()].reshape(picture.shape)
 surprise = -np.log(np.maximum(likely, 1e-6))
-print(f"mean surprise: grass {surprise[:, : size // 2].mean():.2f}, gravel {surprise[:, size // 2 :].mean():.2f}")
+print(f"mean surprise: brick {surprise[:, :64].mean():.2f}, grass {surprise[:, 64:].mean():.2f}")
 
-write(folder / "picture.png", (picture * 17).astype(np.uint8))
-write(folder / "surprise.png", np.round(surprise / surprise.max() * 255).astype(np.uint8))
-print(f"picture.png and surprise.png are in {folder}")
+figure, (left, middle, right) = plt.subplots(1, 3, figsize=(11, 3.4), layout="constrained")
+left.imshow(picture, "gray")
+left.set_title("brick and grass")
+figure.colorbar(middle.imshow(surprise, "viridis"), ax=middle, label="-log P")
+middle.set_title("surprise")
+for row, col in ((64, 32), (64, 96)):
+    right.step(np.arange(16), table[128 * row + col], where="mid", label=f"site ({row}, {col}): {picture[row, col]}")
+right.set(title="LCPDF of two sites", xlabel="grey level", ylabel="probability")
+right.legend()
+plt.show()

@@ -3,42 +3,33 @@
 Levels, sweeps and temperature
 ==============================
 
-Save the picture and the temperatures after every sweep of a run:
-``python stages_and_temperature.py [FOLDER] [--size 256]``.
+A callback keeps the picture and the temperatures after some sweeps. Neighbours with temperature 1 do not count in
+equation (12), those with 0 fully. The coarsest level decides the arrangement, and the finer ones add detail.
 """
 
-import argparse
-import tempfile
-from pathlib import Path
-
+import matplotlib.pyplot as plt
 from skimage import data
 
 import simdtex
-from simdtex.io.image import read
-from simdtex.report.sheet import StageWriter, contact_sheet
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
-parser.add_argument("--size", type=int, default=256, help="side of the texture, twice that of the sample")
-args = parser.parse_args()
-folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
-folder.mkdir(exist_ok=True)
-
-writer = StageWriter(folder / "stages")  # pictures and temperatures of every sweep
+stages = {}
 
 
-def watch(progress: simdtex.Progress) -> None:
-    writer(progress)
-    if progress.stage:
-        hot = progress.temperature().max()
-        print(f"level {progress.level}, sweep {progress.sweep:2} ({progress.phase}): hottest site {hot:.3f}")
+def watch(progress):
+    if progress.stage and progress.sweep in (1, 4):
+        stages[f"level {progress.level}, sweep {progress.sweep}"] = progress.image(), progress.temperature()
 
 
-sample = data.grass()[: args.size // 2, : args.size // 2]
-texture, output = simdtex.synthesize(sample, (args.size, args.size), order=8, rng=1, callback=watch, full_output=True)
-
+sample = data.immunohistochemistry()[150:278, 100:228]
+texture, output = simdtex.synthesize(sample, (192, 192), rng=1, channel_axis=-1, callback=watch, full_output=True)
 for level in output.statistics["levels"]:
     print(f"level {level['level']}: {level['rows']} x {level['cols']} sites, {level['sweeps']} sweeps")
-last = {path.stem.partition("-")[0]: path for path in sorted((folder / "stages").glob("level*.png"))}  # of each level
-contact_sheet([(level, read(path).pixels) for level, path in reversed(last.items())], folder / "sheet.png")
-print(f"sheet.png and stages are in {folder}")
+
+figure, axes = plt.subplots(2, len(stages), figsize=(2 * len(stages), 4.4), layout="constrained")
+for (title, (picture, temperature)), (above, below) in zip(stages.items(), axes.T, strict=True):
+    above.set_title(title, fontsize=9)
+    above.imshow(picture)
+    drawn = below.imshow(temperature, "inferno", vmin=0, vmax=1)
+    above.set_axis_off(), below.set_axis_off()
+figure.colorbar(drawn, ax=axes[1], label="temperature")
+plt.show()

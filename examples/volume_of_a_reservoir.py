@@ -3,14 +3,11 @@
 Uncertainty of a volume
 =======================
 
-From a training image and three wells to the volume that a well drains: ``python volume_of_a_reservoir.py [FOLDER]
-[--size 48] [--realisations 8]``.
-
-sheet.png has the map of the probability, the vertical proportions beside the training image's, the volume connected to
-a well with P10, P50 and P90, and the standard error of the map, with a line for the signature.
+From a training image and three wells to the volume that a well drains. The sheet has the map of the probability, the
+vertical proportions beside the training image's, the volume connected to a well with P10, P50 and P90, and the standard
+error of the map, with a line for the signature.
 """
 
-import argparse
 import tempfile
 from pathlib import Path
 
@@ -21,16 +18,11 @@ from scipy.ndimage import gaussian_filter
 import simdtex
 from simdtex import ensemble
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
-parser.add_argument("--size", type=int, default=48, help="columns, twice the rows")
-parser.add_argument("--realisations", type=int, default=8)
-args = parser.parse_args()
-folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
-folder.mkdir(exist_ok=True)
+REALISATIONS = 20
+folder = Path(tempfile.mkdtemp(prefix="simdtex-"))
 
 # The training image: bodies of sand in 8 layers of 0.5 m, cells of 25 x 25 m.
-shape, origin, cell = (8, args.size // 2, args.size), (1012.5, 2012.5, -3.75), (25.0, 25.0, 0.5)
+shape, origin, cell = (8, 24, 48), (1012.5, 2012.5, -3.75), (25.0, 25.0, 0.5)
 noise = gaussian_filter(np.random.default_rng(1).standard_normal(shape), (1, 2, 4), mode="wrap")
 training = (noise > np.quantile(noise, 0.7)).astype(np.uint8)
 
@@ -46,7 +38,7 @@ well = origin[0] + cell[0] * (shape[2] // 3), origin[1] + cell[1] * (shape[1] //
 
 wells = folder / "wells.csv"
 given = {"known": wells, "origin": origin, "cell": cell, "categorical": True, "order": 3, "rng": 1}
-maps = simdtex.simulate(training, args.realisations, **given)
+maps = simdtex.simulate(training, REALISATIONS, **given)
 for axis in maps.dims[1:]:
     maps[axis].attrs["units"] = "m"
 
@@ -73,5 +65,5 @@ error.plot.line(ax=four, marker=".")
 four.set(title=f"{float(error[-1]):.2f} after {len(maps)} realisations", ylim=(0, None))
 about = f"simdtex {maps.attrs['version']}, seed {maps.attrs['seed']}, image {maps.attrs['training_image'][:12]}"
 figure.supxlabel(f"{about}      Signed: ____________________", fontsize=9)
-figure.savefig(folder / "sheet.png", dpi=110)
-print(f"P10 {p10:,.0f}, P50 {p50:,.0f}, P90 {p90:,.0f} m³; sheet.png and wells.csv are in {folder}")
+print(f"P10 {p10:,.0f}, P50 {p50:,.0f}, P90 {p90:,.0f} m³; the wells are in {folder}")
+plt.show()
