@@ -8,7 +8,9 @@ name; without names all are written.
 """
 
 import argparse
+import base64
 import io
+import json
 import re
 import runpy
 import sys
@@ -18,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 from skimage import data
-from skimage.transform import downscale_local_mean
+from skimage.transform import downscale_local_mean, resize
 
 import simdtex
 from simdtex.io.image import write
@@ -215,6 +217,26 @@ def research():
                 print(told.getvalue(), end="")
 
 
+def light():
+    """Make a material of 2048 pixels from one of 512; keep both at a quarter of their size for docs/_static/relight.js."""
+    height = resize(gravel(128), (512, 512), order=3, mode="reflect")  # stones of 60 pixels
+    down, right = np.gradient(40 * height)
+    normal = np.stack([-right, -down, np.ones_like(height)], axis=-1) / 2 + 0.5
+    colour = height[..., None] ** 0.5 * (1, 0.85, 0.7)
+    both = [np.round(255 * one.clip(0, 1)).astype(np.uint8) for one in (colour, normal)]
+    more, output = simdtex.synthesize(both[0], (2048, 2048), rng=1, channel_axis=-1, full_output=True)
+    after = [more, apply_source_map(output.source, both[1], height.shape)]
+    maps = []
+    for pictures, copies in ((both, 4), (after, 1)):
+        addresses = []
+        for one in pictures:
+            small = downscale_local_mean(one, (4, 4, 1)).round().astype(np.uint8)
+            PIL.Image.fromarray(small).save(file := io.BytesIO(), "WEBP", quality=75)
+            addresses.append(f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}")
+        maps.append([*addresses, copies])
+    (HERE / "_static" / "material.js").write_text(f"window.material = {json.dumps(maps)};\n", encoding="utf-8")
+
+
 def reservoir():
     """Run the example of a volume, and keep its sheet."""
     made = runpy.run_path(str(HERE.parent / "examples" / "volume_of_a_reservoir.py"))
@@ -229,7 +251,7 @@ WISHES = (
     *(proportions, shares, methods, alpha, paper),
 )
 READERS = (materials, maps, geoscience)
-RUN = {"research": research, "reservoir": reservoir}
+RUN = {"research": research, "reservoir": reservoir, "light": light}
 
 
 def main():
