@@ -218,7 +218,7 @@ def research():
 
 
 def light():
-    """Make a material of 2048 pixels from one of 512; keep both at a quarter of their size for docs/_static/relight.js."""
+    """Make a material of 2048 pixels from one of 512; keep both at a quarter of their size for relight.js."""
     height = resize(gravel(128), (512, 512), order=3, mode="reflect")  # stones of 60 pixels
     down, right = np.gradient(40 * height)
     normal = np.stack([-right, -down, np.ones_like(height)], axis=-1) / 2 + 0.5
