@@ -117,9 +117,9 @@ class Null:
     mean: NDArray[np.float64]
     variance: NDArray[np.float64]
 
-    def distance(self, measures: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return the mean of squared differences of M measures (n,), each relative to its variance."""
-        total = np.zeros(len(measures[0]))
+    def distance(self, measures: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean of squared differences of measures (M, n), each relative to its variance."""
+        total = np.zeros(measures.shape[1])
         for value, mean, variance in zip(measures, self.mean, self.variance, strict=True):
             total += (value - mean) ** 2 / variance
         return total / len(measures)
