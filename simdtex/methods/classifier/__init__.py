@@ -88,9 +88,9 @@ class Options:
         shown=ALL,
     )
     window: float = rejection(
-        10.0,
+        20.0,
         Number(1, 100),
-        "Average distances for the fit over a Gaussian of this standard deviation, within a segment",
+        "Average distances and patterns for the fit over a Gaussian of this standard deviation, within a segment",
         unit="pixels",
         shown=(),
     )

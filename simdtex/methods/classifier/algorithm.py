@@ -18,7 +18,18 @@ from simdtex.checkpoint import like
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.classifier import Options
-from simdtex.methods.classifier.model import UNITS, Model, Null, Region, blurred, learn, prepared, windowed
+from simdtex.methods.classifier.model import (
+    PATTERNS,
+    UNITS,
+    Model,
+    Region,
+    blurred,
+    learn,
+    measured,
+    patterns,
+    prepared,
+    windowed,
+)
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
 from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window
@@ -28,8 +39,11 @@ from simdtex.run import Callback, Observer, Output, Progress
 WORK = 2**32
 """About the number of multiply-adds of a step."""
 
-SITES_AT_ONCE = 2**19
+SITES_AT_ONCE = 2**17
 """The most sites whose fits are computed together."""
+
+SPREAD = 10
+"""Degrees of freedom of the squared difference of a window's measures, which are correlated."""
 
 STEPS = 64
 """The most steps of a sweep, since each takes a pass over the picture."""
@@ -63,10 +77,10 @@ class Plan:
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
         part = min(sites, SITES_AT_ONCE)
-        device = sites * (16 * count + experts * bands) + part * 14 * experts
-        memory.require(
-            machine, device, sites * (count * (2 * experts + 20) + 24 * bands + 64) + part * (10 * experts + 24)
-        )
+        planes = experts + PATTERNS * self.options.levels
+        device = sites * (16 * count + experts * bands) + part * 14 * planes
+        host = sites * (count * (2 * experts + 20) + 24 * bands + 64 + 4 * planes) + part * (24 * planes + 24)
+        memory.require(machine, device, host)
         model = self.classes
         if not isinstance(model, Model):
             model = learn(machine, model, list(self.names.values()), self.options, seed)
@@ -231,17 +245,18 @@ class Run:
     def _fits(self, state: State) -> tuple[NDArray[np.float32], Mask]:
         """Return the fit of each class at each site, (classes, rows, cols), and a mask of sites with a rejected class.
 
-        The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
-        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. Copies of
-        the samples are excluded, since their distance is 0, and fit.
+        The fit is the probability that a texture of the class differs as much from its exemplars and in its patterns,
+        on average over the window within the site's segment. Copies of the samples are excluded, since their distance
+        is 0, and fit.
         """
         from scipy.special import fdtrc, fdtri
 
-        experts, classes, rows, cols = state.logs.shape
+        _, classes, rows, cols = state.logs.shape
         fit = np.zeros((classes, rows, cols), np.float32)
         rejected = np.zeros((rows, cols), bool)
         freedom, size = self.model.freedom, self._size
-        limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
+        patterned = patterns(self.machine, self._levels)
+        limit = fdtri(SPREAD, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
         band, margin = max(1, SITES_AT_ONCE // cols), len(self._taps) // 2 + size // 2
         for first in range(0, rows, band):
             slab, here = slice(max(0, first - margin), first + band + margin), slice(first, first + band)
@@ -252,24 +267,27 @@ class Run:
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
-                segments.append((label, _Segment(own, inner, own & inside)))
+                segment = _Segment(own, inner, own & inside)
+                segments.append((label, segment, self._means(patterned[:, slab], np.zeros_like(own), segment)))
             for c, null in enumerate(self.model.nulls):
                 logs = np.ascontiguousarray(state.logs[:, c, slab])
                 copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
-                for label, segment in segments:
-                    distance, there = self._distance(null, logs, copied, segment), state.labels[here] == label
-                    fit[c, here][there] = fdtrc(experts, freedom, distance)
+                for label, segment, means in segments:
+                    there = state.labels[here] == label
+                    distance = null.distance(measured(self._means(logs, copied, segment), means))
+                    distance[copied[segment.at]] = 0
+                    fit[c, here][there] = fdtrc(SPREAD, freedom, distance)
                     if c == label:
                         rejected[here][there] = distance > limit
         return fit, rejected
 
-    def _distance(self, null: Null, logs: NDArray[np.uint16], copied: Mask, segment: _Segment) -> NDArray[np.float64]:
-        """Return Hotelling's statistic of the tested sites of a segment, 0 where the sample is copied."""
+    def _means(self, planes: NDArray[np.uint16], copied: Mask, segment: _Segment) -> NDArray[np.int64]:
+        """Return the means of planes over the windows of the tested sites of a segment, without copies."""
         own, inner, at = segment
-        means, found = windowed(self.machine, logs, inner & ~copied, self._taps, at)
+        means, found = windowed(self.machine, planes, inner & ~copied, self._taps, at)
         if not (found | copied[at]).all():  # a narrow segment
-            means = np.where(found, means, windowed(self.machine, logs, own & ~copied, self._taps, at)[0])
-        return np.where(copied[at], 0, null.distance(means))
+            means = np.where(found, means, windowed(self.machine, planes, own & ~copied, self._taps, at)[0])
+        return means
 
     def save(self, state: State) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""

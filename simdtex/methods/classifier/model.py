@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isqrt, sqrt
+from math import isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,8 +54,17 @@ RAW = 0.35
 FINER = (1.0, 0.3, 0.09, 0.027, 0.0081)
 """Weights of the evidence of levels, the finest first."""
 
-OWN, DRIFTS, FLOOR = 0.7, 2.0, 0.01
-"""Covariance of a class: the share of its own, the rest is pooled; the factor of the drift; and the least value."""
+OWN, FLOOR = 0.7, 1e-4
+"""Variance of a class: the share of its own, the rest is pooled; and the least value."""
+
+PATTERNS = 10
+"""Binary patterns of a level: uniform ones by the number of greater neighbours, 0 to 8, and all others."""
+
+OCCURRENCE = 2**12
+"""Units in 1 of the share of bands in which a pattern occurs."""
+
+RARE = 0.02
+"""Added to the frequency of a pattern, whose root is compared: the variance of roots hardly depends on the mean."""
 
 
 class Expert(NamedTuple):
@@ -103,21 +112,17 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True)
 class Null:
-    """The differences of a class from its own exemplars: the distribution of mean logarithms over a window.
-
-    ``mean`` (E,), and ``inverse`` (E, E) of the covariance, in logarithms, for E experts.
-    """
+    """The differences of a class from itself: mean and variance (M,) of each of M measures over a window."""
 
     mean: NDArray[np.float64]
-    inverse: NDArray[np.float64]
+    variance: NDArray[np.float64]
 
-    def distance(self, means: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the squared Mahalanobis distance over E of means (E, n) in 1 / (`MEANS` `LOGS`)."""
-        gap = means / float(MEANS * LOGS) - self.mean[:, None]
-        total = np.zeros(gap.shape[1])
-        for i, j in np.ndindex(self.inverse.shape):  # the same order of summation on every machine
-            total += self.inverse[i, j] * gap[i] * gap[j]
-        return total / len(self.mean)
+    def distance(self, measures: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean of squared differences of measures (M, n), each relative to its variance."""
+        total = np.zeros(measures.shape[1])
+        for value, mean, variance in zip(measures, self.mean, self.variance, strict=True):
+            total += (value - mean) ** 2 / variance
+        return total / len(measures)
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,7 @@ class Model:
     """A trained classifier, without any machine.
 
     ``exemplars``, one for each expert, with all classes, in NumPy; ``offsets`` (classes,) int64, added to the evidence
-    of each class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their covariances; ``own``
+    of each class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their variances; ``own``
     (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the numbers of exemplars.
     """
 
@@ -149,6 +154,31 @@ def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) 
     for level in range(1, levels):
         found.append(machine.put(blurred(planes, gaussian(SMOOTHING[level])).astype(np.uint16)))
     return found
+
+
+def patterns(machine: Machine, levels: Sequence[Array]) -> NDArray[np.uint16]:
+    """Return where each binary pattern of the eight neighbours occurs, (levels x `PATTERNS`, rows, cols).
+
+    A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart. Values are shares of
+    the bands, in 1 / `OCCURRENCE`.
+    """
+    found = []
+    for level, placed in enumerate(levels):
+        values, step = np.asarray(machine.get(placed)), 2**level
+        bands, rows, cols = values.shape
+        padded = np.pad(values, ((0, 0), (step, step), (step, step)), "reflect" if min(rows, cols) > step else "edge")
+        around = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)]  # neighbours in a ring
+        greater = [padded[:, step * y :, step * x :][:, :rows, :cols] >= values for y, x in around]
+        changes = sum((a != b).astype(np.uint8) for a, b in zip(greater, greater[1:] + greater[:1], strict=True))
+        code = np.where(changes <= 2, np.sum(greater, 0, dtype=np.uint8), PATTERNS - 1)
+        found += [(code == one).sum(0, dtype=np.uint16) * (OCCURRENCE // bands) for one in range(PATTERNS)]
+    return np.array(found, np.uint16)
+
+
+def measured(means: NDArray[np.int64], patterned: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the measures of windows, (M, n): mean logarithms (E, n), and roots of the frequencies of patterns."""
+    frequencies = patterned / float(MEANS * OCCURRENCE)
+    return np.concatenate([means / float(MEANS * LOGS), np.sqrt(frequencies + RARE)])
 
 
 def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
@@ -230,12 +260,12 @@ class _Part(NamedTuple):
 class OwnDistances(NamedTuple):
     """The distances of the parts of a class from the rest of it.
 
-    ``mean`` (E,) of the logarithms in natural units; ``windows`` (E, n) int64, mean logarithms over windows; ``parts``
-    (parts, E) float64, the mean of each part.
+    ``mean`` (E,) of the logarithms in natural units; ``windows`` (M, n), the measures of windows; ``parts`` (parts, M),
+    those of each part.
     """
 
     mean: NDArray[np.float64]
-    windows: NDArray[np.int64]
+    windows: NDArray[np.float64]
     parts: NDArray[np.float64]
 
 
@@ -277,12 +307,13 @@ class _Class:
         return np.asarray(machine.get(features(machine, levels[expert.level], placed, offsets, expert.contrast)))
 
     def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> OwnDistances:
-        """Return the distances of the parts of the class from the rest of it, for each expert."""
+        """Return the distances of the parts of the class from the rest of it, for each expert, and their measures."""
         taps = gaussian(options.window)
-        windows, parts = [], []
+        windows, parts, own = [], [], []
         for place, region in enumerate(self.regions):
             logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
             judged = np.zeros(region.sites.shape, bool)
+            patterned = patterns(machine, self._levels[place])
             for sites in _quarters(region.sites):
                 part = _Part(place, sites)
                 shown = np.flatnonzero(_boxed(sites))
@@ -291,10 +322,14 @@ class _Class:
                     values = machine.put(self._features(machine, self._levels[place], expert, shown))
                     logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked([rest]).on(machine)))[0]
                 judged.reshape(-1)[shown] = True
-                parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
-            windows.append(windowed(machine, logs, judged, taps, judged)[0])
-        means = np.concatenate(windows, 1)
-        return OwnDistances(np.array(parts).mean(0), means, np.array(parts))
+                sums = [
+                    MEANS * planes.reshape(len(planes), -1)[:, shown].sum(1, keepdims=True, dtype=np.int64)
+                    for planes in (logs, patterned)
+                ]
+                parts.append(measured(*(one // len(shown) for one in sums))[:, 0])
+                own.append(sums[0][:, 0] / (MEANS * len(shown) * LOGS))
+            windows.append(measured(*(windowed(machine, one, judged, taps, judged)[0] for one in (logs, patterned))))
+        return OwnDistances(np.array(own).mean(0), np.concatenate(windows, 1), np.array(parts))
 
 
 TOO_FEW = 8
@@ -342,41 +377,25 @@ def windowed(
 
 
 def _nulls(selves: Sequence[OwnDistances]) -> tuple[list[Null], int]:
-    """Return the distribution of each class, and the degrees of freedom of their covariances.
+    """Return the distribution of each class, and the degrees of freedom of their variances.
 
-    The covariance is that of the class between windows, shrunk to the mean of all classes, plus the drift between parts
-    of a sample, which is pooled because a class has few parts.
+    The variance is that of the class between windows, with a share of the mean of all classes, plus the drift between
+    parts of a sample, which is pooled because a class has few parts.
     """
-    within = [_covariance(one.windows / float(MEANS * LOGS)) for one in selves]
+    within = [_spread(one.windows)[1] for one in selves]
     pooled: NDArray[np.float64] = np.add.accumulate(within)[-1] / len(within)
     several = [one.parts.T for one in selves if len(one.parts) > 1]
-    drift = sum((_covariance(parts) for parts in several), np.zeros_like(pooled)) / max(1, len(several))
-    least = FLOOR * np.eye(len(pooled))
-    nulls = []
-    for one, own in zip(selves, within, strict=True):
-        mean = one.windows.sum(1) / float(one.windows.shape[1] * MEANS * LOGS)
-        nulls.append(Null(mean, _inverse(OWN * own + (1 - OWN) * pooled + DRIFTS * drift + least)))
+    drift = sum((_spread(parts)[1] for parts in several), np.zeros_like(pooled)) / max(1, len(several))
+    nulls = [
+        Null(_spread(one.windows)[0], OWN * own + (1 - OWN) * pooled + drift + FLOOR)
+        for one, own in zip(selves, within, strict=True)
+    ]
     return nulls, max(1, sum(parts.shape[1] - 1 for parts in several))
 
 
-def _covariance(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the covariance of values (E, n), with the same order of summation on every machine."""
-    gap = values - np.array([np.add.accumulate(line)[-1] for line in values])[:, None] / values.shape[1]
-    products = [[np.add.accumulate(a * b)[-1] for a in gap] for b in gap]
-    return np.asarray(np.array(products) / max(1, values.shape[1] - 1))
-
-
-def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse of a symmetric positive definite matrix by Cholesky, with the same bits on every machine."""
-    n = len(matrix)
-    lower = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            rest = matrix[i, j] - sum(float(lower[i, k] * lower[j, k]) for k in range(j))
-            lower[i, j] = sqrt(rest) if i == j else rest / lower[j, j]
-    inverted = np.zeros((n, n))
-    for column in range(n):
-        for i in range(column, n):
-            rest = float(i == column) - sum(float(lower[i, k] * inverted[k, column]) for k in range(column, i))
-            inverted[i, column] = rest / lower[i, i]
-    return np.array([[sum(float(a * b) for a, b in zip(p, q, strict=True)) for q in inverted.T] for p in inverted.T])
+def _spread(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean and the variance of values (M, n), with the same order of summation on every machine."""
+    n = values.shape[1]
+    mean = np.array([np.add.accumulate(line)[-1] for line in values]) / n
+    squares = np.array([np.add.accumulate((line - m) ** 2)[-1] for line, m in zip(values, mean, strict=True)])
+    return mean, squares / max(1, n - 1)
