@@ -103,11 +103,13 @@ class State(NamedTuple):
 
 
 class _Segment(NamedTuple):
-    """The sites of a label in a strip of the picture.
+    """The sites of a label in a strip of the picture, cut to the part that their windows reach.
 
-    ``own``: all of them; ``inner``: those whose neighbours have the label, too; ``at``: those whose fit is computed.
+    ``part``: its rows and columns; ``own``: all of the sites; ``inner``: those whose neighbours have the label, too;
+    ``at``: those whose fit is computed.
     """
 
+    part: tuple[slice, ...]
     own: Mask
     inner: Mask
     at: Mask
@@ -257,7 +259,8 @@ class Run:
         freedom, size = self.model.freedom, self._size
         patterned = patterns(self.machine, self._levels)
         limit = fdtri(SPREAD, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
-        band, margin = max(1, SITES_AT_ONCE // cols), len(self._taps) // 2 + size // 2
+        reach = len(self._taps) // 2
+        band, margin = max(1, SITES_AT_ONCE // cols), reach + size // 2
         for first in range(0, rows, band):
             slab, here = slice(max(0, first - margin), first + band + margin), slice(first, first + band)
             labels = state.labels[slab]
@@ -267,15 +270,17 @@ class Run:
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
-                segment = _Segment(own, inner, own & inside)
+                (box,) = ndimage.find_objects(own.astype(np.int8))
+                part = tuple(slice(max(0, side.start - reach), side.stop + reach) for side in box)
+                segment = _Segment(part, *(mask[part] for mask in (own, inner, own & inside)))
                 segments.append((label, segment, self._means(patterned[:, slab], np.zeros_like(own), segment)))
             for c, null in enumerate(self.model.nulls):
-                logs = np.ascontiguousarray(state.logs[:, c, slab])
+                logs = state.logs[:, c, slab]
                 copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
                 for label, segment, means in segments:
                     there = state.labels[here] == label
                     distance = null.distance(measured(self._means(logs, copied, segment), means))
-                    distance[copied[segment.at]] = 0
+                    distance[copied[segment.part][segment.at]] = 0
                     fit[c, here][there] = fdtrc(SPREAD, freedom, distance)
                     if c == label:
                         rejected[here][there] = distance > limit
@@ -283,7 +288,8 @@ class Run:
 
     def _means(self, planes: NDArray[np.uint16], copied: Mask, segment: _Segment) -> NDArray[np.int64]:
         """Return the means of planes over the windows of the tested sites of a segment, without copies."""
-        own, inner, at = segment
+        part, own, inner, at = segment
+        planes, copied = np.ascontiguousarray(planes[:, *part]), copied[part]
         means, found = windowed(self.machine, planes, inner & ~copied, self._taps, at)
         if not (found | copied[at]).all():  # a narrow segment
             means = np.where(found, means, windowed(self.machine, planes, own & ~copied, self._taps, at)[0])
