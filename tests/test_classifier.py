@@ -165,6 +165,9 @@ def test_the_largest_sums_fit_32_bits(machine):
     for m in (REFERENCE, machine):
         assert (run_window(m, labels, [0], taps, values) == (2**13 - 1) * TAPS**2).all()
         assert (run_window(m, labels, [0], taps) == TAPS**2).all()
+    draw = np.random.default_rng(1)  # columns of a vector, and those that are left
+    case = draw.integers(0, 2, (9, 40)), [0, 1], taps, draw.integers(0, 2**13, (2, 9, 40))
+    assert np.array_equal(run_window(machine, *case), run_window(REFERENCE, *case))
 
 
 @pytest.mark.parametrize("sd", [0.5, 0.8, 1.8, 8.0, 10.0, 33.3, 100.0])

@@ -144,15 +144,16 @@ def window(machine: Launcher | None, labels: Array, owner: Array, taps: Array, v
         return here
     counted = machine.empty((planes, rows, cols + 2 * reach), np.uint32)
     along, sums = (machine.empty((planes, rows, cols), np.uint32) for _ in range(2))
-    defines = {"COUNT": 1} if values is None else {}
     machine.launch(
         "window_counted",
         (cols + 2 * reach, planes * rows),
         *(labels, rows, cols, owner, planes, labels if values is None else values, reach, counted),
-        defines=defines,
+        defines={"COUNT": 1} if values is None else {},
     )
+    wide = {"V": machine.vector}
+    size = -(-cols // machine.vector), planes * rows
     for name, before, after in (("window_rows", counted, along), ("window_cols", along, sums)):
-        machine.launch(name, (cols, planes * rows), before, rows, cols, planes, taps, reach, after, defines=defines)
+        machine.launch(name, size, before, rows, cols, planes, taps, reach, after, defines=wide)
     return sums
 
 
