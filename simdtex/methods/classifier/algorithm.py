@@ -42,8 +42,8 @@ WORK = 2**32
 SITES_AT_ONCE = 2**17
 """The most sites whose fits are computed together."""
 
-SPREAD = 10
-"""Degrees of freedom of the squared difference of a window's measures, which are correlated."""
+SPREAD = 4
+"""Degrees of freedom of the squared difference of a window's measures, which are correlated: docs/classification.rst."""
 
 STEPS = 64
 """The most steps of a sweep, since each takes a pass over the picture."""
