@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sets of corner tiles: `tileset`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random
+from simdtex.checkpoint import Checkpointing
+from simdtex.driver import drive, with_channels_last
+from simdtex.inputs import Tileset
+from simdtex.jobs.inputs import Inputs, Work, public, with_light
+from simdtex.machine import Machine
+from simdtex.methods import mrf
+from simdtex.methods.mrf.options import Options
+from simdtex.model.corners import CYCLE, TORUS, corners_of, torus
+from simdtex.model.given import Given
+from simdtex.model.lattice import neighbourhood_offsets, sums_around
+from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import Lattice, Phases, parse_lattice, phases, plain
+from simdtex.options import resolve, whole, within_32_bits
+from simdtex.run import Callback, Output, OutputWithSource, Progress
+
+USUAL = 4
+"""A colour is one of the positions whose mean differs least from the sample's, one of so many: none stands out."""
+
+FREE = 0.25
+"""Share of a side, on each side of its middle, in which either of the textures of its two corners may be."""
+
+
+@public("tileset", without="boundary")
+def tileset(call: Tileset) -> Work:
+    """Return a set of corner tiles, from which planes of any size are laid without a period.
+
+    A tile has four coloured corners, and tiles fit wherever the colours of their corners agree. The set has one tile for
+    each combination of colours: 16 for two colours, 81 for three. A plane gets its variety from random corners.
+
+    Returns
+    -------
+    image : array of the sample's type
+        The set, packed into a torus of 4 x 4 or 9 x 9 tiles that fit their neighbours, also across the borders of the
+        picture. `simdtex.model.corners.plane` lays planes of it.
+    output : simdtex.run.OutputWithSource
+        Only with ``full_output=True``; ``source`` is in pixels of the sample. ``statistics["corners"]`` has the colour
+        of the top left corner of each tile.
+
+    Notes
+    -----
+    Around each corner of a colour is one piece of the sample. Two runs make the borders between the corners, and a
+    third all tiles together, with the borders as known pixels that have a source. The lattice of a regular sample has
+    the same phase at all corners. Cost: that of `simdtex.synthesize` for 24 tiles, or for 99 with three colours.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> tiles = simdtex.tileset(data.gravel()[:64, :64], 32, order=2, rng=1)
+    >>> tiles.shape
+    (128, 128)
+    """
+    several = len(call.sample.pixels)
+    colours = call.colours = call.colours or max(2, several)
+    if colours not in TORUS or several not in (1, colours):
+        counts = f"{colours} colours and {several} sample{'s' * (several > 1)}"
+        raise ValueError(f"a set has 2 or 3 colours, of one sample or each of one sample, and not {counts}; give such")
+    options = with_channels_last(call.options, call.channel_axis)
+    if "boundary" in options:
+        raise ValueError("tiles are made on a torus; leave boundary out")
+    chosen = resolve(Options, "tileset", options)
+    pictures, light = with_light(call.sample, call.light, chosen.categorical)
+    call.inputs = Inputs(call.sample)
+    tiles: Any = Tiles(pictures, call.size, colours, replace(chosen, labels=True))
+    return Work(tiles, chosen, call.channel_axis, light=light)
+
+
+class Canvas(NamedTuple):
+    """Pixels (rows, cols, C) on a torus, and their positions in the sample (rows, cols, 2 or 3), -1 where unknown."""
+
+    values: NDArray[Any]
+    place: NDArray[np.int32]
+
+    def cut(self, row: int, col: int, rows: int, cols: int) -> Canvas:
+        """Return a part, which may wrap around."""
+        at = np.ix_(np.arange(row, row + rows) % len(self.place), np.arange(col, col + cols) % self.place.shape[1])
+        return Canvas(self.values[at], self.place[at])
+
+    def paste(self, row: int, col: int, part: Canvas) -> None:
+        """Set a part, which may wrap around."""
+        rows, cols = part.place.shape[:2]
+        at = np.ix_(np.arange(row, row + rows) % len(self.place), np.arange(col, col + cols) % self.place.shape[1])
+        self.values[at], self.place[at] = part
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """The job of `tileset`: three runs, which make the horizontal borders, the vertical ones, and all tiles.
+
+    ``tile`` are the rows and columns of a tile. ``narrow`` and ``wide`` are the pixels on each side of a border, and on
+    each side of a corner, that are the same in all tiles.
+    """
+
+    pictures: Pictures
+    tile: tuple[int, int]
+    colours: int
+    options: Options
+
+    @property
+    def narrow(self) -> int:
+        """Half of the width of a border."""
+        return max(2, min(self.tile) // 16)
+
+    @property
+    def wide(self) -> int:
+        """Half of the side of the square around a corner."""
+        return 2 * self.narrow
+
+    def __call__(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Make the borders and then the tiles; the state is the finished runs, and the state of the current one."""
+        cycle = np.array([[int(letter) for letter in CYCLE[self.colours]]])
+        jobs = {"borders from left to right": cycle, "borders from top to bottom": cycle.T, "tiles": torus(self.colours)}
+        regular, (rows, cols) = self.regular(), self.tile
+        pieces = self.pieces(regular and regular.pictures, seed)
+        finished, inside = checkpointing.found or ([], None)
+        finished = [(Canvas(*made), about) for made, about in finished]
+        areas = np.cumsum([0, *(grid.size for grid in jobs.values())]) / sum(grid.size for grid in jobs.values())
+        for number, (job, grid) in enumerate(jobs.items()):
+            if number < len(finished):
+                continue
+            canvas = self.blank((grid.shape[0] * rows, grid.shape[1] * cols))
+            if finished and number == 2:
+                self.draw_borders(canvas, grid, cycle[0].tolist(), *(made for made, _ in finished))
+            for (row, col), colour in np.ndenumerate(grid):
+                canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
+            plan = self.plan(canvas, grid)
+            part = partial(_part, begin=areas[number], share=areas[number + 1] - areas[number], job=job)
+            now = Checkpointing(
+                inside, lambda info, tree: checkpointing.offer(info, lambda: ([*map(tuple, finished)], tree()))
+            )
+            made, output = drive(plan, machine, seed, callback and (lambda progress: callback(part(progress))), now)
+            finished.append((Canvas(made, output.source), output.statistics | {"job": job}))
+            inside = None
+            if number < 2:
+                checkpointing.offer(None, lambda: ([*map(tuple, finished)], None))
+        runs = [about for _, about in finished]
+        seconds = [run["device_seconds"] for run in runs]
+        statistics = runs[-1] | {"runs": runs, "seconds": sum(run["seconds"] for run in runs)}
+        statistics["device_seconds"] = None if None in seconds else sum(seconds)
+        statistics |= {"corners": torus(self.colours).tolist(), "lattice": regular and regular.statistics(self.tile)}
+        return made, OutputWithSource(output.source, output.temperature, output.stages, statistics)
+
+    def blank(self, shape: tuple[int, int]) -> Canvas:
+        """Return a torus of unknown pixels."""
+        pixels = self.pictures.pixels
+        values = np.zeros((*shape, pixels[0].shape[-1]), pixels[0].dtype)
+        return Canvas(values, np.full((*shape, 2 if len(pixels) == 1 else 3), -1, np.int32))
+
+    def regular(self) -> Phases | None:
+        """Return the lattice of the sample, and as it is deformed to repeat after a tile; None without one."""
+        options = self.options.resolved(self.options.of(self.pictures))
+        lattice = parse_lattice(options.lattice)
+        return None if lattice is None else phases(self.pictures, self.tile, True, lattice)
+
+    def pieces(self, lattices: tuple[Lattice, ...] | None, seed: int) -> list[Canvas]:
+        """Return the piece of the sample around a corner of each colour, without unknown pixels.
+
+        Pieces of one sample do not overlap, if it has room. On a lattice all have the phase of the first.
+        """
+        planes, masks = plain(self.pictures)
+        several, reach, found = len(planes) > 1, self.wide, []
+        turn: Any = None
+        for colour in range(self.colours):
+            number = colour if several else 0
+            known = sums_around(~masks[number], reach) == 0
+            known[:reach] = known[len(known) - reach + 1 :] = False
+            known[:, :reach] = known[:, known.shape[1] - reach + 1 :] = False
+            if lattices and turn is not None:
+                apart = np.stack(lattices[number].phases(*np.indices(known.shape)), -1) - turn
+                away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
+                known &= away <= max(1, away[known].min(initial=np.inf))
+            if not several:
+                for row, col in found:
+                    clear = np.ones(known.shape, bool)
+                    clear[max(0, row - 2 * reach + 1) : row + 2 * reach, max(0, col - 2 * reach + 1) : col + 2 * reach] = 0
+                    known = known & clear if (known & clear).any() else known
+            if not known.any():
+                raise ValueError(
+                    f"a corner needs {2 * reach}x{2 * reach} known pixels of the sample, which it has nowhere; give a "
+                    "smaller size or a larger sample"
+                )
+            off = abs(sums_around(planes[number], reach) - round(float(planes[number].mean()) * (2 * reach + 1) ** 2))
+            places = np.argwhere(known)
+            usual = places[np.argsort(off[known], kind="stable")[: -(-len(places) // USUAL)]]
+            bits = random.draw4(seed, 0, 0, np.array([colour]), random.START)
+            row, col = usual[int(random.below(bits[0], bits[1], len(usual))[0])].tolist()
+            if lattices and turn is None:
+                turn = lattices[number].phases(row, col)
+            found.append((row, col))
+        pieces = []
+        for colour, (row, col) in enumerate(found):
+            number = colour if several else 0
+            at = np.moveaxis(np.mgrid[row - reach : row + reach, col - reach : col + reach], 0, -1)
+            place = np.concatenate([at, np.full((*at.shape[:2], 1), number)], -1)[..., : 3 if several else 2]
+            pieces.append(Canvas(self.pictures.pixels[number][at[..., 0], at[..., 1]], place.astype(np.int32)))
+        return pieces
+
+    def draw_borders(self, canvas: Canvas, grid: NDArray[np.intp], cycle: list[int], across: Canvas, down: Canvas) -> None:
+        """Set the borders of all tiles of a grid of corners from those of the cycle of colours."""
+        (rows, cols), half = self.tile, self.narrow
+        pairs = {pair: number for number, pair in enumerate(zip(cycle, [*cycle[1:], cycle[0]], strict=True))}
+        for row, col in np.ndindex(*grid.shape):
+            here, right, below, _ = corners_of(grid)[row, col].tolist()
+            strip = across.cut(-half, pairs[here, right] * cols, 2 * half, cols)
+            canvas.paste(row * rows - half, col * cols, strip)
+            strip = down.cut(pairs[here, below] * rows, -half, rows, 2 * half)
+            canvas.paste(row * rows, col * cols - half, strip)
+
+    def plan(self, canvas: Canvas, grid: NDArray[np.intp]) -> mrf.Plan:
+        """Return the plan of the run that makes the unknown pixels of tiles with a grid of corners."""
+        known = canvas.place[..., 0] >= 0
+        given = Given(canvas.values, np.repeat(known[..., None], canvas.values.shape[-1], -1), canvas.place)
+        shape, guide = known.shape, None
+        if len(self.pictures.pixels) > 1:
+            samples = tuple(np.full((*one.shape[:2], 1), n) for n, one in enumerate(self.pictures.pixels))
+            guide = samples, self.labels(grid)[..., None]
+        return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile)
+
+    def labels(self, grid: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return the number of the sample of each pixel, which is that of the nearest corner, NaN half way."""
+        (rows, cols), corners = self.tile, corners_of(grid)
+        y, x = (np.arange(n) / n for n in (rows, cols))
+        weights = np.stack([(v[:, None] * h) for v in (1 - y, y) for h in (1 - x, x)])
+        share = np.stack([(corners == colour) for colour in range(self.colours)])
+        shares = np.einsum("kijc,cyx->kiyjx", share.astype(np.float64), weights)
+        shares = np.round(shares, 9).reshape(self.colours, grid.shape[0] * rows, grid.shape[1] * cols)
+        first, second = np.sort(shares, 0)[:-3:-1]
+        return np.where(first - second > 2 * FREE, shares.argmax(0), np.nan)
+
+
+def _part(progress: Progress, begin: float, share: float, job: str) -> Progress:
+    return replace(
+        progress, fraction=begin + share * progress.fraction, details=progress.details | {"job": job}
+    )
