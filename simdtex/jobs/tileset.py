@@ -29,6 +29,9 @@ from simdtex.run import Callback, Output, OutputWithSource, Progress
 USUAL = 4
 """A colour is one of the positions whose mean differs least from the sample's, one of so many: none stands out."""
 
+APART = 8
+"""Pixels by which the square around a corner is wider than borders on each side, so that these fit where they meet."""
+
 FREE = 0.25
 """Share of a side, on each side of its middle, in which either of the textures of its two corners may be."""
 
@@ -112,12 +115,12 @@ class Tiles:
     @property
     def narrow(self) -> int:
         """Half of the width of a border."""
-        return max(2, min(self.tile) // 16)
+        return max(2, min(self.tile) // 10)
 
     @property
     def wide(self) -> int:
         """Half of the side of the square around a corner."""
-        return 2 * self.narrow
+        return self.narrow + min(APART, self.narrow)
 
     def __call__(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
