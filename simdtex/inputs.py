@@ -346,14 +346,13 @@ class Tileset(Common, Lit):
 
     sample: ArrayLike = needed(
         Data(f"{PICTURE}; or a list of such"),
-        doc="The texture. Or a list of two or three of one type, such as grass and sand: each corner has one of them, and "
-        "they meet within the tiles.",
+        doc="The texture, or a list of two or three of one type, such as grass and sand: those of the corners.",
         checker="samples",
         identity="arrays",
     )
     size: int | tuple[int, int] = given(
         Data("int or (int, int)"),
-        doc="Rows and columns of a tile, 16 or more; one number for both. Of a regular texture a multiple of its cells.",
+        doc="Rows and columns of a tile, 16 or more; one number for both. Whole cells of a regular texture should fit.",
         default=256,
         positional=True,
         checker="tile",

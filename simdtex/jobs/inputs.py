@@ -33,9 +33,6 @@ from simdtex.run import Callback, Output, Progress
 SUMS = 1e-3
 """The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
 
-LEAST_TILE = 16
-"""The fewest rows and columns of a tile."""
-
 RAISES = """\
 Raises
 ------
@@ -535,12 +532,6 @@ def _cell(at: NDArray[np.integer]) -> str:
     return ", ".join(f"{name} {n}" for name, n in zip(names, at, strict=True))
 
 
-def check_tile(size: Any) -> tuple[int, int]:
-    """Return the rows and columns of a tile from one number or both."""
-    found = check_sides(size if np.iterable(size) else (size, size), ("rows", "columns"), LEAST_TILE)
-    return found[0], found[1]
-
-
 def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
     """Return the inputs of a simulation without the cells where the region is False, which take no part."""
     inside = check_mask(region, shape, "region", "the output")
@@ -608,7 +599,7 @@ CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
     "picture with gaps": lambda name, value, call: check_picture(value, call.channel_axis),
     "hole": lambda name, value, call: check_mask(value, call.image[0].shape[:2]),
     "rows and columns": lambda name, value, call: check_shape(value),
-    "tile": lambda name, value, call: check_tile(value),
+    "tile": lambda name, value, call: check_shape(value if np.ndim(value) else (value, value), 16),
     "block": lambda name, value, call: check_sides(value, ("depth", "rows", "columns")),
     "data": lambda name, value, call: as_known(value, name, call.sample if name == "known" else None),
 }

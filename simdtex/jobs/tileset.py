@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from simdtex import random
 from simdtex.checkpoint import Checkpointing
@@ -20,10 +22,10 @@ from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.corners import CYCLE, TORUS, corners_of, torus
 from simdtex.model.given import Given
-from simdtex.model.lattice import neighbourhood_offsets, sums_around
+from simdtex.model.lattice import sums_around
 from simdtex.model.pictures import Pictures
-from simdtex.model.regularity import Lattice, Phases, parse_lattice, phases, plain
-from simdtex.options import resolve, whole, within_32_bits
+from simdtex.model.regularity import Lattice, Phases, parse_lattice, phases, plain, regular
+from simdtex.options import DataWarning, resolve
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 USUAL = 4
@@ -40,8 +42,8 @@ FREE = 0.25
 def tileset(call: Tileset) -> Work:
     """Return a set of corner tiles, from which planes of any size are laid without a period.
 
-    A tile has four coloured corners, and tiles fit wherever the colours of their corners agree. The set has one tile for
-    each combination of colours: 16 for two colours, 81 for three. A plane gets its variety from random corners.
+    Tiles fit wherever the colours of their four corners agree. The set has one tile for each combination of colours, 16
+    for two colours and 81 for three, so that corners of a plane may be coloured at random.
 
     Returns
     -------
@@ -77,7 +79,8 @@ def tileset(call: Tileset) -> Work:
     chosen = resolve(Options, "tileset", options)
     pictures, light = with_light(call.sample, call.light, chosen.categorical)
     call.inputs = Inputs(call.sample)
-    tiles: Any = Tiles(pictures, call.size, colours, replace(chosen, labels=True))
+    size: Any = call.size
+    tiles: Any = Tiles(pictures, size, colours, replace(chosen, labels=True))
     return Work(tiles, chosen, call.channel_axis, light=light)
 
 
@@ -87,15 +90,18 @@ class Canvas(NamedTuple):
     values: NDArray[Any]
     place: NDArray[np.int32]
 
-    def cut(self, row: int, col: int, rows: int, cols: int) -> Canvas:
-        """Return a part, which may wrap around."""
-        at = np.ix_(np.arange(row, row + rows) % len(self.place), np.arange(col, col + cols) % self.place.shape[1])
-        return Canvas(self.values[at], self.place[at])
+    def at(self, row: int, col: int, rows: int, cols: int) -> Any:
+        """Return the indices of a part, which may wrap around."""
+        height, width = self.place.shape[:2]
+        return np.ix_(np.arange(row, row + rows) % height, np.arange(col, col + cols) % width)
+
+    def cut(self, *part: int) -> Canvas:
+        """Return the part from a row and a column on, of so many rows and columns."""
+        return Canvas(self.values[self.at(*part)], self.place[self.at(*part)])
 
     def paste(self, row: int, col: int, part: Canvas) -> None:
-        """Set a part, which may wrap around."""
-        rows, cols = part.place.shape[:2]
-        at = np.ix_(np.arange(row, row + rows) % len(self.place), np.arange(col, col + cols) % self.place.shape[1])
+        """Set a part."""
+        at = self.at(row, col, *part.place.shape[:2])
         self.values[at], self.place[at] = part
 
 
@@ -103,8 +109,7 @@ class Canvas(NamedTuple):
 class Tiles:
     """The job of `tileset`: three runs, which make the horizontal borders, the vertical ones, and all tiles.
 
-    ``tile`` are the rows and columns of a tile. ``narrow`` and ``wide`` are the pixels on each side of a border, and on
-    each side of a corner, that are the same in all tiles.
+    ``tile`` are the rows and columns of a tile.
     """
 
     pictures: Pictures
@@ -114,48 +119,46 @@ class Tiles:
 
     @property
     def narrow(self) -> int:
-        """Half of the width of a border."""
+        """Pixels on each side of a border that are the same in all tiles with it."""
         return max(2, min(self.tile) // 10)
 
     @property
     def wide(self) -> int:
-        """Half of the side of the square around a corner."""
+        """Pixels on each side of a corner, in rows and in columns, that are the same in all tiles with it."""
         return self.narrow + min(APART, self.narrow)
 
     def __call__(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Make the borders and then the tiles; the state is the finished runs, and the state of the current one."""
+        (rows, cols), regular = self.tile, self.regular()
+        pieces, packed = self.pieces(regular and regular.pictures, seed), torus(self.colours)
         cycle = np.array([[int(letter) for letter in CYCLE[self.colours]]])
-        jobs = {"borders from left to right": cycle, "borders from top to bottom": cycle.T, "tiles": torus(self.colours)}
-        regular, (rows, cols) = self.regular(), self.tile
-        pieces = self.pieces(regular and regular.pictures, seed)
-        finished, inside = checkpointing.found or ([], None)
-        finished = [(Canvas(*made), about) for made, about in finished]
-        areas = np.cumsum([0, *(grid.size for grid in jobs.values())]) / sum(grid.size for grid in jobs.values())
+        done, inside = checkpointing.found or ([], None)
+        finished = [(Canvas(*made), about) for made, about in done]
+        jobs = {"borders from left to right": cycle, "borders from top to bottom": cycle.T, "tiles": packed}
+        begin, every = 0, sum(grid.size for grid in jobs.values())
         for number, (job, grid) in enumerate(jobs.items()):
-            if number < len(finished):
-                continue
-            canvas = self.blank((grid.shape[0] * rows, grid.shape[1] * cols))
-            if finished and number == 2:
-                self.draw_borders(canvas, grid, cycle[0].tolist(), *(made for made, _ in finished))
-            for (row, col), colour in np.ndenumerate(grid):
-                canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
-            plan = self.plan(canvas, grid)
-            part = partial(_part, begin=areas[number], share=areas[number + 1] - areas[number], job=job)
-            now = Checkpointing(
-                inside, lambda info, tree: checkpointing.offer(info, lambda: ([*map(tuple, finished)], tree()))
-            )
-            made, output = drive(plan, machine, seed, callback and (lambda progress: callback(part(progress))), now)
-            finished.append((Canvas(made, output.source), output.statistics | {"job": job}))
-            inside = None
-            if number < 2:
-                checkpointing.offer(None, lambda: ([*map(tuple, finished)], None))
+            if number >= len(finished):
+                canvas = self.blank((grid.shape[0] * rows, grid.shape[1] * cols))
+                if number == 2:
+                    self.draw_borders(canvas, cycle[0].tolist(), *(made for made, _ in finished))
+                for (row, col), colour in np.ndenumerate(grid):
+                    canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
+                seen = callback and partial(_show, callback, job, begin / every, grid.size / every)
+                now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
+                made, output = drive(self.plan(canvas, grid), machine, seed, seen, now)
+                finished.append((Canvas(made, np.asarray(output.source)), output.statistics | {"job": job}))
+                inside = None
+                if number < 2:
+                    checkpointing.offer(None, lambda: (finished, None))
+            begin += grid.size
         runs = [about for _, about in finished]
         seconds = [run["device_seconds"] for run in runs]
         statistics = runs[-1] | {"runs": runs, "seconds": sum(run["seconds"] for run in runs)}
         statistics["device_seconds"] = None if None in seconds else sum(seconds)
-        statistics |= {"corners": torus(self.colours).tolist(), "lattice": regular and regular.statistics(self.tile)}
+        statistics |= {"corners": packed.tolist(), "lattice": regular and regular.statistics(self.tile)}
+        assert output.source is not None
         return made, OutputWithSource(output.source, output.temperature, output.stages, statistics)
 
     def blank(self, shape: tuple[int, int]) -> Canvas:
@@ -165,60 +168,61 @@ class Tiles:
         return Canvas(values, np.full((*shape, 2 if len(pixels) == 1 else 3), -1, np.int32))
 
     def regular(self) -> Phases | None:
-        """Return the lattice of the sample, and as it is deformed to repeat after a tile; None without one."""
+        """Return the lattice of a regular sample, also deformed so that it repeats after a tile, if it can."""
         options = self.options.resolved(self.options.of(self.pictures))
         lattice = parse_lattice(options.lattice)
-        return None if lattice is None else phases(self.pictures, self.tile, True, lattice)
+        found = None if lattice is None else phases(self.pictures, self.tile, True, lattice)
+        planes, masks = plain(self.pictures)
+        if lattice and found is None and (own := regular(planes[0], masks[0])):
+            (rows, cols), size = own.fitting(self.tile), self.tile
+            message = (
+                f"no whole cells of the sample's pattern fit tiles of {size[1]}x{size[0]}; {cols}x{rows} fit better"
+            )
+            warnings.warn(message, DataWarning, stacklevel=2)
+        return found
 
     def pieces(self, lattices: tuple[Lattice, ...] | None, seed: int) -> list[Canvas]:
         """Return the piece of the sample around a corner of each colour, without unknown pixels.
 
-        Pieces of one sample do not overlap, if it has room. On a lattice all have the phase of the first.
+        On a lattice all pieces have one phase. Other pieces of one sample do not overlap, if it has room.
         """
         planes, masks = plain(self.pictures)
-        several, reach, found = len(planes) > 1, self.wide, []
+        reach, pieces, several = self.wide, [], len(planes) > 1
         turn: Any = None
+        taken = np.zeros(masks[0].shape, bool)
         for colour in range(self.colours):
             number = colour if several else 0
-            known = sums_around(~masks[number], reach) == 0
-            known[:reach] = known[len(known) - reach + 1 :] = False
-            known[:, :reach] = known[:, known.shape[1] - reach + 1 :] = False
-            if lattices and turn is not None:
-                apart = np.stack(lattices[number].phases(*np.indices(known.shape)), -1) - turn
+            usable = ndimage.minimum_filter(
+                masks[number], 2 * reach, mode="constant", cval=0
+            )  # from -reach to reach - 1
+            if turn is not None and lattices:
+                apart = np.stack(lattices[number].phases(*np.indices(usable.shape)), -1) - turn
                 away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
-                known &= away <= max(1, away[known].min(initial=np.inf))
-            if not several:
-                for row, col in found:
-                    clear = np.ones(known.shape, bool)
-                    clear[max(0, row - 2 * reach + 1) : row + 2 * reach, max(0, col - 2 * reach + 1) : col + 2 * reach] = 0
-                    known = known & clear if (known & clear).any() else known
-            if not known.any():
+                usable &= away <= max(1, away.min(initial=np.inf, where=usable))
+            elif not several and (usable & ~taken).any():
+                usable &= ~taken
+            if not usable.any():
                 raise ValueError(
-                    f"a corner needs {2 * reach}x{2 * reach} known pixels of the sample, which it has nowhere; give a "
-                    "smaller size or a larger sample"
+                    f"a corner needs {2 * reach}x{2 * reach} known pixels, which the sample has nowhere; give smaller "
+                    "tiles or a larger sample"
                 )
-            off = abs(sums_around(planes[number], reach) - round(float(planes[number].mean()) * (2 * reach + 1) ** 2))
-            places = np.argwhere(known)
-            usual = places[np.argsort(off[known], kind="stable")[: -(-len(places) // USUAL)]]
+            off = np.abs(sums_around(planes[number], reach) - round(planes[number].mean() * (2 * reach + 1) ** 2))
+            places = np.argwhere(usable)[np.argsort(off[usable], kind="stable")[: -(-usable.sum() // USUAL)]]
             bits = random.draw4(seed, 0, 0, np.array([colour]), random.START)
-            row, col = usual[int(random.below(bits[0], bits[1], len(usual))[0])].tolist()
-            if lattices and turn is None:
-                turn = lattices[number].phases(row, col)
-            found.append((row, col))
-        pieces = []
-        for colour, (row, col) in enumerate(found):
-            number = colour if several else 0
-            at = np.moveaxis(np.mgrid[row - reach : row + reach, col - reach : col + reach], 0, -1)
-            place = np.concatenate([at, np.full((*at.shape[:2], 1), number)], -1)[..., : 3 if several else 2]
-            pieces.append(Canvas(self.pictures.pixels[number][at[..., 0], at[..., 1]], place.astype(np.int32)))
+            row, col = places[int(random.below(bits[0], bits[1], len(places))[0])].tolist()
+            taken[max(0, row - 2 * reach) : row + 2 * reach, max(0, col - 2 * reach) : col + 2 * reach] = True
+            turn = lattices[number].phases(row, col) if lattices and turn is None else turn
+            at = np.mgrid[row - reach : row + reach, col - reach : col + reach]
+            place = np.stack([*at, np.full_like(at[0], number)], -1)[..., : 3 if several else 2]
+            pieces.append(Canvas(self.pictures.pixels[number][tuple(at)], place.astype(np.int32)))
         return pieces
 
-    def draw_borders(self, canvas: Canvas, grid: NDArray[np.intp], cycle: list[int], across: Canvas, down: Canvas) -> None:
-        """Set the borders of all tiles of a grid of corners from those of the cycle of colours."""
+    def draw_borders(self, canvas: Canvas, cycle: list[int], across: Canvas, down: Canvas) -> None:
+        """Set the borders of all tiles from those between the colours of a cycle."""
         (rows, cols), half = self.tile, self.narrow
         pairs = {pair: number for number, pair in enumerate(zip(cycle, [*cycle[1:], cycle[0]], strict=True))}
-        for row, col in np.ndindex(*grid.shape):
-            here, right, below, _ = corners_of(grid)[row, col].tolist()
+        for row, col in np.ndindex(self.colours**2, self.colours**2):
+            here, right, below, _ = corners_of(torus(self.colours))[row, col].tolist()
             strip = across.cut(-half, pairs[here, right] * cols, 2 * half, cols)
             canvas.paste(row * rows - half, col * cols, strip)
             strip = down.cut(pairs[here, below] * rows, -half, rows, 2 * half)
@@ -246,7 +250,6 @@ class Tiles:
         return np.where(first - second > 2 * FREE, shares.argmax(0), np.nan)
 
 
-def _part(progress: Progress, begin: float, share: float, job: str) -> Progress:
-    return replace(
-        progress, fraction=begin + share * progress.fraction, details=progress.details | {"job": job}
-    )
+def _show(callback: Callback, job: str, begin: float, share: float, progress: Progress) -> Any:
+    fraction, details = begin + share * progress.fraction, progress.details | {"job": job}
+    return callback(replace(progress, fraction=fraction, details=details))

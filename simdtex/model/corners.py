@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 TORUS = {
-    2: ("0010", "0001", "0111", "1011"),
-    3: ("020012112", "201221022", "001112222", "112112102", "100002211", "200221212", "110001020", "012011020")
-    + ("101020102",),
+    2: "0010,0001,0111,1011",
+    3: "020012112,201221022,001112222,112112102,100002211,200221212,110001020,012011020,101020102",
 }
 """The colours of the corners of the torus, by their number: every window of 2x2 is in it once."""
 
@@ -25,7 +24,7 @@ CYCLE = {2: "0011", 3: "001021122"}
 
 def torus(colours: int) -> NDArray[np.intp]:
     """Return the colours of the top left corners of the tiles in the torus, (colours**2, colours**2)."""
-    return np.array([[int(letter) for letter in line] for line in TORUS[colours]])
+    return np.array([[int(letter) for letter in line] for line in TORUS[colours].split(",")])
 
 
 def corners_of(grid: NDArray[np.intp]) -> NDArray[np.intp]:
