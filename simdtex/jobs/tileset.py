@@ -192,11 +192,9 @@ class Tiles:
         taken = np.zeros(masks[0].shape, bool)
         for colour in range(self.colours):
             number = colour if several else 0
-            usable = ndimage.minimum_filter(
-                masks[number], 2 * reach, mode="constant", cval=0
-            )  # from -reach to reach - 1
+            usable = ndimage.minimum_filter(masks[number], 2 * reach, mode="constant", cval=0)  # of -reach..reach - 1
             if turn is not None and lattices:
-                apart = np.stack(lattices[number].phases(*np.indices(usable.shape)), -1) - turn
+                apart = np.moveaxis(lattices[number].phases(*np.indices(usable.shape)), 0, -1) - turn
                 away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
                 usable &= away <= max(1, away.min(initial=np.inf, where=usable))
             elif not several and (usable & ~taken).any():
