@@ -15,7 +15,7 @@ import simdtex
 from simdtex.cli import main
 from simdtex.io import image, tilesets
 from simdtex.jobs.tileset import Tiles
-from simdtex.model.corners import CYCLE, TORUS, corners_of, places, plane, torus
+from simdtex.model.corners import CYCLE, TORUS, corners_of, numbers, plane, torus
 from simdtex.options import DataWarning
 
 GRAVEL, GRASS = data.gravel()[:64, :64], data.grass()[:60, :64]
@@ -40,7 +40,7 @@ def test_the_torus_has_each_combination_once(colours):
     found = corners_of(torus(colours)).reshape(-1, 4)
     assert len(found) == len({*map(tuple, found.tolist())}) == colours**4
     for corners in found:
-        row, col = places(colours)[tuple(corners)]
+        row, col = divmod(numbers(colours)[tuple(corners)], colours**2)
         grid = torus(colours)
         around = [grid[(row + y) % len(grid), (col + x) % len(grid)] for y in (0, 1) for x in (0, 1)]
         assert around == corners.tolist()
@@ -94,7 +94,7 @@ def test_a_plane_is_made_of_the_tiles(tiles):
     found = plane(packed, corners)
     assert found.shape == (3 * 24, 5 * 24)
     for row, col in np.ndindex(3, 5):
-        y, x = places(2)[corners[row, col], corners[row, col + 1], corners[row + 1, col], corners[row + 1, col + 1]]
+        y, x = divmod(numbers(2)[tuple(corners[row : row + 2, col : col + 2].ravel())], 4)
         tile = packed[y * 24 : y * 24 + 24, x * 24 : x * 24 + 24]
         assert_same_bits(found[row * 24 : row * 24 + 24, col * 24 : col * 24 + 24], tile)
     assert_same_bits(plane(packed, np.pad(torus(2), (0, 1), "wrap")), packed)
@@ -234,7 +234,7 @@ def test_the_files_of_a_set(folder):
     expected = simdtex.tileset(GRAVEL, (20, 24), order=2, rng=3, device=REFERENCE)
     assert_same_bits(packed, expected)
     for a, b, c, d in np.ndindex(2, 2, 2, 2):
-        row, col = places(2)[a, b, c, d]
+        row, col = divmod(numbers(2)[a, b, c, d], 4)
         tile = packed[row * 20 : row * 20 + 20, col * 24 : col * 24 + 24]
         assert_same_bits(image.read(f"out/gravel-{a}{b}{c}{d}.png").pixels, tile)
     assert len([*(folder / "out").iterdir()]) == 1 + 16 + 5
@@ -274,10 +274,11 @@ def test_tiled_shows_the_plane(folder):
 
 
 def test_terrains_of_editors_are_the_corners():
-    root = ElementTree.fromstring(tilesets.tiled_set("a.png", (20, 24), ["sand", "grass"]).encode())
+    about = "a.png", (20, 24), ["sand", "grass"], corners_of(torus(2))
+    root = ElementTree.fromstring(tilesets.tiled_set(*about).encode())
     assert [one.get("name") for one in root.iter("wangcolor")] == ["sand", "grass"]
     found = {int(one.get("tileid")): [*map(int, one.get("wangid").split(","))] for one in root.iter("wangtile")}
-    text = tilesets.godot_set("a.png", (20, 24), ["sand", "grass"])
+    text = tilesets.godot_set(*about)
     assert 'path="a.png"' in text and "tile_size = Vector2i(24, 20)" in text and "terrain_set_0/mode = 1" in text
     for (row, col), _ in np.ndenumerate(torus(2)):
         a, b, c, d = corners_of(torus(2))[row, col].tolist()
@@ -289,7 +290,7 @@ def test_terrains_of_editors_are_the_corners():
 
 @pytest.mark.parametrize("colours", TORUS)
 def test_the_shader_finds_each_tile(colours):
-    text = tilesets.glsl(colours)
-    numbers = [*map(int, re.search(r"\((.*)\);", text.partition("PLACE")[2])[1].split(", "))]
-    found = [divmod(number, colours**2) for number in numbers]
-    assert found == [tuple(places(colours)[at]) for at in np.ndindex(*[colours] * 4)]
+    text = tilesets.glsl(numbers(colours))
+    found = [*map(int, re.search(r"\((.*)\);", text.partition("PLACE")[2])[1].split(", "))]
+    assert found == [numbers(colours)[at] for at in np.ndindex(*[colours] * 4)]
+    assert text.count("\n") < 30 and text.count("{") == text.count("}") == 2

@@ -48,7 +48,7 @@ def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options
     lead = leads[0][1] if len(leads) == 1 else read_material([one.paths[0] for _, one in leads], how)
     folders = [one for one, _ in leads if isinstance(one, Folder)]
     maps = read_maps(folders, lead)
-    shape = output_shape(size or "256", lead.pixels[0])
+    shape = output_shape("256" if size is None else size, lead.pixels[0])
     normals = bool(folders) and folders[0].found.files[folders[0].lead] in NORMALS
     colours = options.pop("colours") or max(2, len(samples))
     names = [path.stem for path in lead.paths] if len(samples) > 1 else [f"{n}" for n in range(colours)]
@@ -107,7 +107,7 @@ def write(
     """Write a set into a folder: the packed pictures and the tiles of all maps, and what other programs read."""
     from simdtex.io import image, tilesets
     from simdtex.io.files import atomic_folder
-    from simdtex.model.corners import corners_of, plane, torus
+    from simdtex.model.corners import corners_of, laid, numbers, plane, torus
     from simdtex.model.source_map import unit_normals
     from simdtex.report.sheet import fitted, rgb
 
@@ -125,8 +125,8 @@ def write(
                 image.write(folder / f"{one.out.stem}-{which}{one.out.suffix}", tile, one.maps.metadata)
         shown = image.coloured(plane(made, corners, colours), maps[0].maps.metadata and maps[0].maps.metadata.palette)
         image.write(folder / "plane.png", fitted(rgb(shown), SHEET))
-        about = maps[0].out.name, (rows, cols), names
+        about = maps[0].out.name, (rows, cols), names, corners_of(torus(colours))
         texts = {"tiles.tsx": tilesets.tiled_set(*about), "tiles.tres": tilesets.godot_set(*about)}
-        texts["plane.tmx"] = tilesets.tiled_map("tiles.tsx", (rows, cols), corners, colours)
-        for name, text in {**texts, "tiles.glsl": tilesets.glsl(colours)}.items():
+        texts["plane.tmx"] = tilesets.tiled_map("tiles.tsx", (rows, cols), laid(corners, colours))
+        for name, text in {**texts, "tiles.glsl": tilesets.glsl(numbers(colours))}.items():
             (folder / name).write_text(text, encoding="utf-8", newline="\n")

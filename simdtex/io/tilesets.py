@@ -9,13 +9,11 @@ from xml.etree import ElementTree as XML
 
 from numpy.typing import NDArray
 
-from simdtex.model.corners import corners_of, places, torus
-
 COLOURS = ("#7fbf3f", "#e0c060", "#8090a0")
 """Colours by which editors show those of corners."""
 
 CORNERS = ("top_left_corner", "top_right_corner", "bottom_left_corner", "bottom_right_corner")
-"""Names of Godot, in the order of `simdtex.model.corners.corners_of`."""
+"""Names of Godot, top left, top right, bottom left and bottom right."""
 
 GLSL = """\
 // An endless plane of corner tiles. One unit of `at` is one tile, and at.y grows downwards, as the rows of a picture.
@@ -42,17 +40,20 @@ vec4 cornerTiles(sampler2D tiles, vec2 at) {{
 """
 
 
-def glsl(colours: int) -> str:
-    """Return a function in GLSL that looks up an endless plane in the packed picture."""
-    side = colours**2
-    numbers = (places(colours).reshape(-1, 2) @ (side, 1)).tolist()
-    return GLSL.format(colours=colours, side=side, count=side**2, places=", ".join(map(str, numbers)))
+def glsl(numbers: NDArray[Any]) -> str:
+    """Return a function in GLSL that looks up an endless plane in the packed picture.
+
+    ``numbers`` (colours,) * 4 are those of the tiles by the colours of their corners, row by row in the packed picture.
+    """
+    side, places = len(numbers) ** 2, ", ".join(map(str, numbers.ravel()))
+    return GLSL.format(colours=len(numbers), side=side, count=side**2, places=places)
 
 
-def tiled_set(picture: str, tile: tuple[int, int], names: Sequence[str]) -> str:
+def tiled_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: NDArray[Any]) -> str:
     """Return a set of tiles for Tiled, with a terrain set of corners, whose terrains have these names.
 
-    ``picture`` is the name of the packed picture, and ``tile`` the rows and columns of a tile.
+    ``picture`` is the name of the packed picture, ``tile`` the rows and columns of a tile, and ``grid`` (n, n, 4) the
+    colours of the tiles' corners: top left, top right, bottom left and bottom right.
     """
     (rows, cols), side = tile, len(names) ** 2
     size = {"tilewidth": cols, "tileheight": rows, "tilecount": side**2, "columns": side}
@@ -61,31 +62,29 @@ def tiled_set(picture: str, tile: tuple[int, int], names: Sequence[str]) -> str:
     corners = _element(_element(root, "wangsets"), "wangset", name="corners", type="corner", tile=-1)
     for name, colour in zip(names, COLOURS, strict=False):
         _element(corners, "wangcolor", name=name, color=colour, tile=-1, probability=1)
-    for number, (a, b, c, d) in enumerate((corners_of(torus(len(names))) + 1).reshape(-1, 4).tolist()):
+    for number, (a, b, c, d) in enumerate((grid + 1).reshape(-1, 4).tolist()):
         _element(corners, "wangtile", tileid=number, wangid=f"0,{b},0,{d},0,{c},0,{a}")  # clockwise from the top
     return _text(root)
 
 
-def tiled_map(tiles: str, tile: tuple[int, int], corners: NDArray[Any], colours: int) -> str:
-    """Return a map for Tiled, of the tiles of a file, for the corners (m + 1, n + 1) of a plane."""
-    numbers = places(colours)[tuple(corners_of(corners)[:-1, :-1].transpose(2, 0, 1))] @ (colours**2, 1) + 1
+def tiled_map(tiles: str, tile: tuple[int, int], numbers: NDArray[Any]) -> str:
+    """Return a map for Tiled, of the tiles of a file with these numbers (m, n), from 0."""
     size = {"width": numbers.shape[1], "height": numbers.shape[0]}
     how = {"orientation": "orthogonal", "renderorder": "right-down", "infinite": 0}
     root = _element(None, "map", version="1.10", **how, **size, tilewidth=tile[1], tileheight=tile[0])
     _element(root, "tileset", firstgid=1, source=tiles)
     data = _element(_element(root, "layer", id=1, name="plane", **size), "data", encoding="csv")
-    data.text = ",\n".join(",".join(map(str, line)) for line in numbers.tolist())
+    data.text = ",\n".join(",".join(map(str, line)) for line in (numbers + 1).tolist())
     return _text(root)
 
 
-def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str]) -> str:
+def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: NDArray[Any]) -> str:
     """Return a TileSet of Godot 4, with a terrain set that matches corners; the parameters are those of `tiled_set`."""
     size = f"Vector2i({tile[1]}, {tile[0]})"
     lines = ['[gd_resource type="TileSet" load_steps=3 format=3]', ""]
     lines += [f'[ext_resource type="Texture2D" path="{picture}" id="1"]', ""]
     lines += ['[sub_resource type="TileSetAtlasSource" id="1"]', 'texture = ExtResource("1")']
     lines += [f"texture_region_size = {size}"]
-    grid = corners_of(torus(len(names)))
     for row in range(len(grid)):
         for col, colours in enumerate(grid[row].tolist()):
             values = {"": 0, "/terrain_set": 0, "/terrain": max(sorted(colours), key=colours.count)}

@@ -33,14 +33,19 @@ def corners_of(grid: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.stack([grid, right, np.roll(grid, -1, 0), np.roll(right, -1, 0)], -1)
 
 
-def places(colours: int) -> NDArray[np.intp]:
-    """Return the row and the column in the torus of the tile with given corners, (colours,) * 4 + (2,).
+def numbers(colours: int) -> NDArray[np.intp]:
+    """Return the numbers of the tiles in the torus, row by row from 0, (colours,) * 4.
 
     The indices are the colours of the corners in the order of `corners_of`.
     """
-    found = np.empty((*[colours] * 4, 2), np.intp)
-    for place in np.ndindex(colours**2, colours**2):
-        found[tuple(corners_of(torus(colours))[place])] = place
+    found = np.empty([colours] * 4, np.intp)
+    found[tuple(corners_of(torus(colours)).reshape(-1, 4).T)] = np.arange(colours**4)
+    return found
+
+
+def laid(corners: NDArray[np.intp], colours: int) -> NDArray[np.intp]:
+    """Return the numbers (m, n) of the tiles of a plane from the colours (m + 1, n + 1) of their corners."""
+    found: NDArray[np.intp] = numbers(colours)[tuple(np.moveaxis(corners_of(corners)[:-1, :-1], -1, 0))]
     return found
 
 
@@ -71,6 +76,6 @@ def plane(packed: ArrayLike, corners: ArrayLike, colours: int = 2) -> NDArray[An
     image, grid = np.asarray(packed), np.asarray(corners)
     rows, cols = (side // colours**2 for side in image.shape[:2])
     tiles = image.reshape(colours**2, rows, colours**2, cols, *image.shape[2:])
-    row, col = np.moveaxis(places(colours)[tuple(np.moveaxis(corners_of(grid)[:-1, :-1], -1, 0))], -1, 0)
+    row, col = np.divmod(laid(grid, colours), colours**2)
     found: NDArray[Any] = tiles[row, :, col].swapaxes(1, 2)
     return found.reshape(found.shape[0] * rows, -1, *image.shape[2:])
