@@ -29,7 +29,8 @@ from simdtex.options import DataWarning, resolve
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 USUAL = 4
-"""A colour is one of the positions whose mean differs least from the sample's, one of so many: none stands out."""
+"""A colour is one of the positions around which the mean squared deviation from the sample's mean differs least from
+that of the sample, one of so many: no part of it is conspicuous."""
 
 APART = 8
 """Pixels by which the square around a corner is wider than borders on each side, so that these fit where they meet."""
@@ -204,7 +205,8 @@ class Tiles:
                     f"a corner needs {2 * reach}x{2 * reach} known pixels, which the sample has nowhere; give smaller "
                     "tiles or a larger sample"
                 )
-            off = np.abs(sums_around(planes[number], reach) - round(planes[number].mean() * (2 * reach + 1) ** 2))
+            squares = (planes[number] - round(planes[number].mean())) ** 2
+            off = np.abs(sums_around(squares, reach) - round(squares.mean() * (2 * reach + 1) ** 2))
             places = np.argwhere(usable)[np.argsort(off[usable], kind="stable")[: -(-usable.sum() // USUAL)]]
             bits = random.draw4(seed, 0, 0, np.array([colour]), random.START)
             row, col = places[int(random.below(bits[0], bits[1], len(places))[0])].tolist()
