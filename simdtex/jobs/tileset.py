@@ -32,6 +32,9 @@ USUAL = 4
 """A colour is one of the positions around which the mean squared deviation from the sample's mean differs least from
 that of the sample, one of so many: no part of it is conspicuous."""
 
+NEAR = 0.75
+"""Pixels from a point of one phase within which a whole pixel has it."""
+
 APART = 8
 """Pixels by which the square around a corner is wider than borders on each side, so that these fit where they meet."""
 
@@ -197,7 +200,7 @@ class Tiles:
             if turn is not None and lattices:
                 apart = np.moveaxis(lattices[number].phases(*np.indices(usable.shape)), 0, -1) - turn
                 away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
-                usable &= away <= max(1, away.min(initial=np.inf, where=usable))
+                usable &= away <= max(NEAR, away.min(initial=np.inf, where=usable))
             elif not several and (usable & ~taken).any():
                 usable &= ~taken
             if not usable.any():
