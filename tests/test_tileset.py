@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -177,6 +178,7 @@ def test_terrain_has_the_texture_of_each_corner():
         ([GRAVEL] * 4, 24, {}, "4 samples"),
         (GRAVEL[:30, :30], 128, {}, "40x40 known pixels"),
         (GRAVEL, 24, {"boundary": "open"}, "leave boundary out"),
+        (GRAVEL, 24, {"preset": "paper"}, 'give pixel="source"'),
         (np.where(np.indices((64, 64))[0] % 6 < 1, np.nan, GRAVEL), 32, {}, "known pixels"),
     ],
 )
@@ -293,4 +295,6 @@ def test_the_shader_finds_each_tile(colours):
     text = tilesets.glsl(numbers(colours))
     found = [*map(int, re.search(r"\((.*)\);", text.partition("PLACE")[2])[1].split(", "))]
     assert found == [numbers(colours)[at] for at in np.ndindex(*[colours] * 4)]
+    page = Path(__file__).parents[1] / "docs" / "readers" / "tiles.glsl"
+    assert colours != 2 or page.read_text(encoding="utf-8") == text
     assert text.count("\n") < 30 and text.count("{") == text.count("}") == 2

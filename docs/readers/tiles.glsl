@@ -1,5 +1,6 @@
-// An endless plane of corner tiles. One unit of `at` is one tile, and at.y grows downwards, as the rows of a picture.
-// `tiles` is the packed picture: repeated in both directions, its first row first, with mipmaps. GLSL 1.30 or ES 3.00.
+// An endless plane of corner tiles. One unit of `at` is one tile; at.y grows downwards, as rows do.
+// `tiles` is the packed picture: repeated both ways, first row first, with mipmaps.
+// GLSL 1.30 or ES 3.00.
 const int COLOURS = 2, SIDE = 4;
 const int PLACE[16] = int[16](0, 4, 3, 5, 1, 13, 8, 6, 12, 2, 7, 11, 15, 9, 14, 10);
 
@@ -16,6 +17,7 @@ vec4 cornerTiles(sampler2D tiles, vec2 at) {
     int upper = corner(c) * COLOURS + corner(c + ivec2(1, 0));
     int lower = corner(c + ivec2(0, 1)) * COLOURS + corner(c + ivec2(1, 1));
     int place = PLACE[upper * COLOURS * COLOURS + lower];
-    vec2 packed = vec2(place % SIDE, place / SIDE) + at - cell, scale = vec2(1.0 / float(SIDE));
-    return textureGrad(tiles, packed * scale, dFdx(at) * scale, dFdy(at) * scale);
+    vec2 there = vec2(place % SIDE, place / SIDE) + at - cell;
+    float side = float(SIDE);
+    return textureGrad(tiles, there / side, dFdx(at) / side, dFdy(at) / side);
 }

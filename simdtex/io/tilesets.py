@@ -16,8 +16,9 @@ CORNERS = ("top_left_corner", "top_right_corner", "bottom_left_corner", "bottom_
 """Names of Godot, top left, top right, bottom left and bottom right."""
 
 GLSL = """\
-// An endless plane of corner tiles. One unit of `at` is one tile, and at.y grows downwards, as the rows of a picture.
-// `tiles` is the packed picture: repeated in both directions, its first row first, with mipmaps. GLSL 1.30 or ES 3.00.
+// An endless plane of corner tiles. One unit of `at` is one tile; at.y grows downwards, as rows do.
+// `tiles` is the packed picture: repeated both ways, first row first, with mipmaps.
+// GLSL 1.30 or ES 3.00.
 const int COLOURS = {colours}, SIDE = {side};
 const int PLACE[{count}] = int[{count}]({places});
 
@@ -34,8 +35,9 @@ vec4 cornerTiles(sampler2D tiles, vec2 at) {{
     int upper = corner(c) * COLOURS + corner(c + ivec2(1, 0));
     int lower = corner(c + ivec2(0, 1)) * COLOURS + corner(c + ivec2(1, 1));
     int place = PLACE[upper * COLOURS * COLOURS + lower];
-    vec2 packed = vec2(place % SIDE, place / SIDE) + at - cell, scale = vec2(1.0 / float(SIDE));
-    return textureGrad(tiles, packed * scale, dFdx(at) * scale, dFdy(at) * scale);
+    vec2 there = vec2(place % SIDE, place / SIDE) + at - cell;
+    float side = float(SIDE);
+    return textureGrad(tiles, there / side, dFdx(at) / side, dFdy(at) / side);
 }}
 """
 

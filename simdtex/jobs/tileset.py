@@ -81,6 +81,8 @@ def tileset(call: Tileset) -> Work:
     if "boundary" in options:
         raise ValueError("tiles are made on a torus; leave boundary out")
     chosen = resolve(Options, "tileset", options)
+    if chosen.pixel == "density":
+        raise ValueError('tiles continue the sources of their borders, and a density has none; give pixel="source"')
     pictures, light = with_light(call.sample, call.light, chosen.categorical)
     call.inputs = Inputs(call.sample)
     size: Any = call.size
