@@ -24,6 +24,8 @@ from skimage.transform import downscale_local_mean, resize
 
 import simdtex
 from simdtex.io.image import write
+from simdtex.io.tilesets import glsl
+from simdtex.model.corners import numbers, plane
 from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, magnified
@@ -246,11 +248,22 @@ def reservoir():
         sheet.convert("RGB").quantize(64).save(path, optimize=True)
 
 
+def tileset():
+    """Planes of two sets, and beside them the packed picture and the shader of the page."""
+    halves = [downscale_local_mean(picture[:256, :256], (2, 2)) for picture in (data.gravel(), data.grass())]
+    sample, grass = (np.round(half).astype(np.uint8) for half in halves)
+    write(HERE / "_static" / "tileset.png", simdtex.tileset(sample, 64, rng=1))
+    (HERE / "readers" / "tiles.glsl").write_text(glsl(numbers(2)), encoding="utf-8")
+    corners = np.random.default_rng(1).integers(0, 2, (9, 9))
+    samples = (("gravel", sample), ("grass and gravel", [grass, sample]))
+    return [(f"{name}, 8 x 8 tiles", plane(simdtex.tileset(those, 48, rng=1), corners)) for name, those in samples]
+
+
 WISHES = (
     *(balance, novelty, structure, order, period, finish, tile, hole, some),
     *(proportions, shares, methods, alpha, paper),
 )
-READERS = (materials, maps, geoscience)
+READERS = (materials, maps, geoscience, tileset)
 RUN = {"research": research, "reservoir": reservoir, "light": light}
 
 

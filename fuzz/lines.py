@@ -23,6 +23,7 @@ LINES = {
     "simulate": (8, "simulate PICTURE -o MAPS --size SIZE --number 2 --order 1 --jobs 1"),
     "classify": (4, "classify PICTURE -o OUT --texture a=PICTURE --texture b=PICTURE"),
     "tile": (5, "tile PICTURE -o OUT --order 1"),
+    "tileset": (2, "tileset PICTURE -o tiles --size 16x17 --order 1 --levels 1"),
     "maspar": (2, "maspar PICTURE -o OUT --size SIZE --order 1 --array 4x4"),
     "estimate": (3, "estimate GRID -o MAPS --size SIZE --known TABLE"),
     "schedules": (0.1, "schedules PICTURE -o out --size 9x9 --seeds 1 --schedule coloring --order 1"),

@@ -13,6 +13,7 @@ _NAMES = {
     "simdtex.jobs.pyramids": ("mix", "synthesize_solid"),
     "simdtex.jobs.simulation": ("estimate", "simulate"),
     "simdtex.jobs.synthesis": ("explain", "lcpdf", "replay", "synthesize"),
+    "simdtex.jobs.tileset": ("tileset",),
     "simdtex.live.widget": ("Live",),
     "simdtex.machine": ("open_machine",),
     "simdtex.machine.devices": ("DeviceError", "devices"),

@@ -21,6 +21,7 @@ from simdtex.io.hard_data import place_hard_data as place_hard_data
 from simdtex.io.hard_data import read_hard_data as read_hard_data
 from simdtex.jobs.classification import TextureClassifier as TextureClassifier
 from simdtex.jobs.synthesis import lcpdf as lcpdf
+from simdtex.jobs.tileset import tileset as tileset
 from simdtex.live.widget import Live as Live
 from simdtex.machine import Machine
 from simdtex.machine import open_machine as open_machine

@@ -418,6 +418,9 @@ RUNS = {
     ),
     "extend": arguments(simdtex.extend, GREY, right=3, seamless="y", band=2, order=2),
     "extend-light": arguments(simdtex.extend, GREY, right=3, seamless="y", band=2, order=2, light="even"),
+    "tileset": arguments(
+        simdtex.tileset, lambda: [texture((14, 15)), texture((15, 13), seed=1)], size=16, order=1, levels=2
+    ),
     # the other methods
     "multires": multires((13, 11), (15, 18)),
     "multires-luminance": multires((9, 10), (13, 8), channels=3, alpha=3, beta=1, levels=4),

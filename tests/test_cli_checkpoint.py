@@ -25,6 +25,7 @@ RUNS = {
     "synth-pyramid": (*SYNTH, "--method", "pyramid", "--stages", "stages"),
     "fill": tuple(shlex.split("fill holed.png --mask mask.png -o out.png --order 1 --levels 1 --seed 5")),
     "extend": ("extend", "sample.png", "-o", "out.png", "--right", "3", "--order", "2", "--seed", "5"),
+    "tileset": ("tileset", "sample.png", "-o", "out", "--size", "16", "--order", "1", "--seed", "5"),
     "mix": ("mix", "sample.png", "holed.png", "-o", "out.png", "--size", "16x16", "--seed", "5"),
     "solid": ("solid", "sample.png", "-o", "out.npz", "--size", "8", "--iterations", "2", "--seed", "5"),
     "classify": (

@@ -92,6 +92,7 @@ def stopped_and_resumed(name, path, device):
 
 
 RESUMED = ("array", "known", "soft-all", "volume", "fill", "extend", "multires", "pyramid", "solid", "mix", "classify")
+RESUMED += ("tileset",)
 
 
 @pytest.mark.parametrize("name", slow_but(RESUMED, KEPT))

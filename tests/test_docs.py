@@ -136,7 +136,7 @@ def test_story_runs(any_device, page, tmp_path, monkeypatch):
             exec(compile(small(text), page_id(page), "exec"), names)
             continue
         words = shlex.split(small(text))[1:]
-        words += ["--order", "8"] if {"synth", "fill", "extend", "tile", "simulate"} & set(words) else []  # quicker
+        words += ["--order", "8"] if {"synth", "fill", "extend", "tile", "tileset", "simulate"} & {*words} else []
         words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
         assert cli.main(words, standalone_mode=False) in (None, 0), text
 
@@ -324,7 +324,7 @@ def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
     rows = re.findall(r"^   \* - (.*--.*)$", page.partition("Names on the command line")[2], re.MULTILINE)
     others = set()
     functions = {"synth": "synthesize", "solid": "synthesize_solid", "tile": "extend"}
-    for name in ("synth", "fill", "tile", "extend", "simulate", "estimate", "classify", "solid", "mix"):
+    for name in ("synth", "fill", "tile", "extend", "simulate", "estimate", "classify", "solid", "mix", "tileset"):
         function = getattr(simdtex, functions.get(name, name))
         options = {max(p.opts, key=len) for p in cli.load(name).params if isinstance(p, click.Option)}
         others |= options - {f"--{one.replace('_', '-')}" for one in inspect.signature(function).parameters}

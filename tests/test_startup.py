@@ -29,6 +29,7 @@ PUBLIC = {
     "explain",
     "replay",
     *("show", "TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
+    "tileset",
 }
 OTHERS = {"importlib.metadata", "PIL.TiffImagePlugin", "simdtex.maspar.accounting", "simdtex.methods.pyramid.algorithm"}
 """What other runs need."""

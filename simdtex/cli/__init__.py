@@ -17,6 +17,7 @@ GROUPS = {
         "synth": "Synthesise a picture of any size with the texture of SAMPLE.",
         "fill": "Fill the holes of PICTURE with the texture around them.",
         "tile": "Make PICTURE tile, or all maps of a material.",
+        "tileset": "Make a set of corner tiles with the texture of SAMPLE, for a game.",
         "extend": "Continue PICTURE beyond its edges, or make it seamless.",
         "mix": "Mix the textures SAMPLE... into one picture.",
         "solid": "Make a solid block whose slices have the texture of SAMPLE.",
@@ -59,6 +60,7 @@ WHAT = "Texture synthesis from samples, by parallel relaxation on any OpenCL dev
 COMMAND_WORDS = {
     "fill": ("inpaint", "heal", "remove", "erase", "patch", "repair"),
     "tile": ("seamless", "loop", "wrap", "tileable", "make-seamless"),
+    "tileset": ("tiles", "wang", "autotile", "terrain"),
     "synth": ("synthesize", "synthesise", "generate", "texture", "variations", "make", "grow"),
     "extend": ("expand", "outpaint", "uncrop", "continue"),
     "solid": ("volume", "3d", "block"),

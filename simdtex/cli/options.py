@@ -205,16 +205,17 @@ PREVIEW = option(
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
 
 
+MAP = option(
+    "--map",
+    "roles",
+    group=DATA,
+    multiple=True,
+    type=READ_NAMED,
+    metavar="ROLE=FILE",
+    help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
+)
 material_options = together(
-    option(
-        "--map",
-        "roles",
-        group=DATA,
-        multiple=True,
-        type=READ_NAMED,
-        metavar="ROLE=FILE",
-        help="Use FILE of the folder as its map of this role (albedo, normal...), whatever its name; may be repeated.",
-    ),
+    MAP,
     option(
         "--also",
         group=OUTPUTS,

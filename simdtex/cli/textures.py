@@ -406,7 +406,7 @@ def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool | None) -> tuple
     return pixels, hole | gone | unknown_in(planes(pixels))
 
 
-COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "tile")
+COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "tile", "tileset")
 """Those that keep checkpoints."""
 
 

@@ -599,6 +599,7 @@ CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
     "picture with gaps": lambda name, value, call: check_picture(value, call.channel_axis),
     "hole": lambda name, value, call: check_mask(value, call.image[0].shape[:2]),
     "rows and columns": lambda name, value, call: check_shape(value),
+    "tile": lambda name, value, call: check_shape(value if np.ndim(value) else (value, value), 16),
     "block": lambda name, value, call: check_sides(value, ("depth", "rows", "columns")),
     "data": lambda name, value, call: as_known(value, name, call.sample if name == "known" else None),
 }

@@ -43,7 +43,7 @@ SITES_AT_ONCE = 2**17
 """The most sites whose fits are computed together."""
 
 SPREAD = 4
-"""Degrees of freedom of the squared difference of a window's measures, which are correlated: docs/classification.rst."""
+"""Degrees of freedom of the squared difference of a window's measures: see docs/classification.rst."""
 
 STEPS = 64
 """The most steps of a sweep, since each takes a pass over the picture."""

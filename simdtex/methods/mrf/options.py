@@ -61,8 +61,8 @@ def check_categorical(value: Any) -> None:
             whole("a channel of categorical", channel, 0)
 
 
-ALL = ("synth", "fill", "extend", "simulate", "schedules")
-DATA = ("synth", "fill", "extend", "simulate")
+ALL = ("synth", "tileset", "fill", "extend", "simulate", "schedules")
+DATA = ("synth", "tileset", "fill", "extend", "simulate")
 
 appearance = partial(option, group="Appearance", shown=ALL)
 scales = partial(option, group="Scales and edges", shown=ALL)

@@ -73,6 +73,7 @@ def plan(
     guide: GuidePair | Surroundings | None = None,
     most: int | None = None,
     soft: Soft | None = None,
+    period: tuple[int, int] | None = None,
 ) -> Plan:
     """Return the plan of a run, with its input validated and its sample in working levels.
 
@@ -91,6 +92,8 @@ def plan(
         The largest number of levels if the option ``levels`` is None.
     soft : Soft, optional
         The probability of each category, and of each picture of Y, at each site of X.
+    period : (int, int), optional
+        Rows and columns after which the lattice of a regular sample repeats on a torus; None: those of X.
     """
     pictures = options.of(pictures)
     check_categories(pictures, given, options.proportions)
@@ -115,7 +118,7 @@ def plan(
     known = (given.values, given.data, given.place) if given and given.data.any() else None
     lattice = parse_lattice(options.lattice)
     torus = options.boundary == "torus"
-    regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), torus, lattice, known)
+    regular = None if lattice is None else phases(pictures, period or (shape[0], shape[1]), torus, lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     heavy = heaviest(options, len(offsets)) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
