@@ -400,6 +400,12 @@ class Sample:
             own = number == here
             yield here, own, row[own] - top, col[own]
 
+    @property
+    def hot(self) -> int:
+        """Number of channels of the first variable, if that is one channel for each category; else 0."""
+        categories = self.pictures.categories(0)
+        return len(categories) if categories is not None and len(categories) > 2 else 0
+
     def planes(self, machine: Any) -> Any:
         """Return the working levels on a machine, (C, rows * cols) float32."""
         return machine.put(self.working.astype(np.float32))
