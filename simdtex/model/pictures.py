@@ -89,8 +89,10 @@ class Pictures:
     def proportions(self) -> NDArray[np.number[Any]]:
         """Return the proportions of the categories of the first variable, by the shares of the pictures."""
         names, numbers = self.categories(0), range(len(self.pixels))
+        assert names is not None
         counts = np.array([[np.count_nonzero(self.values(0, n) == name) for name in names] for n in numbers])
-        return counts.sum(0) if self.shares is None else self.shares @ (counts / counts.sum(1, keepdims=True))
+        each = counts / counts.sum(1, keepdims=True)
+        return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
 
     def values(self, variable: int, number: int) -> NDArray[Any]:
         """Return the known values of a variable in one of the pictures, (n,)."""

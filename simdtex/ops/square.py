@@ -24,13 +24,13 @@ class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
     ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) float32, the sample's working levels with the
-    columns that are a level's step apart side by side, and one more plane if the first `hot` channels are the categories
-    of a variable: the number of the category, from 1; ``row_stride`` is the distance there from one row of the lattice
-    to the next, ``layer_stride`` from one layer to the next; ``disc`` (side, columns) float32, or (side, side, columns)
-    of a volume, is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of each neighbour in ``disc`` and
-    its offset in ``levels``, in an order in which each is far from earlier ones, since close ones differ alike; the
-    site itself is the last. If ``at`` has all places of a level, they have ``cols`` columns, and every ``runs``-th of a
-    row is side by side in ``levels``.
+    columns that are a level's step apart side by side, and one plane more if the first ``hot`` channels are the
+    categories of a variable, their number from 1; ``order`` of the neighbourhood; ``row_stride`` is the distance there
+    from one row of the lattice to the next, ``layer_stride`` from one layer to the next; ``disc`` (side, columns)
+    float32, or (side, side, columns) of a volume, is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of
+    each neighbour in ``disc`` and its offset in ``levels``, in an order in which each is far from earlier ones, since
+    close ones differ alike; the site itself is the last. If ``at`` has all places of a level, they have ``cols``
+    columns, and every ``runs``-th of a row is side by side in ``levels``.
     """
 
     at: Array
