@@ -57,7 +57,7 @@ class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
     ``georeference`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system;
-    ``deep`` whether there is one volume; ``metadata`` what the file of the first says of its pixels.
+    ``deep`` whether they are volumes; ``metadata`` what the file of the first says of its pixels.
     """
 
     paths: tuple[Path, ...]
