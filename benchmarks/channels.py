@@ -78,10 +78,10 @@ class Scene:
     A course is (n, 3): row and column in fixed point, and heading.
     """
 
-    def __init__(self, shape, seed):
+    def __init__(self, shape, seed, width=WIDTH):
         self.pixels, self.room = np.zeros(shape, np.uint8), np.full(shape, FAR)
         self.paths, self.tips, self.joints = [], [], []
-        self.words = words(seed)
+        self.words, self.width = words(seed), width
 
     def below(self, limit):
         """Draw a number from 0 to limit - 1."""
@@ -166,7 +166,7 @@ class Scene:
 
     def draw(self, path):
         """Draw a course in place, as discs of one width."""
-        width = WIDTH - 1 + self.below(3)
+        width = self.width - 1 + self.below(3)
         around = np.stack(np.mgrid[tuple([slice(-(width // 2) - 1, width // 2 + 2)] * 2)], -1)
         centres = path[:, np.newaxis, np.newaxis, :2]
         places = centres // PIXEL + around

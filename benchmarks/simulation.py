@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How like the training image realisations are, with and without hard and soft data.
 
-    python benchmarks/simulation.py [--parts maps,volumes,soft] [--images channels,network,lenses] [--data 0,50,200,500]
-                                    [--number 50] [--side N] [--options NAME=VALUE,...] [--out DIR] [--device TEXT]
+    python benchmarks/simulation.py [--parts maps,volumes,soft] [--images channels,network,lenses,meanders]
+                                    [--data 0,50,200,500] [--number 50] [--side N] [--options NAME=VALUE,...]
+                                    [--out DIR] [--device TEXT]
 
 ``--options`` are those of `simdtex.simulate` that differ from its defaults, ``--number`` is that of realisations, and
 ``--side`` makes other sizes. ``--out`` takes a table for each part.
 
-maps     training images of channels, of a network of thin lines without ends, and of lenses; data are read off another
-         one of the same kind, at random places. The row *others* is of five more of the same kind. ``--out`` also takes
-         pictures: the training image, two realisations, and the share of category 1.
+maps     training images of channels, of a network of thin lines without ends, of lenses, and of thin meanders without
+         ends; data are read off another one of the same kind, at random places. The row *others* is of five more of the
+         same kind. ``--out`` also takes pictures: the training image, two realisations, and the share of category 1.
 volumes  channels of elliptic cross section along x in 100 x 100 x 30 voxels, at random depths: the share of channels,
          the data missed, and the mean absolute differences, from the training image, of the indicator variograms and
          of the connectivity functions along z, y and x, lags up to a third of a side; *another* is one more draw.
@@ -23,7 +24,7 @@ from pathlib import Path
 
 import common
 import numpy as np
-from channels import channels
+from channels import Scene, channels
 from scipy import ndimage
 from scipy.spatial import KDTree
 
@@ -31,6 +32,7 @@ import simdtex
 from simdtex.experiments.ensemble import channels as of_the_pages
 from simdtex.experiments.ensemble import connectivity, summary, variogram
 from simdtex.io import image as files
+from simdtex.random import as_seed
 
 SPECK = 16  # pixels of a body that is one, at most
 OTHERS = 5
@@ -38,7 +40,7 @@ CELL = 1600  # pixels of a cell of the network, on average
 LINE = 4  # width of its lines, pixels
 STRETCH = 2  # cells are so many times as wide as high
 SIZES = ((56, 10), (22, 7))  # lengths and heights of lenses, pixels
-SHARE = 0.3  # of lenses, and of channels in a volume
+SHARE = 0.3  # of lenses, and of channels in a volume; half of it of meanders
 FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
 BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
 
@@ -72,7 +74,15 @@ def lenses(shape, rng=None):
     return image
 
 
-IMAGES = {"channels": channels, "network": network, "lenses": lenses}
+def meanders(shape, rng=None):
+    """Make thin sinuous lines (rows, cols) uint8, 1, about 4 pixels wide, that cross the image and never end."""
+    scene = Scene(shape, as_seed(rng), LINE)
+    while scene.pixels.mean() < SHARE / 2:
+        scene.add_main()
+    return scene.pixels
+
+
+IMAGES = {"channels": channels, "network": network, "lenses": lenses, "meanders": meanders}
 
 
 def hard_data(truth, number, seed):

@@ -131,7 +131,7 @@ static inline float repeated(const int p, const SHARED int *next, const SHARED i
 #if ITEMS == 1
 #define EVALUATE(m, coherent)                                                                                          \
     for (int k_ = 0; k_ < (m); ++k_)                                                                                   \
-        CONSIDER(DISTANCE(list[k_]), list[k_], FACTOR(k_, coherent))
+        CONSIDER(DISTANCE_BELOW(list[k_], FACTOR(k_, coherent), most, best), list[k_], FACTOR(k_, coherent))
 #else
 #define ABREAST (ITEMS / 16)
 #define EVALUATE(m, coherent)                                                                                          \
@@ -206,6 +206,9 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
 
     // 6.2.2.1: the neighbourhood.
     AROUND(g, site, i, j);
+#ifdef HOT
+    by_category(xu);
+#endif
 
     // What neighbours suggest, the present source, and random candidates.
     const int suggested = SUGGESTED(g);
@@ -324,7 +327,7 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
 #define SURVIVES(p) list[atomic_inc(&kept)] = p;
 #else
 #define SLOT(q) (b + (q))
-#define SURVIVES(p) CONSIDER(DISTANCE(p), p, 1.0f)
+#define SURVIVES(p) CONSIDER(DISTANCE_BELOW(p, 1.0f, most, best), p, 1.0f)
 #endif
     const float slack = SLACK(terms * C + WAVES);
 

@@ -230,7 +230,7 @@ class EstimateKeywords(TypedDict, total=False):
     cell: Sequence[float] | None
     several: Literal["refuse", "mean", "most"]
     outside: Literal["refuse", "skip"]
-    shape: tuple[int, int] | None
+    shape: tuple[int, ...] | None
     categorical: bool
     nearest: int
     reach: int | None

@@ -504,7 +504,7 @@ class Simulate(Seeded, Guided, Cells):
     """The inputs of `simdtex.simulate`."""
 
     training: ArrayLike = needed(
-        Data("(rows, cols) or (layers, rows, cols) array, or a list of (rows, cols) arrays"),
+        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
         doc="The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values "
         "are categories. With `channel_axis` it has one more axis, for variables.",
         checker="training",
@@ -534,25 +534,25 @@ class Simulate(Seeded, Guided, Cells):
         **MAP,
     )
     image_map: ArrayLike | None = given(
-        Data("(rows, cols) or (training images, rows, cols) array"),
+        Data("([layers,] rows, cols) or (training images, [layers,] rows, cols) array"),
         "Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
         "their weights",
         "The number, from 0, of the training image of each cell, or the weight of each training image at each cell. "
-        "NaN: any training image. This and the next two parameters are not for volumes.",
+        "NaN: any training image.",
         **MAP,
     )
     rotation: ArrayLike | None = given(
-        Data("(rows, cols) array"),
+        Data("([layers,] rows, cols) array"),
         "Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn",
-        "Rotation of the training image at each cell, in degrees from x to y (from columns to rows), rounded to "
-        "eighths of a turn. NaN: any rotation of another cell.",
+        "Rotation of the training image at each cell, of a volume about z, in degrees from x to y (from columns to "
+        "rows), rounded to eighths of a turn. NaN: any rotation of another cell.",
         **MAP,
     )
     scale: ArrayLike | None = given(
-        Data("(rows, cols) array"),
+        Data("([layers,] rows, cols) array"),
         "Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2",
-        "Factor by which the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root "
-        "of 2. NaN: any factor of another cell.",
+        "Factor by which all axes of the training image are enlarged at each cell, 1/2 to 2, rounded to powers of the "
+        "square root of 2. NaN: any factor of another cell.",
         **MAP,
     )
     source: bool = given(
@@ -576,18 +576,20 @@ class Estimate(Watched, Cells):
     """The inputs of `simdtex.estimate`."""
 
     training: ArrayLike = needed(
-        Data("(rows, cols) array, or a list of such"),
+        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
         doc="The training image, as in `simdtex.simulate`; one variable.",
         checker="training",
     )
-    shape: tuple[int, int] | None = given(
-        Data("(int, int)"),
-        doc="Rows and columns of the result. None: those of `known` if it is an array, else of the training image.",
+    shape: tuple[int, ...] | None = given(
+        Data("(int, int) or (int, int, int)"),
+        doc="[Layers,] rows and columns of the result. None: those of `known` if an array, else of the training image.",
     )
     categorical: bool = given(Switch(), "Treat values as categories", group=DATA, default=False)
     nearest: int = given(Whole(0, 64), "Use this many data for each cell, the nearest", default=8)
     reach: int | None = given(
-        Whole(0), "Use data up to this many cells away", none="an eighth of the smaller side of TRAINING_IMAGE"
+        Whole(0),
+        "Use data up to this many cells away",
+        none="an eighth of the smaller of rows and columns of TRAINING_IMAGE",
     )
     bandwidth: float = given(
         Number(0, above=True),

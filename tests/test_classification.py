@@ -265,6 +265,16 @@ BAD = {
         ValueError,
         "the picture has 15 bands; give 14 at most",
     ),
+    "too many values": (
+        {
+            "image": np.zeros((40, 40, 2), np.uint8),
+            "textures": {"a": np.zeros((40, 40, 2), np.uint8)},
+            "channel_axis": -1,
+            "order": 45,
+        },
+        ValueError,
+        "order=45 with 2 bands compares 298 values; give a smaller order, so that there are 258 at most",
+    ),
     "an unknown option": ({"orders": 3}, TypeError, "unknown option 'orders' of the method 'classifier' .did you mean"),
     "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),
     "an option out of range": ({"unknown": 2}, ValueError, "unknown is 2; give at most 1"),

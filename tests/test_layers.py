@@ -20,13 +20,14 @@ from scipy.ndimage import gaussian_filter
 import simdtex
 from simdtex import schedules
 from simdtex.cli import main
-from simdtex.experiments.ensemble import connectivity
+from simdtex.experiments.ensemble import connectivity, copied, copies
 from simdtex.io import volume
 from simdtex.methods import mrf
 from simdtex.model.given import between, nearest_data
 from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, sums_around
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
+from simdtex.ops.lcpdf import optimal_bandwidth
 from simdtex.ops.sites import coloring
 from simdtex.ops.square import square_of
 
@@ -247,13 +248,128 @@ def test_a_callback_sees_volumes():
             "order 40 does not fit the sample of 9 layers x 20 rows x 22 columns; the largest order that fits",
         ),
         ({"known": np.full((4, 4), np.nan)}, "known is 2-dimensional; give .layers, rows, cols."),
-        ({"rotation": np.zeros((9, 20, 22))}, "rotation is for training images of two axes; leave it out for a volume"),
+        ({"rotation": np.zeros((20, 22))}, "rotation is 20x22 and has to be 9x20x22, as the output; give one size"),
+        ({"structure": 4.0}, "structure=4.0 is for pictures; leave it out for a volume"),
+        ({"lattice": ((8.0, 0.0), (0.0, 8.0))}, "lattice=.* is for pictures; leave it out for a volume"),
+        ({"finish": 2.0, "categorical": False}, "finish=2.0 is for pictures; leave it out for a volume"),
+        ({"training": facies()[0], "shape": (5, 6, 7)}, "the training image is a picture; give a training volume"),
+        ({"training": np.stack([facies(), facies()])}, "the sample is 4-dimensional: give .layers, rows, cols."),
         ({"probabilities": np.full((2, 9, 20, 22), 0.4)}, "the probabilities of layer 0, row 0, column 0 are 0.4, 0.4"),
     ],
 )
 def test_what_only_pictures_have_is_refused(options, words):
     with pytest.raises(ValueError, match=words):
         simulated(**options)
+
+
+VOLUMES = facies((9, 20, 22)), facies((8, 24, 18), 1)
+
+
+def made_of(training, **options):
+    """A realisation and the number of the volume of each cell, whose sources hold its values."""
+    given = {"categorical": True, "order": 3, "rng": 7, "device": "reference", "jobs": 1, "source": True} | options
+    found = simdtex.simulate(training, 1, **given).isel(realisation=0)
+    number = found.source_image.values if "source_image" in found else np.zeros(found.simulation.shape, int)
+    places = np.stack([found[f"source_{name}"].values for name in ("layer", "row", "column")], -1)
+    volumes = training if isinstance(training, tuple) else (training,)
+    for k, one in enumerate(volumes):
+        assert (one[tuple(places[number == k].T)] == found.simulation.values[number == k]).all()
+    return found.simulation.values, number
+
+
+def test_candidates_of_several_volumes_are_those_of_each():
+    volumes = [
+        np.random.default_rng(n).permutation(np.prod(s)).reshape(s) for n, s in enumerate([(5, 8, 9), (6, 7, 10)])
+    ]
+    offsets, margin = neighbourhood_offsets(3, 3), 2
+    sample = Sample(Pictures(tuple(one[..., None].astype(np.uint16) for one in volumes)), len(offsets), margin, step=2)
+    for spacing, edges in product((1, 2), ("whole", "reflect")):
+        places = sample.places(offsets, spacing, "decimated", edges).positions
+        inside = spacing if edges == "whole" else 0
+        lines = [[range(inside + -inside % spacing, n - inside, spacing) for n in one.shape] for one in volumes]
+        wanted = [(*at, k) for k, each in enumerate(lines) for at in product(*each)]
+        found = sample.place(places)
+        assert sorted(map(tuple, found.tolist())) == sorted(wanted)
+        assert (sample.index(found) == places).all()
+        assert sample.own(places)[:, 0].tolist() == [
+            volumes[k][at] for *at, k in map(tuple, found.tolist()) for at in [tuple(at)]
+        ]
+        reach = sample.places(offsets, spacing, "decimated", edges).reach
+        near = sample.around(places, reach)[..., 0]
+        for (*at, k), row in zip(found.tolist(), near.tolist(), strict=True):
+            framed = np.pad(volumes[k], margin, mode="reflect")
+            assert row == [framed[tuple(a + margin + spacing * b for a, b in zip(at, o, strict=True))] for o in ball(3)]
+
+
+def test_cells_are_of_the_volumes_that_maps_ask_for():
+    shape = (6, 16, 18)
+    right = np.broadcast_to(np.arange(18) > 8, shape)
+    assert (np.bincount(made_of(VOLUMES, shape=shape)[1].ravel(), minlength=2) > 0).all()
+    assert (made_of(VOLUMES, image_map=right.astype(float))[1] == right).all()
+    two = facies(), 2 + facies(seed=1)  # the shares that are asked are those of both
+    values, number = made_of(two, image_map=right.astype(float))
+    assert ((values > 1) == right).all() and (number == right).all()
+
+
+def test_rotation_and_scale_of_a_volume():
+    shape = (6, 16, 18)
+    turned = np.ascontiguousarray(np.rot90(VOLUMES[0], -1, (1, 2)))  # from x to y
+    found, _ = made_of(VOLUMES[0], rotation=np.full(shape, 90.0))
+    assert (found == made_of(turned, shape=shape)[0]).all()
+    larger = VOLUMES[0].repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    found, _ = made_of(VOLUMES[0], scale=np.full(shape, 2.0))
+    assert (found == made_of(larger, shape=shape)[0]).all()
+    made_of(VOLUMES, rotation=np.full(shape, 45.0), scale=np.full(shape, 0.5), order=1)
+
+
+def test_estimates_of_a_volume_are_those_of_plain_loops(cl_device):
+    """Two data, one on another layer; a cell that is near one only, and one that is near none."""
+    training, known = facies((4, 7, 8)), np.ma.masked_all((3, 6, 9), np.uint8)
+    known[0, 1, 2], known[2, 2, 3] = 1, 0
+    given = {"known": known, "categorical": True, "nearest": 2, "reach": 3}
+    found = simdtex.estimate(training, device="reference", **given)
+    assert found.probability.dims == ("category", "z", "y", "x")
+    framed = np.pad(training, 3, mode="reflect")
+    for site in [(1, 1, 2), (2, 5, 3), (0, 5, 8)]:
+        near = [at for at in np.argwhere(~known.mask) if ((at - site) ** 2).sum() <= 9]
+        cost = np.zeros(training.shape)
+        for at in near:
+            part = tuple(slice(3 + a - s, 3 + a - s + n) for a, s, n in zip(at, site, training.shape, strict=True))
+            cost += framed[part] != known[tuple(at)]
+        h = optimal_bandwidth(training.var(), training.size, len(near) + 1)
+        weight = np.exp(-cost / (2 * h * h))
+        wanted = (weight * training).sum() / weight.sum()
+        assert found.probability.values[(1, *site)] == pytest.approx(wanted, rel=1e-6)
+    assert found.identical(simdtex.estimate(training, device=cl_device, **given).assign_attrs(found.attrs))
+
+
+def test_windows_of_layers_that_occur_in_a_volume():
+    training = facies((3, 20, 22))
+    made = np.stack([training[::-1, 2:, 3:], facies((3, 18, 19), 5)])
+    places = copies(made, training, side=8)
+    assert places.shape == (2, 3, 11, 12)
+    there = np.argwhere(places[0] >= 0)
+    assert len(there)
+    for layer, row, col in there:
+        at = np.unravel_index(places[0, layer, row, col], training.shape)
+        window = training[at[0], at[1] : at[1] + 8, at[2] : at[2] + 8]
+        assert (window == made[0, layer, row : row + 8, col : col + 8]).all()
+    whole, other = copied(places)
+    assert whole == 1 and other < 1
+
+
+@pytest.mark.parametrize(
+    ("training", "options"),
+    [
+        (facies(kinds=5), {"shape": (5, 9, 11)}),  # half of the lanes
+        (facies(kinds=4)[4], {"order": 18, "shape": (12, 20)}),  # all of them, and the structure channel
+        (facies(kinds=4)[4], {"known": np.where(np.arange(440).reshape(20, 22) % 9, np.nan, 2.0), "order": 5}),
+        (facies(kinds=4)[4], {"relaxation": "gibbs", "search": "coherent"}),  # noise
+    ],
+)
+def test_categories_are_compared_by_number_as_by_channel(cl_device, training, options):
+    found = [simulated(training, device=one, **options) for one in ("reference", cl_device)]
+    assert_same_bits(*found)
 
 
 @pytest.mark.parametrize("suffix", slow_but([".sgems"], [".sgems", ".nc", ".nrrd"]))

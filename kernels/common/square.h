@@ -257,26 +257,90 @@ static inline float lane_of_distance(__global const float *y, SQUARE_ARG(const),
 #endif
 
 #if ITEMS == 1
-static inline float distance_in_lanes(__global const float *y, SQUARE_ARG(const), const int plane,
-                                      const int row_stride, const int layer_stride)
-{
+// No partial sum exceeds the whole one, so that a candidate beyond the bound is left out half-way: infinity.
+#define BOUND const float factor, const float most, const float best
+#define UNBOUNDED 1.0f, 0.0f, INFINITY
+#define BEYOND(d) (PRODUCT(d, factor) - most > best)
 #if V == 1
+static inline float distance_in_lanes(__global const float *y, SQUARE_ARG(const), const int plane,
+                                      const int row_stride, const int layer_stride, BOUND)
+{
     float d[16];
     for (int n = 0; n < 16; ++n)
         d[n] = lane_of_distance(y, u, xu, plane, row_stride, layer_stride, n);
-#else
-    float16 d = 0.0f;
-#pragma unroll
-    for (int cell = 0; cell < CELLS; ++cell)
-#pragma unroll
-        for (int c = 0; c < C; ++c) {
-            const float16 yn = vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16);
-            const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
-            d = fma(e, e, d);
-        }
-#endif
     return folded(d);
 }
+#else
+#if SIDE > 8
+#define LOW(x) (x)
+#define LOW_AT(y) vload16(0, y)
+typedef float16 low;
+#else // the other lanes are 0
+#define LOW(x) (x).lo
+#define LOW_AT(y) vload8(0, y)
+typedef float8 low;
+#endif
+static inline float folded_low(const low d)
+{
+#if SIDE > 8
+    return folded(d);
+#else
+    const float4 c = d.lo + d.hi;
+    const float2 e = c.lo + c.hi;
+    return e.x + e.y;
+#endif
+}
+
+#if AXES > 2
+#define APART_IN_ROW(a) (((a) / SIDE - RADIUS) * ((a) / SIDE - RADIUS) + ((a) % SIDE - RADIUS) * ((a) % SIDE - RADIUS))
+#define EMPTY(a) (APART_IN_ROW(a) > ORDER) // row of the cube without a neighbour
+#else
+#define EMPTY(a) false
+#endif
+
+static inline float distance_in_lanes(__global const float *y, SQUARE_ARG(const), const int plane,
+                                      const int row_stride, const int layer_stride, BOUND)
+{
+    low d = 0.0f;
+#pragma unroll
+    for (int cell = 0; cell < CELLS; ++cell) {
+        if (EMPTY(cell / CHUNKS))
+            continue;
+        if ((cell == CELLS / 2 || cell == 3 * CELLS / 4) && BEYOND(folded_low(d)))
+            return INFINITY;
+        __global const float *row = y + ROW_AT(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16;
+#ifdef HOT // x and y differ in two channels of the categories, whose terms are equal, or in none
+        const low e = select(LOW(xu[cell * C]), (low)0.0f, LOW_AT(row + C * plane) == LOW(xu[cell * C + 1]));
+        d = fma(e, e, fma(e, e, d));
+#pragma unroll
+        for (int c = HOT; c < C; ++c) {
+#else
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+#endif
+            const low gap = GAP(LOW_AT(row + c * plane), LOW(u[cell * CONFIDENCES + CONFIDENT(c)]), LOW(xu[cell * C + c]));
+            d = fma(gap, gap, d);
+        }
+    }
+    return folded_low(d);
+}
+#endif
+
+#ifdef HOT
+// What replaces x_r u in the first HOT channels, of which one is not 0: it, and the number of its channel from 1.
+static inline void by_category(__private float16 *xu)
+{
+    for (int cell = 0; cell < CELLS; ++cell) {
+        float16 height = 0.0f, number = 0.0f;
+        for (int c = 0; c < HOT; ++c) {
+            height += xu[cell * C + c];
+            number = select(number, (float16)(c + 1), xu[cell * C + c] > 0.0f);
+        }
+        xu[cell * C] = height;
+        xu[cell * C + 1] = number;
+    }
+}
+#endif
 #endif
 
 #endif

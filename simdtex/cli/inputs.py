@@ -57,7 +57,7 @@ class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
     ``georeference`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system;
-    ``deep`` whether there is one volume; ``metadata`` what the file of the first says of its pixels.
+    ``deep`` whether they are volumes; ``metadata`` what the file of the first says of its pixels.
     """
 
     paths: tuple[Path, ...]
@@ -219,8 +219,9 @@ def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     pictures, metadata, georeferences, crs = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
-    if len(paths) > 1 and any(volumes):
-        raise ValueError(f"{paths[volumes.index(True)]} is a volume: give one volume only")
+    if len({*volumes}) > 1:
+        volume, other = paths[volumes.index(True)], paths[volumes.index(False)]
+        raise ValueError(f"{volume} is a volume and {other} is none; give volumes, or pictures")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
     return Material(tuple(paths), pixels, None if plain else -1, georeferences[0], volumes[0], metadata[0], crs[0])

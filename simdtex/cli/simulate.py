@@ -60,7 +60,7 @@ def simulate(
     data = read_inputs("simulate", options, material, how)
     known, pixels = data["known"], material.pixels[0]
     maps = [one for one in (data[name] for name in MAPS) if isinstance(one, np.ndarray)]
-    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps]
+    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps if one.ndim >= 2 + material.deep]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     place = georeference | given({name: options.pop(name) for name in ("several", "outside")})
     if click.get_current_context().params["report"]:
@@ -103,22 +103,21 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
 
     how = take_reading(options, deep=True)
     material = read_material(training_image, how)
-    if material.deep:
-        raise ValueError(f"{training_image[0]} is a volume, and estimates are maps; use simdtex simulate")
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     georeference = read_georeference(material, output, options)
     data = read_inputs("estimate", options, material, how)
-    height, width = output_shape(size, material.pixels[0], data["known"], material.pixels[0])
+    shape = output_shape(size, material.pixels[0], data["known"], material.pixels[0], axes=2 + material.deep)
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
     inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | georeference
 
     def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
-        made = estimate(material.array, shape=(height, width), device=device, callback=callback, **inputs)
+        made = estimate(material.array, shape=shape, device=device, callback=callback, **inputs)
         return georeferenced(made, material.crs), Output(None, statistics=made.attrs)
 
-    return Task(make, f"maps of {width}x{height}", str(output), [lambda made, run: write_realisations(output, made)])
+    size = "x".join(map(str, shape[::-1]))
+    return Task(make, f"maps of {size}", str(output), [lambda made, run: write_realisations(output, made)])
 
 
 def read_georeference(

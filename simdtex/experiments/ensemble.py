@@ -266,17 +266,17 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
 
     Parameters
     ----------
-    ensemble : array_like, (realisations, rows, cols)
-    training : array_like, (rows, cols)
+    ensemble : array_like, (realisations, [layers,] rows, cols)
+    training : array_like, ([layers,] rows, cols)
     side : int
-        Side of the square windows, pixels.
+        Side of the square windows, pixels; those of a volume are in its layers.
 
     Returns
     -------
-    ndarray of int32, (realisations, rows - side + 1, cols - side + 1)
-        For the window at each upper left pixel, the pixel index (row x columns + column) of the upper left pixel of the
-        first equal window of the training image; -1 if there is none, and -2 for windows with a single value, which do
-        not count as copies.
+    ndarray of int32, (realisations, [layers,] rows - side + 1, cols - side + 1)
+        For the window at each upper left pixel, the pixel index (in C order) of the upper left pixel of the first equal
+        window of the training image; -1 if there is none, and -2 for windows with a single value, which do not count as
+        copies.
 
     Raises
     ------
@@ -289,24 +289,28 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
     pixel, and a look-up, about 20 ms for 250 x 250 pixels; memory: 50 bytes for every pixel of the training image and
     of one realisation, beside the result.
     """
-    array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
-    if not 1 <= side <= min(*array.shape[1:], *image.shape):
-        raise ValueError(f"side is {side}: give 1 to {min(*array.shape[1:], *image.shape)}, a side of the images")
+    image = checked(training, "training image", IMAGE, VOLUME)
+    array = checked(ensemble, "ensemble", ENSEMBLE if image.ndim == 2 else "(realisations, layers, rows, cols)")
+    least = min(*array.shape[-2:], *image.shape[-2:])
+    if not 1 <= side <= least:
+        raise ValueError(f"side is {side}: give 1 to {least}, a side of the images")
     values = np.unique(image)
 
     def hashed(one: Array) -> NDArray[np.uint64]:
         return hashes(position(one, values)[..., np.newaxis], side)
 
-    known, first = np.unique(hashed(image), return_index=True)
-    row, col = np.divmod(first, image.shape[1] - side + 1)
-    pixel = np.append(row * image.shape[1] + col, ABSENT).astype(np.int32)  # the last for -1
-    middle = tuple(slice(side // 2, n - (side - 1) // 2) for n in array.shape[1:])
+    layers = image.reshape(-1, *image.shape[-2:])
+    found = np.stack([hashed(one) for one in layers])
+    known, first = np.unique(found, return_index=True)
+    pixel = np.append(np.ravel_multi_index(np.unravel_index(first, found.shape), layers.shape), ABSENT)  # for -1
+    middle = tuple(slice(side // 2, n - (side - 1) // 2) for n in array.shape[-2:])
 
     def placed(one: Array) -> NDArray[np.int32]:
         plain = (minimum_filter(one, side) == maximum_filter(one, side))[middle]
-        return np.where(plain, np.int32(PLAIN), pixel[position(hashed(one), known)])
+        return np.where(plain, np.int32(PLAIN), pixel[position(hashed(one), known)].astype(np.int32))
 
-    return np.stack([placed(one) for one in array])
+    places = np.stack([placed(one) for one in array.reshape(-1, *array.shape[-2:])])
+    return places.reshape(*array.shape[:-2], *places.shape[1:])
 
 
 def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -314,7 +318,7 @@ def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    places : ndarray of int32, (realisations, rows, cols)
+    places : ndarray of int32, (realisations, [layers,] rows, cols)
         The result of `copies`.
 
     Returns
@@ -322,8 +326,8 @@ def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
     ndarray of float64, (realisations,)
         NaN where all windows have a single value.
     """
-    counted = (places != PLAIN).sum(axis=(1, 2))
-    found = (places >= 0).sum(axis=(1, 2))
+    places = places.reshape(len(places), -1)
+    counted, found = (places != PLAIN).sum(1), (places >= 0).sum(1)
     return np.where(counted > 0, found / np.maximum(counted, 1), np.nan)
 
 

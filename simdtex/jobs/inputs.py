@@ -203,9 +203,9 @@ def check_inputs(
 def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
     """Check a sample, or a list or tuple of samples, with the ``mask`` or masks of usable pixels, and return them.
 
-    With 3 ``axes`` the sample is a volume.
+    With 3 ``axes`` the samples are volumes.
     """
-    several = is_several(sample, channel_axis)
+    several = is_several(sample, channel_axis, axes)
     arrays: list[Any] = [as_array("a sample", one) for one in sample] if several else [sample]
     if several and len(kinds := {one.ndim for one in arrays}) > 1:
         counts = f"{min(kinds)} and {max(kinds)}"
@@ -261,12 +261,12 @@ def trends(pixels: Sequence[NDArray[Any]], use: Sequence[Mask], categorical: Any
     return [trend(*pair) for pair in zip(pixels, use, strict=True)]
 
 
-def is_several(sample: Any, channel_axis: int | None) -> bool:
+def is_several(sample: Any, channel_axis: int | None, axes: int = 2) -> bool:
     """Return whether a sample is a list or tuple of samples, and not one array written as a list."""
     if not isinstance(sample, (list, tuple)):
         return False
-    axes = [0 if isinstance(one, (list, tuple)) else np.ndim(one) for one in sample]
-    return (2 if channel_axis is None else 3) in axes and min(axes) >= 2
+    each = [0 if isinstance(one, (list, tuple)) else np.ndim(one) for one in sample]
+    return axes + (channel_axis is not None) in each and min(each) >= 2
 
 
 def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
@@ -456,7 +456,7 @@ class Maps(NamedTuple):
         """Return the SHA-256 digest of each map, by name."""
         return {name: found for name in self._fields if (found := self.digest(name))}
 
-    def of_images(self, pictures: Pictures, shape: tuple[int, int]) -> Turned | None:
+    def of_images(self, pictures: Pictures, shape: tuple[int, ...]) -> Turned | None:
         """Return the copies of training images that the maps require; None without such maps."""
         if self.image_map is self.rotation is self.scale is None:
             return None
@@ -467,13 +467,14 @@ class Maps(NamedTuple):
             raise ValueError(f"scale has {scale.min():g} to {scale.max():g}; give factors of {1 / most:g} to {most:g}")
         return turned(pictures, self._images(pictures, shape), rotation, scale)
 
-    def _images(self, pictures: Pictures, shape: tuple[int, int]) -> NDArray[np.float64]:
-        """Return the probability of each training image, (training images, H, W)."""
-        areas, count = [float(prod(one.shape[:2])) for one in pictures.pixels], len(pictures.pixels)
+    def _images(self, pictures: Pictures, shape: tuple[int, ...]) -> NDArray[np.float64]:
+        """Return the probability of each training image, (training images, *shape)."""
+        areas, count = [float(prod(one.shape[:-1])) for one in pictures.pixels], len(pictures.pixels)
+        along = (-1, *[1] * len(shape))
         if self.image_map is None:
-            return np.broadcast_to(np.array(areas)[:, None, None] / sum(areas), (count, *shape))
+            return np.broadcast_to(np.array(areas).reshape(along) / sum(areas), (count, *shape))
         given = as_array("image_map", self.image_map)
-        if given.ndim == 3:
+        if given.ndim == 1 + len(shape):
             each = _numbers("image_map", given, (count, *shape))
             if (each < 0).any() or (each.sum(0) == 0).any():
                 raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
@@ -484,9 +485,9 @@ class Maps(NamedTuple):
             wrong = told[~np.isin(told, np.arange(count))][0]
             raise ValueError(
                 f"image_map has {wrong:g} and there {'is 1' if count == 1 else f'are {count}'} training "
-                f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, rows, cols)"
+                f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, {AXES[len(shape)][1:]}"
             )
-        weights: NDArray[np.float64] = (number == np.arange(count)[:, None, None]).astype(np.float64)
+        weights: NDArray[np.float64] = (number == np.arange(count).reshape(along)).astype(np.float64)
         weights[:, np.isnan(number)] = np.nan
         return weights
 
@@ -578,8 +579,9 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
 
 
 def _training(name: str, value: Any, call: Any) -> Pictures:
-    """Return training images; one of three axes, without that of the variables, is a volume."""
-    call.axes = 3 if getattr(value, "ndim", 2) - (call.channel_axis is not None) == 3 else 2
+    """Return training images; those of three axes, without that of the variables, are volumes."""
+    first = value[0] if isinstance(value, (list, tuple)) and value else value
+    call.axes = 3 if getattr(first, "ndim", 2) - (call.channel_axis is not None) > 2 else 2
     call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))
     return found
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest
-from simdtex.driver import check_shape, check_sides, drive
+from simdtex.driver import check_sides, drive
 from simdtex.inputs import Cells, Estimate, Simulate
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
@@ -95,12 +95,11 @@ def simulate(call: Simulate) -> Work:
 
     n, first, axes, pictures, known = call.n, call.first, call.axes, call.training, call.known
     sides = ("layers", "rows", "columns")[-axes:]
+    if axes == 2 and isinstance(call.shape, (tuple, list)) and len(call.shape) == 3:
+        raise ValueError("shape is of a volume and the training image is a picture; give a training volume")
     if call.shape is not None:
         within_32_bits(check_sides(call.shape, sides), 1)
     frame(call.origin, call.cell)  # raises early
-    flat = ("image_map", "rotation", "scale")
-    if axes > 2 and (asked := [name for name in flat if getattr(call, name) is not None]):
-        raise ValueError(f"{asked[0]} is for training images of two axes; leave it out for a volume")
     maps = call.maps = Maps(**{name: getattr(call, name) for name in Maps._fields})
     size = maps.shape(axes) or pictures.pixels[0].shape[:-1]
     if isinstance(known, np.ndarray) and known.ndim == axes + (call.channel_axis is not None):
@@ -113,7 +112,7 @@ def simulate(call: Simulate) -> Work:
         inputs, missing = check_region(maps.region, size, inputs), missing_value(pictures.pixels)
     call.inputs = inputs
     chosen = resolve(mrf.Options, "simulate" if axes == 2 else "simulate 3-D", call.options)
-    copies = maps.of_images(pictures, (size[-2], size[-1]))
+    copies = maps.of_images(pictures, size)
     if copies and chosen.shares:
         raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
     kinds = chosen.of(pictures)
@@ -172,7 +171,7 @@ def simulate(call: Simulate) -> Work:
                 made[number] = picture
                 if call.source:
                     at: Any = output.source
-                    sources[number] = copies.sources(at, columns == 3) if copies else at
+                    sources[number] = copies.sources(at, columns > axes) if copies else at
                 finished.append(number)
                 checkpointing.offer(None, state)
             name = f"realisation{first + number:04d}"
@@ -225,9 +224,10 @@ def estimate(call: Estimate) -> Work:
     Returns
     -------
     xarray.Dataset
-        Dimensions ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the variables
-        ``probability`` (category, y, x), float64, which adds up to 1, and ``entropy`` (y, x) in bits; else ``mean`` and
-        ``variance`` (y, x) in the units of the training image. A cell with a datum has its value with certainty.
+        Dimensions ``z`` of a volume, ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the
+        variables ``probability`` (category, [z,] y, x), float64, which adds up to 1, and ``entropy`` ([z,] y, x) in
+        bits; else ``mean`` and ``variance`` in the units of the training image. A cell with a datum has its value with
+        certainty.
         ``plot()`` draws the maps.
 
     Notes
@@ -249,17 +249,17 @@ def estimate(call: Estimate) -> Work:
     require("simulate", "xarray")
     from simdtex.model.show import Results, described
 
-    categorical, nearest = call.categorical, call.nearest
+    categorical, nearest, axes = call.categorical, call.nearest, call.axes
     pictures = mrf.Options(categorical=categorical).of(call.training)
-    least = min(min(one.shape[:2]) for one in pictures.pixels)
+    least = min(min(one.shape[-3:-1]) for one in pictures.pixels)
     reach = least // 8 if call.reach is None else call.reach
     whole("reach", reach, 0, least - 1)
-    known, size = call.known, pictures.pixels[0].shape[:2]
+    known, size = call.known, pictures.pixels[0].shape[:-1]
     if known is None:
         raise ValueError("an estimate requires data; give known")
-    if isinstance(known, np.ndarray) and known.ndim == 2:
+    if isinstance(known, np.ndarray) and known.ndim == axes:
         size = known.shape
-    size = check_shape(size if call.shape is None else call.shape)
+    size = check_sides(size if call.shape is None else call.shape, ("layers", "rows", "columns")[-axes:])
     along, sides_of_cells = grid_axes(size, call.origin, call.cell)
     check_several(call.several, known, pictures)
     given = check_known(known, size, None, pictures, place=placing(call))
@@ -267,7 +267,7 @@ def estimate(call: Estimate) -> Work:
     if not categorical:
         moderate("the training image", *pictures.pixels)
     sample = Sample(pictures, pictures.channels * (nearest + 1), reach)
-    positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
+    positions = sample.places(np.zeros((1, axes), np.int32), 1).positions
     own = sample.own(positions)[:, 0]
     names, of = np.unique(own if categorical else sample.working[0, positions], return_inverse=True)
     data = Data(np.argwhere(given.whole), sample.scale.levels(given.values[given.whole]).T)
@@ -291,7 +291,7 @@ def estimate(call: Estimate) -> Work:
         return found.T.reshape(*size, -1), Output(None, statistics={"device": machine.name})
 
     def finish(found: NDArray[Any], output: Output) -> xarray.Dataset:
-        dims, maps = ("y", "x"), np.moveaxis(found, -1, 0)
+        dims, maps = tuple("zyx"[-axes:]), np.moveaxis(found, -1, 0)
         units = {"units": about["units"]} if "units" in (about := described(call.given)) else {}
         variables: dict[str, Any] = {
             "mean": (dims, maps[0], units),

@@ -34,7 +34,7 @@ class Pictures:
     Parameters
     ----------
     pixels : tuple of (rows, cols, C) arrays
-        Pictures of any sizes, NaN where a pixel is unknown; or one volume (layers, rows, cols, C).
+        Pictures of any sizes, NaN where a pixel is unknown; or volumes (layers, rows, cols, C).
     unknown : tuple of (rows, cols) bool arrays, optional
         Unknown pixels in addition to NaN: they are never taken, and are no neighbours.
     usable : tuple of (rows, cols) bool arrays, optional
@@ -72,7 +72,7 @@ class Pictures:
 
     @property
     def deep(self) -> bool:
-        """Whether the sample is a volume."""
+        """Whether the sample is of volumes."""
         return self.pixels[0].ndim > 3
 
     @property
@@ -85,6 +85,14 @@ class Pictures:
         if not (self.categorical and self.categorical[variable]):
             return None
         return np.unique(np.concatenate([self.values(variable, number) for number in range(len(self.pixels))]))
+
+    def proportions(self) -> NDArray[np.number[Any]]:
+        """Return the proportions of the categories of the first variable, by the shares of the pictures."""
+        names, numbers = self.categories(0), range(len(self.pixels))
+        assert names is not None
+        counts = np.array([[np.count_nonzero(self.values(0, n) == name) for name in names] for n in numbers])
+        each = counts / counts.sum(1, keepdims=True)
+        return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
 
     def values(self, variable: int, number: int) -> NDArray[Any]:
         """Return the known values of a variable in one of the pictures, (n,)."""
@@ -178,38 +186,43 @@ MOST_COPIES = 64
 class Copy:
     """A copy of a picture.
 
-    ``image``, the number of the picture; ``row`` and ``col`` (rows, cols) int32, the position in it of each pixel of
-    the copy; ``inside`` (rows, cols), False in the mirror image.
+    ``image``, the number of the picture; ``at``, int32 arrays that broadcast to the shape of the copy, the [layer,] row
+    and column in it of each pixel of the copy; ``inside`` ([layers,] rows, cols), False in the mirror image.
     """
 
     image: int
-    row: NDArray[np.int32]
-    col: NDArray[np.int32]
+    at: tuple[NDArray[np.int32], ...]
     inside: Mask
 
     def of(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        """Return the copy of an array (rows, cols, ...) that belongs to the picture."""
-        return np.ascontiguousarray(pictures[self.image][self.row, self.col])
+        """Return the copy of an array ([layers,] rows, cols, ...) that belongs to the picture."""
+        return np.ascontiguousarray(pictures[self.image][self.at])
 
 
 def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Copy:
     """Return the copy of a picture of ``shape``, turned by ``eighths`` from x to y and enlarged by sqrt(2)**halves.
 
-    x grows with the column and y with the row.
+    x grows with the column and y with the row. A volume is turned about z, and its layers are enlarged as well.
     """
     half = sqrt(0.5)
     cosines = (1.0, half, 0.0, -half, -1.0, -half, 0.0, half)
     cos, sin = cosines[eighths], cosines[(eighths - 2) % EIGHTHS]
     by = 2.0 ** (halves // 2) * (sqrt(2.0) if halves % 2 else 1.0)
-    rows, cols = shape[:2]
+    *layers, rows, cols = shape
     high, wide = (abs(cos) * a + abs(sin) * b for a, b in ((rows, cols), (cols, rows)))
     sides = [max(1, ceil(side * by - 1e-6)) for side in (high, wide)]
     y, x = ((np.arange(side) - (side - 1) / 2) / by for side in sides)
     down = cos * y[:, None] - sin * x[None, :] + (rows - 1) / 2
     along = sin * y[:, None] + cos * x[None, :] + (cols - 1) / 2
-    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (down, along))  # halves up, even if inexact
-    inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
-    return Copy(image, _mirrored(row, rows), _mirrored(col, cols), inside)
+    lines = [down, along]
+    for n in layers:
+        z = (np.arange(max(1, ceil(n * by - 1e-6))) / by)[:, None, None]
+        lines.insert(0, z + (n - 1 - z.max()) / 2)
+    places = [np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in lines]  # halves up, even if inexact
+    inside: Any = np.logical_and.reduce(
+        np.broadcast_arrays(*((at >= 0) & (at < n) for at, n in zip(places, shape, strict=True)))
+    )
+    return Copy(image, tuple(_mirrored(at, n) for at, n in zip(places, shape, strict=True)), inside)
 
 
 def _mirrored(at: NDArray[np.int64], side: int) -> NDArray[np.int32]:
@@ -230,22 +243,24 @@ class Turned:
         if pictures.known:
             unknown = tuple(one.of([~known for known in pictures.known]) for one in copies)
         if pictures.usable or not all(one.inside.all() for one in copies):
-            everywhere = [np.ones(one.shape[:2], bool) for one in pictures.pixels]
+            everywhere = [np.ones(one.shape[:-1], bool) for one in pictures.pixels]
             usable = tuple(one.inside & one.of(pictures.usable or everywhere) for one in copies)
         return Pictures(tuple(one.of(pictures.pixels) for one in copies), unknown, usable)
 
     def sources(self, place: NDArray[np.int32], several: bool) -> NDArray[np.int32]:
         """Return the source map in the pictures themselves from one of the copies; -1 stays -1.
 
-        ``place`` is (..., 3), row, column and number of the copy, or (..., 2) with one copy; with ``several`` pictures
-        the last number of the result is that of the picture.
+        ``place`` is (..., 3), row, column and number of the copy, or (..., 2) with one copy, of volumes with the layer
+        before these; with ``several`` pictures the last number of the result is that of the picture.
         """
-        number = place[..., 2] if place.shape[-1] == 3 else np.where(place[..., 0] < 0, np.int32(-1), np.int32(0))
-        found = np.full((*place.shape[:-1], 2 + several), -1, np.int32)
+        axes, none = len(self.copies[0].at), place[..., 0] < 0
+        number = place[..., axes] if place.shape[-1] > axes else np.where(none, np.int32(-1), np.int32(0))
+        found = np.full((*place.shape[:-1], axes + several), -1, np.int32)
         for k, one in enumerate(self.copies):
             here = number == k
-            at = tuple(place[here][:, :2].T)
-            found[here] = np.stack([one.row[at], one.col[at], np.full(at[0].size, one.image)][: 2 + several], -1)
+            at = tuple(place[here][:, :axes].T)
+            lines = [line[at] for line in np.broadcast_arrays(*one.at)]
+            found[here] = np.stack([*lines, np.full(at[0].size, one.image)][: axes + several], -1)
         return found
 
 
@@ -257,8 +272,8 @@ def turned(
 ) -> Turned:
     """Return the copies that any site requires, and their probabilities.
 
-    ``images`` (pictures, H, W) is the probability of each picture, adding up to 1, or NaN. ``rotation`` (H, W) is in
-    degrees from x to y, and ``scale`` (H, W) 1/2 to 2; NaN takes any of another site.
+    ``images`` (pictures, [D,] H, W) is the probability of each picture, adding up to 1, or NaN. ``rotation`` ([D,] H,
+    W) is in degrees from x to y, and ``scale`` 1/2 to 2; NaN takes any of another site.
     """
     shape = images.shape[1:]
     turns = np.zeros(shape) if rotation is None else np.floor(rotation / (360 / EIGHTHS) + 0.5) % EIGHTHS
@@ -277,5 +292,5 @@ def turned(
     probability = np.stack([np.where(kind == one, images[n], 0) for one, n in wanted])
     probability[:, free] = np.nan
     copies = [(n, one // (2 * HALVES + 1), one % (2 * HALVES + 1) - HALVES) for one, n in wanted]
-    sides = [picture.shape for picture in pictures.pixels]
+    sides = [picture.shape[:-1] for picture in pictures.pixels]
     return Turned(tuple(copy_of(n, sides[n], turn, halves) for n, turn, halves in copies), probability)

@@ -93,7 +93,7 @@ class Candidates(NamedTuple):
 
 
 class Sample:
-    """A sample in working grey levels: one picture, several one below another, or the layers of one volume.
+    """A sample in working grey levels: pictures one below another, or the layers of volumes.
 
     `simdtex.model.scale` maps pixels to working levels. Pixels of the output are the sample's own, or differ from them
     by the finish in steps of an eighth of a level, so the output has their full precision.
@@ -137,7 +137,7 @@ class Sample:
     guided : list of (G, rows, cols) uint16 arrays
         Working levels of the guides of each picture; empty without guides.
     boxes : list of (int, int, int)
-        First row, number of rows and number of columns of each picture.
+        First row, number of rows and number of columns of each picture; of a volume its first layer, rows and columns.
     layer : int
         Rows of a layer of a volume with its margin; 0 for pictures.
 
@@ -205,7 +205,7 @@ class Sample:
         self._places: dict[tuple[Any, ...], Places] = {}
         self.__dict__.pop("variance", None)
         if levels[0].ndim > 3:
-            self._lay_volume(levels[0], margin)
+            self._lay_volumes(levels, margin, step)
             return
         top = 0
         for one in levels:
@@ -224,21 +224,28 @@ class Sample:
         ]
         self.working = canvas.reshape(len(canvas), -1)
 
-    def _lay_volume(self, levels: NDArray[np.uint16], margin: int) -> None:
-        layers, self.height, self.width = levels.shape[1:]
-        self.layer, self.cols = self.height + 2 * margin, self.width + 2 * margin
-        self.rows = (layers + 2 * margin) * self.layer
-        self.boxes.append((0, self.height, self.width))
-        self.levels = [levels]
-        self.working = np.pad(levels, ((0, 0), *[(margin, margin)] * 3), mode="reflect").reshape(len(levels), -1)
+    def _lay_volumes(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int) -> None:
+        self.height, self.width = (max(one.shape[axis] for one in levels) for axis in (2, 3))
+        self.layer, self.cols, self.levels = self.height + 2 * margin, self.width + 2 * margin, [*levels]
+        high, parts = 0, []
+        for one in levels:
+            self.boxes.append((high, *one.shape[2:]))
+            parts.append(np.pad(one, ((0, 0), *[(margin, margin)] * 3), mode="reflect"))
+            high += -(-parts[-1].shape[1] // step) * step
+        self.depth = self.boxes[-1][0] + levels[-1].shape[1]
+        canvas = np.zeros((len(levels[0]), self.depth + 2 * margin, self.layer, self.cols), np.uint16)
+        for (first, *_), one in zip(self.boxes, parts, strict=True):
+            canvas[:, first : first + one.shape[1], : one.shape[2], : one.shape[3]] = one
+        self.rows, self.working = canvas.shape[1] * self.layer, canvas.reshape(len(canvas), -1)
 
     def _stacked(self, pictures: Sequence[NDArray[Any]], between: Any) -> NDArray[Any]:
-        """Return arrays (rows, cols, ...), one for each picture, stacked without the margin."""
+        """Return arrays ([layers,] rows, cols, ...), one for each picture, stacked without the margin."""
         if len(pictures) == 1:
             return pictures[0]
-        stacked = np.full((self.height, self.width, *pictures[0].shape[2:]), between, pictures[0].dtype)
-        for (first, rows, cols), one in zip(self.boxes, pictures, strict=True):
-            stacked[first : first + rows, :cols] = one
+        sides = (self.depth, self.height, self.width) if self.layer else (self.height, self.width)
+        stacked = np.full((*sides, *pictures[0].shape[len(sides) :]), between, pictures[0].dtype)
+        for (first, *_), one in zip(self.boxes, pictures, strict=True):
+            stacked[(slice(first, first + len(one)), *map(slice, one.shape[1 : len(sides)]))] = one
         return stacked
 
     @cached_property
@@ -274,15 +281,15 @@ class Sample:
             return inside
 
         row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
-        found = np.zeros((row.size, col.size), bool)
-        for top, rows, cols in self.boxes:
-            found |= whole(row, top, rows)[:, None] & whole(col, 0, cols)[None, :]
+        layer = np.arange(0, self.depth if self.layer else 1, step, dtype=np.int32)
+        found = np.zeros((layer.size, row.size, col.size), bool)
+        for (top, rows, cols), levels in zip(self.boxes, self.levels, strict=True):
+            down = whole(row, 0 if self.layer else top, rows)
+            deep = whole(layer, top, levels.shape[1]) if self.layer else np.ones(1, bool)
+            found |= deep[:, None, None] & down[:, None] & whole(col, 0, cols)
         if self.layer:
-            size = self.levels[0].shape[1]
-            layer = np.arange(0, size, step, dtype=np.int32)
-            found = (whole(layer, 0, size)[:, None, None] & found).reshape(-1, col.size)
             row = ((layer + self.margin)[:, None] * np.int32(self.layer) + row).ravel()
-        return row, col, found
+        return row, col, found.reshape(-1, col.size)
 
     def places(
         self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
@@ -364,8 +371,8 @@ class Sample:
 
     def picture_of(self, source: NDArray[np.integer]) -> NDArray[np.intp]:
         """Return the number of the picture of each pixel index: the last one that begins at or above it."""
-        tops = np.array([top for top, *_ in self.boxes])
-        row = np.asarray(source) // self.cols - self.margin
+        tops = np.array([top for top, *_ in self.boxes]) * (self.layer or 1)
+        row = np.asarray(source) // self.cols - self.margin * ((self.layer or 0) + 1)
         found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
         return found
 
@@ -392,6 +399,12 @@ class Sample:
         for here, (top, *_) in enumerate(self.boxes):
             own = number == here
             yield here, own, row[own] - top, col[own]
+
+    @property
+    def hot(self) -> int:
+        """Number of channels of the first variable, if that is one channel for each category; else 0."""
+        categories = self.pictures.categories(0)
+        return len(categories) if categories is not None and len(categories) > 2 else 0
 
     def planes(self, machine: Any) -> Any:
         """Return the working levels on a machine, (C, rows * cols) float32."""
@@ -431,7 +444,7 @@ class Sample:
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return (row, column) in the user's sample of pixel indices, on a last axis; -1 for a pixel without source.
 
-        With several pictures the result is (row, column, number of the picture), with a volume (layer, row, column).
+        With a volume the result is (layer, row, column); with several pictures the number of the picture is the last.
         """
         place = np.stack(self._coordinates(source), -1)
         number = self.picture_of(source).astype(np.int32) if len(self.boxes) > 1 else None
@@ -444,15 +457,14 @@ class Sample:
         return np.where((source < 0)[..., None], np.int32(-1), place) if (source < 0).any() else place
 
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Return the pixel index of (row, column[, number of the picture]) on a last axis; -1 if the row is below 0."""
-        row, col = place[..., -2 if self.layer else 0], place[..., -1 if self.layer else 1]
+        """Return the pixel index of places as `place` returns them; -1 if the first number is below 0."""
+        row, col = (place[..., axis + (self.layer > 0)] for axis in (0, 1))
         if self.reduction > 1:
             _, rows, cols = np.array(self.boxes)[place[..., 2] if place.shape[-1] == 3 else 0].T
             row, col = np.minimum(row // self.reduction, rows.T - 1), np.minimum(col // self.reduction, cols.T - 1)
-        if self.layer:
-            row = row + (place[..., 0] + self.margin) * self.layer
-        elif place.shape[-1] == 3:
-            row = row + np.array([top for top, *_ in self.boxes])[np.maximum(place[..., 2], 0)]
+        tops, several = np.array([top for top, *_ in self.boxes]), len(self.boxes) > 1
+        first = tops[np.maximum(place[..., -1], 0)] if several else 0
+        row = row + ((place[..., 0] + first + self.margin) * self.layer if self.layer else first)
         found = (row + self.margin) * self.cols + col + self.margin
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
@@ -484,14 +496,14 @@ class Sample:
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""
         lines = np.stack(self._coordinates(position[:, None] + reach))
-        number = np.zeros(position.size, np.intp) if self.layer else self.picture_of(position)
+        number = self.picture_of(position)
         sides = np.array([one.shape[1:] for one in self.levels])[number].T[..., None]
         top = np.array([top for top, *_ in self.boxes])[number, None]
-        lines[-2] -= top
+        lines[0] -= top
         period = np.maximum(2 * sides - 2, 1)
         lines = abs(lines) % period
         lines = np.minimum(lines, period - lines)
-        lines[-2] += top
+        lines[0] += top
         found: NDArray[Any] = self.pixels[tuple(lines)]
         return found
 

@@ -291,6 +291,7 @@ class Relaxation(NamedTuple):
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}
         defines |= confidences.defines | costs.defines | self.grid.defines
+        defines |= {"ORDER": square.order} if self.grid.layered else {}
         defines |= {"TILES": 1} if self.grid.tile else {}
         return defines, [
             *(sites, 0, sites.size, *field, constants(self.grid, **level), self.offsets),
@@ -377,6 +378,7 @@ def _kernel(
         defines["SLOTS"] = -(-most_listed(proposal.neighbours, proposal.chance) // 64) * 64
         defines |= {"PHASES": 1} if proposal.phases else {}
         defines |= {"NOVEL": 1} if relaxation.costs.novelty else {}
+        defines |= {"HOT": proposal.square.hot} if proposal.square.hot and machine.vector > 1 else {}
     if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
     arguments += [machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]

@@ -24,12 +24,13 @@ class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
     ``at`` (n,) int32 are the candidates' places in ``levels`` (C, plane) float32, the sample's working levels with the
-    columns that are a level's step apart side by side; ``row_stride`` is the distance there from one row of the lattice
-    to the next, ``layer_stride`` from one layer to the next; ``disc`` (side, columns) float32, or (side, side, columns)
-    of a volume, is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of each neighbour in ``disc`` and
-    its offset in ``levels``, in an order in which each is far from earlier ones, since close ones differ alike; the
-    site itself is the last. If ``at`` has all places of a level, they have ``cols`` columns, and every ``runs``-th of a
-    row is side by side in ``levels``.
+    columns that are a level's step apart side by side, and one plane more if the first ``hot`` channels are the
+    categories of a variable, their number from 1; ``order`` of the neighbourhood; ``row_stride`` is the distance there
+    from one row of the lattice to the next, ``layer_stride`` from one layer to the next; ``disc`` (side, columns)
+    float32, or (side, side, columns) of a volume, is 1 on the neighbourhood. ``looks`` (N + 1, 2) int32 are the lane of
+    each neighbour in ``disc`` and its offset in ``levels``, in an order in which each is far from earlier ones, since
+    close ones differ alike; the site itself is the last. If ``at`` has all places of a level, they have ``cols``
+    columns, and every ``runs``-th of a row is side by side in ``levels``.
     """
 
     at: Array
@@ -40,6 +41,8 @@ class Square(NamedTuple):
     looks: Array
     cols: int
     runs: int
+    order: int = 0
+    hot: int = 0
 
     def distance(
         self,
@@ -84,6 +87,8 @@ def square_of(machine: Machine, sample: Sample, places: Places, every: bool = Fa
     around = ((0, 0), (0, 0), (0, wide * step - cols))
     working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
     levels = working.swapaxes(2, 3).reshape(len(working), -1).astype(np.float32)
+    if hot := sample.hot:
+        levels = np.concatenate([levels, 1 + (levels[:hot] > 0).argmax(0)[None]], dtype=np.float32)
     positions = places.everywhere if every else places.positions
     row, at = np.divmod(positions, np.int32(cols))
     at = (row * np.int32(step) + at % np.int32(step)) * np.int32(wide) + at // np.int32(step)
@@ -101,6 +106,8 @@ def square_of(machine: Machine, sample: Sample, places: Places, every: bool = Fa
         machine.put(looks.astype(np.int32)),
         across,
         min(step // places.step, across) if every else 1,
+        int((offsets**2).sum(1).max()),
+        hot,
     )
 
 

@@ -34,7 +34,10 @@ FEWEST_NEIGHBOURHOODS = 16
 """The fewest neighbourhoods of a class at a level."""
 
 BANDS = 14
-"""The most bands of a picture: sums of products of raw neighbourhoods are then below 2**24."""
+"""The most bands of a picture."""
+
+VALUES = 258
+"""The most values of a raw neighbourhood, 0 to 255 each: sums of their products are then below 2**24 and exact."""
 
 CLASSES = 254
 """The most classes: labels are bytes, and 0 is unknown."""
@@ -194,16 +197,20 @@ def learn(
 ) -> Model:
     """Return the model of classes, each given by regions of pictures of one type.
 
-    Raises ValueError if a class has fewer than `FEWEST_NEIGHBOURHOODS` neighbourhoods.
+    Raises ValueError if a neighbourhood has too many values, or a class fewer than `FEWEST_NEIGHBOURHOODS` of them.
     """
     regions = [region for one in classes for region in one]
+    bands = regions[0].pixels.shape[-1]
+    if (values := bands * len(experts_of(options, 1)[0].offsets)) > VALUES:
+        few = f"give a smaller order, so that there are {VALUES} at most"
+        raise ValueError(f"order={options.order} with {bands} bands compares {values} values; {few}")
     scale = Scale(Pictures(tuple(region.pixels for region in regions)), 512)  # values of up to 12 bits
     levels = _levels_of(options, classes, names)
     experts = experts_of(options, levels)
     taught = [_Class(machine, scale, experts, one) for one in classes]
     drawn = [[one.draw(machine, e, options.exemplars, seed, c) for e in experts] for c, one in enumerate(taught)]
     selves = [one.judge(machine, experts, options, seed, c) for c, one in enumerate(taught)]
-    own, bands = np.array([one.mean for one in selves]), regions[0].pixels.shape[-1]
+    own = np.array([one.mean for one in selves])
     counts = [min(map(len, one)) for one in drawn]
     offsets = []
     for c, count in enumerate(counts):

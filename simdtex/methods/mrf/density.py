@@ -80,7 +80,7 @@ def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) ->
 
 
 class Data(NamedTuple):
-    """Data of an image: ``place`` (n, 2) int row and column, and ``values`` (n, C) uint16 working levels."""
+    """Data of an image: ``place`` (n, 2 or 3) int [layer,] row and column, ``values`` (n, C) uint16 working levels."""
 
     place: NDArray[np.integer]
     values: NDArray[np.uint16]
@@ -89,7 +89,7 @@ class Data(NamedTuple):
 def near(
     sites: NDArray[np.integer], place: NDArray[np.integer], most: int, reach: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
-    """Return the nearest data of sites (S, 2): indices (S, m) into ``place`` (n, 2), and the count of each site, (S,).
+    """Return the nearest data of sites (S, axes): indices (S, m) into ``place`` (n, axes), and the counts, (S,).
 
     A site has at most ``most`` data, none farther away than ``reach``; of equally far data, the first. Indices beyond
     the count of a site are meaningless.
@@ -114,13 +114,15 @@ def given_data(
 
     A neighbour without a datum has t = 1, and no weight. Each datum is compared at its own offset, so the margin of
     ``sample`` limits the distance of data. ``of`` (n,) is the kind of each candidate, from 0; a row holds the
-    probability of each kind and adds up to 1. ``sites`` (S, 2) are rows and columns; ``bandwidth`` is h in units of
-    h_opt, equation (8), for the number of data of the site.
+    probability of each kind and adds up to 1. ``sites`` (S, axes) are [layers,] rows and columns; ``bandwidth`` is
+    h in units of h_opt, equation (8), for the number of data of the site.
     """
-    places = sample.places(np.zeros((1, 2), np.int32), 1)  # the offset of no neighbour
+    places = sample.places(np.zeros((1, sites.shape[1]), np.int32), 1)  # the offset of no neighbour
+    strides = np.array([sample.layer * sample.cols, sample.cols, 1])[-sites.shape[1] :]
+    line = (1,) * (sites.shape[1] - 1)
     kinds, size = int(of.max()) + 1, places.positions.size
     window = lcpdf.window(1, sample.top)._replace(gauss=np.ones(1, np.float32), radius=0, top=kinds - 1)
-    relaxation = _all(machine, sample, places, Grid((1, 1)), window)
+    relaxation = _all(machine, sample, places, Grid((*line, 1)), window)
     square = relaxation.proposal.square
     kind = np.zeros(square.levels.shape[1], np.float32)
     kind[machine.get(square.at)] = of
@@ -137,17 +139,18 @@ def given_data(
             for begin in range(0, those.size, step):
                 here = those[begin : begin + step]
                 told = numbers[here, :count]
-                apart = (data.place[told] - part[here][:, None]) @ np.array([sample.cols, 1])
+                apart = (data.place[told] - part[here][:, None]) @ strides
                 scattered = Scattered(
                     machine.put(np.arange(here.size + 1, dtype=np.int32) * np.int32(count)),
                     machine.put(np.append(apart.ravel(), 0).astype(np.int32)),
                     machine.put(np.append(data.values[told.ravel()], data.values[:1], 0)),
                     np.float32(1),
                 )
-                planes = ((sample.channels, 1, here.size), 0, np.uint16), ((1, here.size), -1, np.int32)
-                field = Field(*(machine.put(np.full(*plane)) for plane in (*planes, ((1, here.size), 1024, np.uint16))))
+                shape = (*line, here.size)
+                planes = ((sample.channels, *shape), 0, np.uint16), (shape, -1, np.int32), (shape, 1024, np.uint16)
+                field = Field(*(machine.put(np.full(*plane)) for plane in planes))
                 rule = relaxation._replace(
-                    grid=Grid((1, here.size), torus=False),
+                    grid=Grid(shape, torus=False),
                     costs=relaxation.costs._replace(scattered=scattered),
                     choice=relaxation.choice._replace(window=window._replace(scale=scale)),
                 )

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
@@ -428,7 +427,7 @@ class Options:
         lattice = "none" if plain or named else self.lattice
         wanted = self.proportions
         if wanted is None and named and pictures.deep and pictures.pixels[0].shape[-1] == 1:
-            wanted = tuple(np.unique(pictures.values(0, 0), return_counts=True)[1].tolist())
+            wanted = tuple(pictures.proportions().tolist())
         least = min(min(one.shape[:-1]) for one in pictures.pixels)
         order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
         found = replace(self, order=order, search=search, finish=finish, structure=structure)

@@ -96,16 +96,18 @@ def plan(
         Rows and columns after which the lattice of a regular sample repeats on a torus; None: those of X.
     """
     pictures = options.of(pictures)
+    if soft and soft.images is not None:
+        pictures = replace(pictures, shares=soft.shares)
     check_categories(pictures, given, options.proportions)
+    if pictures.deep:
+        check_volume(options)
     asked, options = options.proportions, options.resolved(pictures)
     if guide or (soft and soft.categories is not None):
         options = replace(options, proportions=asked)  # a guide, and a map of probabilities, say how much of each
-    if pictures.deep:
-        check_volume(pictures, options)
     offsets = neighbourhood_offsets(options.neighbourhood, len(shape))
     sides = [picture.shape[:-1] for picture in pictures.pixels]
     if soft and soft.images is not None:  # each picture must serve the sites that it is probable at
-        pictures, sides = replace(pictures, shares=soft.shares), [min(sides, key=min)]
+        sides = [min(sides, key=lambda side: min(side[-2:]))]
     levels = number_of_levels(sides, offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
     guides: list[AnyGuide] = []
@@ -226,14 +228,15 @@ def sampled(
     return fewer, sample
 
 
-def check_volume(pictures: Pictures, options: Options) -> None:
-    """Raise if a volume has an option that only pictures support."""
-    if len(pictures.pixels) > 1:
-        raise ValueError("several samples are pictures; give one volume")
+def check_volume(options: Options) -> None:
+    """Raise if a volume has an option, as it is given, that only pictures support."""
     flat = {
         "boundary": options.boundary == "torus",
         "array": options.array is not None,
         "schedule": schedules.get(options.schedule).tile is not None,
+        "finish": bool(options.finish),
+        "structure": options.structure not in (0, Options.structure),
+        "lattice": options.lattice not in ("auto", "none"),
     }
     for name in filter(flat.get, flat):
         raise ValueError(f"{name}={vars(options)[name]} is for pictures; leave it out for a volume")
