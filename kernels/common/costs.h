@@ -43,9 +43,9 @@
         __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
         __global const ushort *restrict kinds_of, __global const float *restrict kind_cost
 #define EVALUATED(p, factor, site) WITH_COSTS(DISTANCE(p), p, factor, site)
-#define DISTANCE(p) DISTANCE_BELOW(p, UNBOUNDED)
-#define DISTANCE_BELOW(p, ...)                                                                                         \
-    distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, __VA_ARGS__)
+#define DISTANCE(p) distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, UNBOUNDED)
+#define DISTANCE_BELOW(p, factor, most, best)                                                                          \
+    distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, factor, most, best)
 #define WITH_COSTS(distance, p, factor, site)                                                                          \
     (PRODUCT(distance, factor) + penalty[p] + PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
 #define PHASE(p, site) apart_in_phase(waves + (p), listed, phases + (site), area_, phase_weight, tolerance)
