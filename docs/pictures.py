@@ -219,6 +219,11 @@ def research():
                 print(told.getvalue(), end="")
 
 
+def address(kind, file):
+    """A picture as an address, which WebGL takes also from a page that is opened as a file."""
+    return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
 def light():
     """Make a material of 2048 pixels from one of 512; keep both at a quarter of their size for relight.js."""
     height = resize(gravel(128), (512, 512), order=3, mode="reflect")  # stones of 60 pixels
@@ -234,7 +239,7 @@ def light():
         for one in pictures:
             small = downscale_local_mean(one, (4, 4, 1)).round().astype(np.uint8)
             PIL.Image.fromarray(small).save(file := io.BytesIO(), "WEBP", quality=75)
-            addresses.append(f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}")
+            addresses.append(address("webp", file))
         maps.append([*addresses, copies])
     (HERE / "_static" / "material.js").write_text(f"window.material = {json.dumps(maps)};\n", encoding="utf-8")
 
@@ -252,7 +257,8 @@ def tileset():
     """Planes of two sets, and beside them the packed picture and the shader of the page."""
     halves = [downscale_local_mean(picture[:256, :256], (2, 2)) for picture in (data.gravel(), data.grass())]
     sample, grass = (np.round(half).astype(np.uint8) for half in halves)
-    write(HERE / "_static" / "tileset.png", simdtex.tileset(sample, 64, rng=1))
+    PIL.Image.fromarray(simdtex.tileset(sample, 64, rng=1)).save(file := io.BytesIO(), "PNG", optimize=True)
+    (HERE / "_static" / "tiles.js").write_text(f'window.tiles = "{address("png", file)}";\n', encoding="utf-8")
     (HERE / "readers" / "tiles.glsl").write_text(glsl(numbers(2)), encoding="utf-8")
     corners = np.random.default_rng(1).integers(0, 2, (9, 9))
     samples = (("gravel", sample), ("grass and gravel", [grass, sample]))

@@ -52,7 +52,7 @@ addEventListener("DOMContentLoaded", () => {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
     draw();
   };
-  picture.src = canvas.dataset.tiles;
+  picture.src = window.tiles;
   canvas.onpointermove = (event) => {
     if (!event.buttons) return;
     const scale = canvas.width / canvas.clientWidth / side;
