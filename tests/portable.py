@@ -29,7 +29,19 @@ COLUMNS = ("file", "defines", "kernel", "gfx1100 registers", "gfx1100 scratch", 
 CLANG = next(filter(None, (shutil.which(f"clang-{version}") for version in range(15, 30))), "")
 NO_CLANG = "clang is missing, 15 or newer: apt install clang-15 (Debian 12, Ubuntu)"
 
-LANGUAGE = ("-x", "cl", "-cl-std=CL1.2", "-Xclang", "-finclude-default-header", "-Wno-everything", "-Werror=pedantic", "-S", "-o", "-", "-")
+LANGUAGE = (
+    "-x",
+    "cl",
+    "-cl-std=CL1.2",
+    "-Xclang",
+    "-finclude-default-header",
+    "-Wno-everything",
+    "-Werror=pedantic",
+    "-S",
+    "-o",
+    "-",
+    "-",
+)
 BUILTINS = ("-nogpulib", "-include", str(Path(__file__).with_suffix(".h")))
 TARGETS = {
     "amdgcn": ("-target", "amdgcn-amd-amdhsa", "-mcpu=gfx1100", "-O3", *BUILTINS),
