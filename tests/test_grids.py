@@ -539,6 +539,7 @@ def test_wells_and_realisations_lie_in_the_coordinates_of_a_raster(tmp_path, out
         with xarray.open_dataset(tmp_path / output, decode_coords="all") as many:
             found = many.simulation[0].values[::-1][rows, cols]
             assert "UTM zone 33N" in many.spatial_ref.crs_wkt
+            assert many.x.attrs["units"] == many.y.attrs["units"] == "m"
             assert many.y.values[[0, -1]].tolist() == [8770, 8990]
     assert np.array_equal(found, heights[rows, cols])
     refused = run(*words[:3], tmp_path / "other.nc", *words[4:6])

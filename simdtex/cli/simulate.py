@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -140,10 +141,16 @@ def read_georeference(
 
 
 def georeferenced(made: Any, crs: str) -> Any:
-    """Return an array or dataset of xarray with a coordinate reference system, if it is known, as CF describes it."""
+    """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
     if not crs:
         return made
     found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": crs})).assign_attrs(crs=crs)
+    with suppress(ImportError):  # the extra rasters
+        from rasterio.crs import CRS
+
+        unit = CRS.from_wkt(crs).units_factor[0]
+        own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
+        found = found.assign_coords({axis: found[axis].assign_attrs(own) for axis in "xy" if axis in found.coords})
     for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
         one.encoding["grid_mapping"] = "spatial_ref"
     return found
