@@ -273,7 +273,7 @@ BAD = {
             "order": 45,
         },
         ValueError,
-        "order=45 with 2 bands compares 298 values; give a smaller order, so that there are 258 at most",
+        "order=45 with 2 bands compares 290 values; give a smaller order, so that there are 258 at most",
     ),
     "an unknown option": ({"orders": 3}, TypeError, "unknown option 'orders' of the method 'classifier' .did you mean"),
     "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),

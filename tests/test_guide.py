@@ -243,16 +243,16 @@ def test_a_pixel_is_the_nearest_of_the_picture(eighths, halves):
     copy, by, angle = copy_of(3, (rows, cols), eighths, halves), 2.0 ** (halves / 2), radians(45 * eighths)
     assert copy.image == 3
     high, wide = copy.inside.shape
-    far = 0.0
+    far, (rows_at, cols_at) = 0.0, np.broadcast_arrays(*copy.at)
     for i, j in np.ndindex(high, wide):
         y, x = (i - (high - 1) / 2) / by, (j - (wide - 1) / 2) / by
         col = x * cos(angle) + y * sin(angle) + (cols - 1) / 2
         row = -x * sin(angle) + y * cos(angle) + (rows - 1) / 2
         if copy.inside[i, j]:
-            far = max(far, abs(row - copy.row[i, j]), abs(col - copy.col[i, j]))
+            far = max(far, abs(row - rows_at[i, j]), abs(col - cols_at[i, j]))
         else:
             assert not (-0.4 < row < rows - 0.6 and -0.4 < col < cols - 0.6)
-        assert 0 <= copy.row[i, j] < rows and 0 <= copy.col[i, j] < cols
+        assert 0 <= rows_at[i, j] < rows and 0 <= cols_at[i, j] < cols
     assert far <= 0.5 + 1e-6
     assert copy.inside.sum() == pytest.approx(rows * cols * by**2, rel=0.2)
 

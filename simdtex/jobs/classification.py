@@ -43,7 +43,7 @@ def classify(call: Classify) -> Work:
     differently lit texture is another texture, and strips narrower than the coupling vanish.
 
     Cost: pixels x exemplars x classes x 66 multiply-adds for each band, and pixels x classes x 7000 multiply-adds for
-    the fit; 512x512 pixels and five classes take some 10 s of one core. Memory: 48 bytes for each pixel and class, 200
+    the fit; 512x512 pixels and five classes take some 10 s of one core. Memory: 48 bytes for each pixel and class, 100
     for each pixel, and 200 MB.
 
     Examples

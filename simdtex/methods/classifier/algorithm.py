@@ -79,7 +79,7 @@ class Plan:
         part = min(sites, SITES_AT_ONCE)
         planes = experts + PATTERNS * self.options.levels
         device = sites * (16 * count + experts * bands) + part * 14 * planes
-        host = sites * (count * (2 * experts + 20) + 24 * bands + 64 + 4 * planes) + part * (24 * planes + 24)
+        host = sites * (count * (2 * experts + 20) + 24 * bands + 64 + experts * bands) + part * (24 * planes + 24)
         memory.require(machine, device, host)
         model = self.classes
         if not isinstance(model, Model):
@@ -257,7 +257,7 @@ class Run:
         fit = np.zeros((classes, rows, cols), np.float32)
         rejected = np.zeros((rows, cols), bool)
         freedom, size = self.model.freedom, self._size
-        patterned = patterns(self.machine, self._levels)
+        levels = [np.asarray(self.machine.get(one)) for one in self._levels]
         limit = fdtri(SPREAD, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
         reach = len(self._taps) // 2
         band, margin = max(1, SITES_AT_ONCE // cols), reach + size // 2
@@ -266,14 +266,14 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
-            segments = []
+            patterned, segments = patterns(levels, slab), []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
                 (box,) = ndimage.find_objects(own.astype(np.int8))
                 part = tuple(slice(max(0, side.start - reach), side.stop + reach) for side in box)
                 segment = _Segment(part, *(mask[part] for mask in (own, inner, own & inside)))
-                segments.append((label, segment, self._means(patterned[:, slab], np.zeros_like(own), segment)))
+                segments.append((label, segment, self._means(patterned, np.zeros_like(own), segment)))
             for c, null in enumerate(self.model.nulls):
                 logs = state.logs[:, c, slab]
                 copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture

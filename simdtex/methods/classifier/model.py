@@ -20,6 +20,7 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.model.scale import Scale
 from simdtex.ops.classes import LOGS, SIXTEENTHS, Exemplars, exemplars, features, gaussian, stacked, window
+from simdtex.ops.pyramids import within
 
 SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 """Standard deviations of the Gaussians that smooth the levels, pixels."""
@@ -159,19 +160,21 @@ def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) 
     return found
 
 
-def patterns(machine: Machine, levels: Sequence[Array]) -> NDArray[np.uint16]:
-    """Return where each binary pattern of the eight neighbours occurs, (levels x `PATTERNS`, rows, cols).
+def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.uint16]:
+    """Return where each binary pattern of the eight neighbours occurs in some rows, (levels x `PATTERNS`, rows, cols).
 
-    A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart. Values are shares of
-    the bands, in 1 / `OCCURRENCE`.
+    A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart, mirrored beyond the
+    border. Values are shares of the bands, in 1 / `OCCURRENCE`.
     """
     found = []
-    for level, placed in enumerate(levels):
-        values, step = np.asarray(machine.get(placed)), 2**level
-        bands, rows, cols = values.shape
-        padded = np.pad(values, ((0, 0), (step, step), (step, step)), "reflect" if min(rows, cols) > step else "edge")
-        around = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)]  # neighbours in a ring
-        greater = [padded[:, step * y :, step * x :][:, :rows, :cols] >= values for y, x in around]
+    for level, values in enumerate(levels):
+        bands, height, width = values.shape
+        near = [
+            [within(np.arange(*part.indices(n)) + 2**level * by, n, False) for by in (-1, 0, 1)]
+            for part, n in ((rows, height), (slice(None), width))
+        ]
+        ring = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)]
+        greater = [values[:, near[0][y]][..., near[1][x]] >= values[:, rows] for y, x in ring]
         changes = sum((a != b).astype(np.uint8) for a, b in zip(greater, greater[1:] + greater[:1], strict=True))
         code = np.where(changes <= 2, np.sum(greater, 0, dtype=np.uint8), PATTERNS - 1)
         found += [(code == one).sum(0, dtype=np.uint16) * (OCCURRENCE // bands) for one in range(PATTERNS)]
@@ -320,7 +323,8 @@ class _Class:
         for place, region in enumerate(self.regions):
             logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
             judged = np.zeros(region.sites.shape, bool)
-            patterned = patterns(machine, self._levels[place])
+            levels = [np.asarray(machine.get(one)) for one in self._levels[place]]
+            patterned = patterns(levels, slice(None))
             for sites in _quarters(region.sites):
                 part = _Part(place, sites)
                 shown = np.flatnonzero(_boxed(sites))
