@@ -62,6 +62,8 @@ def small(code):
         .replace("(20, 64, 64)", "(8, 14, 16)")
         .replace("block[:, 20]", "block[:, 2]")
         .replace("--size 64", "--size 8")
+        .replace("(2, 8, 24, 24)", "(2, 6, 16, 16)")
+        .replace("np.arange(24) >= 12", "np.arange(16) >= 8")
     )
     code = code.replace("data.camera()", "data.camera()[:64, :64]")
     code = re.sub(r"((ensemble\.)?channels\(\))", r"(image[:40, :40] for image in \1)", code)
