@@ -159,7 +159,7 @@ def export(image, stem):
     return path
 
 
-def spans(corners, width, height):
+def spans(corners):
     """Yield (row, first, after) of the pixels whose middles lie in a polygon; corners are in pixels, the origin below.
 
     Rows and columns beyond the picture are counted on, since coordinates of textures repeat.
@@ -188,7 +188,7 @@ def selection(context, image):
         for face in mesh.faces if layer else ():
             if face.select:
                 corners = [(loop[layer].uv.x * width, loop[layer].uv.y * height) for loop in face.loops]
-                for row, first, after in spans(corners, width, height):
+                for row, first, after in spans(corners):
                     for column in range(first, min(after, first + width)):
                         rows[height - 1 - row % height][column % width] = 255
     if any(map(any, rows)):
