@@ -112,6 +112,7 @@ def write(
     from simdtex.report.sheet import fitted, rgb
 
     (rows, cols), colours = shape, len(names)
+    grid = corners_of(torus(colours))
     if normals and made.ndim == 3:
         made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
     corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))
@@ -119,13 +120,13 @@ def write(
         for number, one in enumerate(maps):
             packed = one.carried(run.source) if number else made
             image.write(folder / one.out, packed, one.maps.metadata)
-            for (row, col), _ in np.ndenumerate(torus(colours)):
-                which = "".join(map(str, corners_of(torus(colours))[row, col]))
+            for row, col in np.ndindex(grid.shape[:2]):
+                which = "".join(map(str, grid[row, col]))
                 tile = packed[row * rows : (row + 1) * rows, col * cols : (col + 1) * cols]
                 image.write(folder / f"{one.out.stem}-{which}{one.out.suffix}", tile, one.maps.metadata)
         shown = image.coloured(plane(made, corners, colours), maps[0].maps.metadata and maps[0].maps.metadata.palette)
         image.write(folder / "plane.png", fitted(rgb(shown), SHEET))
-        about = maps[0].out.name, (rows, cols), names, corners_of(torus(colours))
+        about = maps[0].out.name, (rows, cols), names, grid
         texts = {"tiles.tsx": tilesets.tiled_set(*about), "tiles.tres": tilesets.godot_set(*about)}
         texts["plane.tmx"] = tilesets.tiled_map("tiles.tsx", (rows, cols), laid(corners, colours))
         for name, text in {**texts, "tiles.glsl": tilesets.glsl(numbers(colours))}.items():
