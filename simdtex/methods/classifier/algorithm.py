@@ -19,20 +19,20 @@ from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.classifier import Options
 from simdtex.methods.classifier.model import (
-    PATTERNS,
+    MEANS,
     UNITS,
     Model,
     Region,
     blurred,
     learn,
     measured,
-    patterns,
     prepared,
     windowed,
 )
+from simdtex.methods.classifier.patterns import NEAR, PATTERNS, SHARE, patterns
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
-from simdtex.ops.classes import WEIGHTS, exemplars, features, gaussian, potts, window
+from simdtex.ops.classes import LOGS, WEIGHTS, exemplars, features, gaussian, potts, window
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Observer, Output, Progress
 
@@ -44,6 +44,9 @@ SITES_AT_ONCE = 2**17
 
 SPREAD = 4
 """Degrees of freedom of the squared difference of a window's measures: see docs/classification.rst."""
+
+PATTERN = round(UNITS / LOGS * SHARE)
+"""Evidence, in `UNITS`, of one unit of the logarithms of probabilities by patterns."""
 
 STEPS = 64
 """The most steps of a sweep, since each takes a pass over the picture."""
@@ -79,7 +82,7 @@ class Plan:
         part = min(sites, SITES_AT_ONCE)
         planes = experts + PATTERNS * self.options.levels
         device = sites * (16 * count + experts * bands) + part * 14 * planes
-        host = sites * (count * (2 * experts + 20) + 24 * bands + 64 + experts * bands) + part * (24 * planes + 24)
+        host = sites * (count * (2 * experts + 22) + 24 * bands + 64 + experts * bands) + part * (24 * planes + 24)
         memory.require(machine, device, host)
         model = self.classes
         if not isinstance(model, Model):
@@ -90,9 +93,9 @@ class Plan:
 class State(NamedTuple):
     """The state between two steps.
 
-    ``done``, the number of compared rows; ``logs`` (E, classes, rows, cols) uint16, logarithms of distances; ``labels``
-    (rows, cols) uint8, 0 the first class; ``schedule``, its state; ``changed``, the number of labels that each sweep
-    changed. The next step writes into the arrays.
+    ``done``, the number of compared rows; ``logs`` (E + 1, classes, rows, cols) uint16, logarithms of distances, and
+    minus those of probabilities by binary patterns; ``labels`` (rows, cols) uint8, 0 the first class; ``schedule``, its
+    state; ``changed``, the number of labels that each sweep changed. The next step writes into the arrays.
     """
 
     done: int
@@ -142,7 +145,7 @@ class Run:
     def begin(self) -> State:
         """Return the state before any comparison."""
         shape = self.plan.pixels.shape[:2]
-        logs = np.zeros((len(self.model.experts), len(self.plan.names), *shape), np.uint16)
+        logs = np.zeros((len(self.model.experts) + 1, len(self.plan.names), *shape), np.uint16)
         return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 
     def step(self, state: State, watch: Callable[..., None]) -> tuple[State, None]:
@@ -165,18 +168,32 @@ class Run:
             values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
             found = machine.get(exemplars(machine, values, known))
             state.logs[e, :, state.done : end] = found.reshape(len(found), -1, cols)
+        state.logs[-1, :, state.done : end] = self._patterned(state.done, end)
         if end < self.grid.rows:
             state.labels[state.done : end] = self._single(state.logs[:, :, state.done : end]).argmax(0)
         else:
             state.labels[:] = self._evidence(state.logs).argmax(0)
         return state._replace(done=end)
 
+    @cached_property
+    def _pictured(self) -> list[NDArray[np.uint16]]:
+        """The levels of the picture in NumPy."""
+        return [np.asarray(self.machine.get(one)) for one in self._levels]
+
+    def _patterned(self, first: int, end: int) -> NDArray[np.uint16]:
+        """Return the logarithms of probabilities by the patterns around the sites of some rows, (classes, n, cols)."""
+        slab = slice(max(0, first - len(NEAR) // 2), min(self.grid.rows, end + len(NEAR) // 2))
+        here = np.zeros((slab.stop - slab.start, self.grid.cols), bool)
+        here[first - slab.start : end - slab.start] = True
+        means, _ = windowed(self.machine, patterns(self._pictured, slab), np.ones_like(here), NEAR, here)
+        return self.model.discriminant.logarithms(means / float(MEANS)).reshape(-1, end - first, self.grid.cols)
+
     def _single(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
-        """Return the evidence of single neighbourhoods, (classes, ...) int32 in 2**-18: equation (6) by the nearest."""
+        """Return the evidence of single sites, (classes, ...) int32 in 2**-18: equation (6), and patterns."""
         total = np.empty(logs.shape[1:], np.int32)
         total[:] = self.model.offsets.reshape(-1, *[1] * (total.ndim - 1))
-        for expert, one in zip(self.model.experts, logs, strict=True):
-            total -= np.int32(expert.factor) * one.astype(np.int32)
+        for factor, one in zip((*(expert.factor for expert in self.model.experts), PATTERN), logs, strict=True):
+            total -= np.int32(factor) * one.astype(np.int32)
         return total
 
     def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
@@ -257,7 +274,6 @@ class Run:
         fit = np.zeros((classes, rows, cols), np.float32)
         rejected = np.zeros((rows, cols), bool)
         freedom, size = self.model.freedom, self._size
-        levels = [np.asarray(self.machine.get(one)) for one in self._levels]
         limit = fdtri(SPREAD, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
         reach = len(self._taps) // 2
         band, margin = max(1, SITES_AT_ONCE // cols), reach + size // 2
@@ -266,7 +282,7 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
-            patterned, segments = patterns(levels, slab), []
+            patterned, segments = patterns(self._pictured, slab), []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
@@ -275,7 +291,7 @@ class Run:
                 segment = _Segment(part, *(mask[part] for mask in (own, inner, own & inside)))
                 segments.append((label, segment, self._means(patterned, np.zeros_like(own), segment)))
             for c, null in enumerate(self.model.nulls):
-                logs = state.logs[:, c, slab]
+                logs = state.logs[:-1, c, slab]
                 copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
                 for label, segment, means in segments:
                     there = state.labels[here] == label

@@ -16,11 +16,11 @@ from simdtex import random
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
 from simdtex.methods.classifier import Options
+from simdtex.methods.classifier.patterns import NEAR, OWN, Discriminant, patterns, roots
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.model.scale import Scale
 from simdtex.ops.classes import LOGS, SIXTEENTHS, Exemplars, exemplars, features, gaussian, stacked, window
-from simdtex.ops.pyramids import within
 
 SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 """Standard deviations of the Gaussians that smooth the levels, pixels."""
@@ -58,17 +58,8 @@ RAW = 0.35
 FINER = (1.0, 0.3, 0.09, 0.027, 0.0081)
 """Weights of the evidence of levels, the finest first."""
 
-OWN, FLOOR = 0.7, 1e-4
-"""Variance of a class: the share of its own, the rest is pooled; and the least value."""
-
-PATTERNS = 10
-"""Binary patterns of a level: uniform ones by the number of greater neighbours, 0 to 8, and all others."""
-
-OCCURRENCE = 2**12
-"""Units in 1 of the share of bands in which a pattern occurs."""
-
-RARE = 0.02
-"""Added to the frequency of a pattern, whose root is compared: the variance of roots hardly depends on the mean."""
+FLOOR = 1e-4
+"""The least variance of a measure."""
 
 
 class Expert(NamedTuple):
@@ -134,14 +125,16 @@ class Model:
     """A trained classifier, without any machine.
 
     ``exemplars``, one for each expert, with all classes, in NumPy; ``offsets`` (classes,) int64, added to the evidence
-    of each class; ``nulls``, one for each class; ``freedom``, the degrees of freedom of their variances; ``own``
-    (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the numbers of exemplars.
+    of each class; ``discriminant`` of patterns; ``nulls``, one for each class; ``freedom``, the degrees of freedom of
+    their variances; ``own`` (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the
+    numbers of exemplars.
     """
 
     scale: Scale
     experts: list[Expert]
     exemplars: list[Exemplars]
     offsets: NDArray[np.int64]
+    discriminant: Discriminant
     nulls: list[Null]
     freedom: int
     own: NDArray[np.float64]
@@ -160,31 +153,9 @@ def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) 
     return found
 
 
-def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.uint16]:
-    """Return where each binary pattern of the eight neighbours occurs in some rows, (levels x `PATTERNS`, rows, cols).
-
-    A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart, mirrored beyond the
-    border. Values are shares of the bands, in 1 / `OCCURRENCE`.
-    """
-    found = []
-    for level, values in enumerate(levels):
-        bands, height, width = values.shape
-        near = [
-            [within(np.arange(*part.indices(n)) + 2**level * by, n, False) for by in (-1, 0, 1)]
-            for part, n in ((rows, height), (slice(None), width))
-        ]
-        ring = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)]
-        greater = [values[:, near[0][y]][..., near[1][x]] >= values[:, rows] for y, x in ring]
-        changes = sum((a != b).astype(np.uint8) for a, b in zip(greater, greater[1:] + greater[:1], strict=True))
-        code = np.where(changes <= 2, np.sum(greater, 0, dtype=np.uint8), PATTERNS - 1)
-        found += [(code == one).sum(0, dtype=np.uint16) * (OCCURRENCE // bands) for one in range(PATTERNS)]
-    return np.array(found, np.uint16)
-
-
 def measured(means: NDArray[np.int64], patterned: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the measures of windows, (M, n): mean logarithms (E, n), and roots of the frequencies of patterns."""
-    frequencies = patterned / float(MEANS * OCCURRENCE)
-    return np.concatenate([means / float(MEANS * LOGS), np.sqrt(frequencies + RARE)])
+    return np.concatenate([means / float(MEANS * LOGS), roots(patterned / float(MEANS))])
 
 
 def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
@@ -223,7 +194,8 @@ def learn(
         offsets.append(round(typical - shift))
     nulls, freedom = _nulls(selves)
     pooled = [stacked([one[e] for one in drawn]) for e in range(len(experts))]
-    return Model(scale, experts, pooled, np.array(offsets, np.int64), nulls, freedom, own, counts)
+    discriminant = Discriminant.of([one.patterns for one in selves], [one.parts[:, len(experts) :] for one in selves])
+    return Model(scale, experts, pooled, np.array(offsets, np.int64), discriminant, nulls, freedom, own, counts)
 
 
 def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
@@ -271,12 +243,13 @@ class OwnDistances(NamedTuple):
     """The distances of the parts of a class from the rest of it.
 
     ``mean`` (E,) of the logarithms in natural units; ``windows`` (M, n), the measures of windows; ``parts`` (parts, M),
-    those of each part.
+    those of each part; ``patterns`` (P, n), roots of the frequencies of patterns in small windows.
     """
 
     mean: NDArray[np.float64]
     windows: NDArray[np.float64]
     parts: NDArray[np.float64]
+    patterns: NDArray[np.float64]
 
 
 class _Class:
@@ -319,7 +292,7 @@ class _Class:
     def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> OwnDistances:
         """Return the distances of the parts of the class from the rest of it, for each expert, and their measures."""
         taps = gaussian(options.window)
-        windows, parts, own = [], [], []
+        windows, parts, own, near = [], [], [], []
         for place, region in enumerate(self.regions):
             logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
             judged = np.zeros(region.sites.shape, bool)
@@ -340,7 +313,8 @@ class _Class:
                 parts.append(measured(*(one // len(shown) for one in sums))[:, 0])
                 own.append(sums[0][:, 0] / (MEANS * len(shown) * LOGS))
             windows.append(measured(*(windowed(machine, one, judged, taps, judged)[0] for one in (logs, patterned))))
-        return OwnDistances(np.array(own).mean(0), np.concatenate(windows, 1), np.array(parts))
+            near.append(roots(windowed(machine, patterned, judged, NEAR, judged)[0] / float(MEANS)))
+        return OwnDistances(np.array(own).mean(0), np.concatenate(windows, 1), np.array(parts), np.concatenate(near, 1))
 
 
 TOO_FEW = 8
