@@ -7,14 +7,16 @@ from cases import REFERENCE, assert_same_bits, opencl, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
+from scipy.special import softmax
+from scipy.stats import multivariate_normal
 
 from simdtex.driver import drive
-from simdtex.methods.classifier import Options, model
+from simdtex.methods.classifier import Options, model, patterns
 from simdtex.methods.classifier.algorithm import Plan
-from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS, MEANS, Region, experts_of, learn, windowed
+from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS, MEANS, UNITS, Region, experts_of, learn, windowed
 from simdtex.model.pictures import Pictures
 from simdtex.model.scale import Scale
-from simdtex.ops.classes import EXEMPLAR_MULTIPLE, TAPS, exemplars, features, gaussian, potts, stacked, window
+from simdtex.ops.classes import EXEMPLAR_MULTIPLE, LOGS, TAPS, exemplars, features, gaussian, potts, stacked, window
 
 # -- The whole neighbourhoods that a classifier compares: values, and what is left of them with contrast compressed.
 
@@ -300,13 +302,15 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoo
     labels = drive(plan, REFERENCE, 1)[0][..., 0]
     learned = learn(REFERENCE, classes, list(plan.names.values()), plan.options, 1)
     energy, share = [], np.array([0.35, 0.65])
+    patterned = plan.on(REFERENCE, 1)._patterned(0, len(picture))
     for c, (region,) in enumerate(classes):
         logs = [
             np.log1p(distances(picture, region.pixels[..., 0], one)) - 0.3 * learned.own[c, e]
             for e, one in enumerate(learned.experts)
         ]
         fewer = 2 * np.log(learned.counts[c] / max(learned.counts)) / np.array([9, 13])
-        energy.append(-(np.tensordot(share, logs, 1) + share @ fewer) / model.TEMPERATURE)
+        single = -(np.tensordot(share, logs, 1) + share @ fewer) / model.TEMPERATURE
+        energy.append(single - patterns.SHARE * patterned[c] / LOGS)
     gap = energy[1] - energy[0]
     for axis in (0, 1) if smoothing else ():
         gap = ndimage.correlate1d(gap, gaussian(smoothing) / TAPS, axis, mode="mirror")
@@ -452,7 +456,7 @@ def test_means_over_a_window_are_of_the_sites_alone():
 def test_the_variance_of_a_class_has_its_share_that_of_all_and_the_drift():
     rng = np.random.default_rng(3)
     selves = [
-        model.OwnDistances(np.zeros(2), rng.normal(5, 3 * scale, (2, 50)), rng.normal(0, scale, (parts, 2)))
+        model.OwnDistances(np.zeros(2), rng.normal(5, 3 * scale, (2, 50)), rng.normal(0, scale, (parts, 2)), None)
         for scale, parts in ((0.2, 4), (0.4, 4), (0.1, 1))
     ]
     nulls, freedom = model._nulls(selves)
@@ -468,18 +472,48 @@ def test_the_variance_of_a_class_has_its_share_that_of_all_and_the_drift():
 def test_patterns_are_uniform_rings_by_the_number_of_greater_neighbours(bands):
     rng = np.random.default_rng(4)
     levels = rng.integers(0, 4, (2, bands, 9, 11)).astype(np.uint16)
-    found = model.patterns(list(levels), slice(None))
+    found = patterns.patterns(list(levels), slice(None))
     ring = [(-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1)]
     for level, place in np.ndindex(2, 9 * 11):
         row, col = divmod(place, 11)
-        share = np.zeros(model.PATTERNS)
+        share = np.zeros(patterns.PATTERNS)
         for plane in levels[level]:
             padded = np.pad(plane, 2, "reflect")
             bits = [padded[row + 2 + y * 2**level, col + 2 + x * 2**level] >= plane[row, col] for y, x in ring]
             uniform = sum(a != b for a, b in zip(bits, np.roll(bits, 1), strict=True)) <= 2
-            share[sum(bits) if uniform else 9] += model.OCCURRENCE // bands
-        assert (found[model.PATTERNS * level :][: model.PATTERNS, row, col] == share).all()
-    assert np.array_equal(model.patterns(list(levels), slice(2, 7)), found[:, 2:7])
+            share[sum(bits) if uniform else 9] += patterns.OCCURRENCE // bands
+        assert (found[patterns.PATTERNS * level :][: patterns.PATTERNS, row, col] == share).all()
+    assert np.array_equal(patterns.patterns(list(levels), slice(2, 7)), found[:, 2:7])
+
+
+def test_the_evidence_of_patterns_is_that_of_normal_densities():
+    """Against SciPy's densities with the covariance of the docs: .7 own, .3 of all, and ten times the drift."""
+    rng = np.random.default_rng(5)
+    mixed = rng.normal(0, 0.05, (3, 4, 4)) + 0.1 * np.eye(4)
+    windows = [0.4 + 0.1 * c + mix @ rng.normal(0, 0.3, (4, 200)) for c, mix in enumerate(mixed)]
+    parts = [one[:, :4].T for one in windows[:2]] + [windows[2][:, :1].T]
+    frequencies = np.concatenate([one[:, :100] for one in windows], 1) ** 2 - 0.02 + rng.uniform(0, 0.05, (4, 300))
+    found = patterns.Discriminant.of(windows, parts).logarithms(frequencies * patterns.OCCURRENCE) / LOGS
+    own, drift = [np.cov(one) for one in windows], (np.cov(parts[0].T) + np.cov(parts[1].T)) / 2
+    logs = []
+    for mean, one in zip(windows, own, strict=True):
+        covariance = 0.7 * one + 0.3 * sum(own) / 3 + 10 * drift
+        covariance += np.diag(1e-3 * np.diag(covariance) + 2.0**-24)
+        logs.append(multivariate_normal(mean.mean(1), covariance).logpdf(np.sqrt(frequencies + 0.02).T) / 8)
+    expected = np.log(1.05) - np.log(softmax(logs, 0) + 0.05)
+    assert found == pytest.approx(expected, abs=0.01)
+    assert found.max() > 3 and np.ptp(found.argmin(0)) == 2
+
+
+def test_patterns_weigh_in_the_evidence():
+    """The logarithms of probabilities by patterns times 0.35, on all rows of several strips."""
+    run = planned(halves()[0]).on(REFERENCE, 1)
+    strips = [run._patterned(first, first + 12) for first in (0, 12, 24)]
+    assert np.array_equal(run._patterned(0, 36), np.concatenate(strips, 1))
+    logs = np.zeros((len(run.model.experts) + 1, 2, 36, 60), np.uint16)
+    logs[-1] = LOGS
+    without = run.model.offsets[:, None, None]
+    assert (run._single(logs) - without == -LOGS * round(0.35 * UNITS / LOGS)).all()
 
 
 def test_sites_whose_neighbours_lie_beyond_their_segment_are_not_judged():

@@ -43,11 +43,11 @@ DOUBT = 0.05
 SHARE = 0.35
 """Weight of the logarithms of probabilities in the evidence."""
 
-_ROOT, _WHITE, _SQUARE = 2**12, 2**20, 2**8  # units in 1 of roots, of the whitening matrix, and of whitened values
+_ROOT, _WHITE = 2**12, 2**20  # units in 1 of roots, and of whitening matrices
 
 
 def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.uint16]:
-    """Return where each binary pattern of the eight neighbours occurs in some rows, (levels x `PATTERNS`, rows, cols).
+    """Return where each binary pattern occurs in some rows, (levels x `PATTERNS`, rows, cols).
 
     A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart, mirrored beyond the
     border. Values are shares of the bands, in 1 / `OCCURRENCE`.
@@ -109,8 +109,8 @@ class Discriminant(NamedTuple):
         values = np.rint(roots(patterned) * _ROOT)
         energy = np.empty((len(self.means), values.shape[1]))
         for one, mean, white, log in zip(energy, self.means, self.whitening, self.logs, strict=True):
-            whitened = np.rint(white @ (values - mean[:, None]) * (_SQUARE / _WHITE))
-            one[:] = ((whitened * whitened).sum(0) / (2 * _SQUARE**2) + log) / HEAT
+            whitened = white @ (values - mean[:, None]) / _WHITE  # sums of integers are the same in any order
+            one[:] = ((whitened * whitened).sum(0) / 2 + log) / HEAT
         chance = exp32(np.maximum(energy.min(0) - energy, -80))
         chance /= np.add.accumulate(chance)[-1]
         least, most = np.float32(DOUBT), np.float32(1 + DOUBT)
