@@ -410,6 +410,7 @@ def test_bricks_stay_whole_across_the_seam(any_device):
     assert abs((made[~courses] < 80).mean() - (image[~courses] < 80).mean()) < 0.01
 
 
+@pytest.mark.slow
 def test_joints_go_on_through_a_hole(any_device):
     image, hole = wall((160, 200), (20, 50), 3), np.zeros((160, 200), bool)
     hole[45:115, 55:145] = True

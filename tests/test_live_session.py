@@ -841,6 +841,7 @@ def test_a_pixel_is_explained_with_another_order_and_more_trust(page_inside):
     assert "order at level 0 must be an integer" in page_inside.error(kind="explain", row=5, col=7, order="x")
 
 
+@pytest.mark.slow
 def test_films_of_four_schedules_are_made_while_nothing_else_is_asked(page_inside):
     run = asked(width=7, height=8, options=EXACT | {"levels": 1}, part=[0, 0, 12, 12])
     page_inside.say(**run | {"kind": "schedules"})
