@@ -54,7 +54,8 @@ def both(shape, array, device, mapping="cut-and-stack", channels=None, dtype=np.
 @pytest.mark.parametrize(
     ("name", "mapping"),
     slow_but(
-        [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER[::2])], product(CASES, MAPPINGS)
+        [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER[::2])],
+        product(CASES, MAPPINGS),
     ),
 )
 def test_the_program_has_the_bytes_and_the_account_of_the_engine(name, mapping):
