@@ -362,7 +362,8 @@ def test_windows_of_layers_that_occur_in_a_volume():
     ("training", "options"),
     [
         (facies(kinds=5), {"shape": (3, 6, 7)}),  # half of the lanes
-        (facies(kinds=4)[4], {"order": 18, "shape": (6, 10)}),  # all of them, and the structure channel
+        # all of them, and the structure channel
+        (facies(kinds=4)[4], {"order": 18, "levels": 2, "search": "coherent", "shape": (6, 10)}),
         (facies(kinds=4)[4], {"known": np.where(np.arange(440).reshape(20, 22) % 9, np.nan, 2.0), "order": 5}),
         (facies(kinds=4)[4], {"relaxation": "gibbs", "search": "coherent", "shape": (9, 11)}),  # noise
     ],
