@@ -129,7 +129,7 @@ def test_an_output_is_no_input(folder, pair):
         ("in/given.png", "link.png"),
         ("way/given.png", "in/given.png"),
     ]
-    for one, other in ways if name == "synth" else ways[:3]:
+    for one, other in ways if name == "synth" else ways[1:3]:
         args = [*reading(given, one), *rest, *writing(out, other)]
         refused("is an input and would be overwritten; give the output another name", name, *args)
 

@@ -26,7 +26,17 @@ def check(name, device, reference, **how):
     assert json.loads(counts) == json.loads(known)
 
 
-@pytest.mark.parametrize("name", [name for name, run in RUNS.items() if run.plain])
+PLAIN = [name for name, run in RUNS.items() if run.plain]
+LONG = ("defaults", "overview", "levels-by-output", "overview-whole", "paper", "exact-order-8", "exact-three-levels")
+LONG += ("exact-colour", "exact-16-bit", "exact-of-many", "gibbs", "density-16-bit", "mode-colour", "few-colour")
+LONG += ("few-order-18", "few-16-bit", "few-chance", "few-levels", "few-gibbs", "few-density", "bool-larger")
+LONG += ("few-whole", "all-of-many", "random-subset:0.3", "block-exact", "raster", "random-scan", "balance-order-9")
+LONG += ("structure-colour", "structure-beyond", "novelty-exact", "finish-16-bit", "lattice-exact", "more-levels")
+LONG += ("reduced-lattice", "reduced-everything", "several-gaps", "categories-mixed")
+"""Runs that take the plain loops more than a second; `make test` has their digests, `make slow` their loops."""
+
+
+@pytest.mark.parametrize("name", slow_but([name for name in PLAIN if name not in LONG], PLAIN))
 def test_a_run_is_that_of_the_plain_loops(reference, results, name):
     expected, _ = results(f"plain {name}", lambda: (RUNS[name].plain(), ""))
     assert_same_bits(reference(name)[0][: len(expected)], expected)
@@ -215,8 +225,7 @@ def test_the_plain_loops_have_the_engines_defaults_and_presets():
 def test_every_option_changes_a_run_of_the_plain_loops(reference, option):
     """Else their equality would show nothing of it; a new option wants a run in the table."""
     default, tried = plain_mrf.DEFAULTS[option], 0
-    plain = [name for name, run in RUNS.items() if run.plain]
-    for name in sorted(plain, key=lambda name: (option not in name, reference(name)[0][0].size)):
+    for name in sorted(PLAIN, key=lambda name: (option not in name, reference(name)[0][0].size)):
         if RUNS[name].inputs()[1].get(option, default) == default:
             continue
         tried += 1

@@ -841,21 +841,22 @@ def test_a_pixel_is_explained_with_another_order_and_more_trust(page_inside):
     assert "order at level 0 must be an integer" in page_inside.error(kind="explain", row=5, col=7, order="x")
 
 
+@pytest.mark.slow
 def test_films_of_four_schedules_are_made_while_nothing_else_is_asked(page_inside):
-    run = asked(width=10, height=12, options=EXACT | {"levels": 1}, part=[0, 0, 14, 14])
+    run = asked(width=7, height=8, options=EXACT | {"levels": 1}, part=[0, 0, 12, 12])
     page_inside.say(**run | {"kind": "schedules"})
-    page_inside.result(width=10, height=12)
+    page_inside.result(width=7, height=8)
     found = {name: page_inside.wait("schedule", name=name) for name in FILMED}
     kinds = [kind for kind in page_inside.kinds() if kind in ("result", "schedule")]
     assert kinds.index("result") < len(FILMED), "another request comes before the next film"
     for name, (one, films) in found.items():
-        replay = simdtex.replay(SAMPLE[:14, :14], (12, 10), rng=7, **RULES | EXACT | {"levels": 1}, schedule=name)
-        assert (one["width"], one["height"]) == (10, 12)
+        replay = simdtex.replay(SAMPLE[:12, :12], (8, 7), rng=7, **RULES | EXACT | {"levels": 1}, schedule=name)
+        assert (one["width"], one["height"]) == (7, 8)
         assert (one["steps"], one["sweeps"]) == (replay.sweeps[0].sets, len(replay.sweeps))
         assert (one["together"] == 0) == (name in ("coloring", "raster"))
-        end = np.frombuffer(films[-1], np.uint8).reshape(12, 10, 4)[..., :3]
+        end = np.frombuffer(films[-1], np.uint8).reshape(8, 7, 4)[..., :3]
         np.testing.assert_array_equal(end, replay.at(-1).image, "the last picture is the result")
-        seen = np.frombuffer(films[0], np.uint8).reshape(12, 10, 4)
+        seen = np.frombuffer(films[0], np.uint8).reshape(8, 7, 4)
         assert (seen[replay.at(0, 1).relaxed == 2, 0] >= 178).all(), "the sites of the first set are magenta"
         assert len(films) <= FILM_FRAMES + 1
     assert found["synchronous"][0]["together"] == 1

@@ -252,7 +252,8 @@ def test_maps_have_north_up_in_plots_and_reports_and_pictures_their_first_row(tm
     known = np.where(np.isin(np.indices(HALVES.shape)[0], [0, 15]), HALVES, np.nan)
     np.save("known.npy", known)
     words = ["simulate", "t.png", "-o", "o.npz", "--known", "known.npy", "--report", "page", "--categorical"]
-    result = CliRunner().invoke(main, [*words, "--order", "2", *["--origin", "5,5", "--cell", "10,10"] * ground])
+    words += ["--order", "2", "--device", "reference"]
+    result = CliRunner().invoke(main, [*words, *["--origin", "5,5", "--cell", "10,10"] * ground])
     assert result.exit_code == 0, result.output
     first, last = category_colours(2)[::-1] if ground else category_colours(2)
     sheet = read("page/realisations.png").pixels[GAP + STRIP :, GAP : GAP + 20]

@@ -201,7 +201,7 @@ def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, orde
 
 
 @lattices
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 5)

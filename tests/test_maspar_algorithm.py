@@ -22,7 +22,7 @@ ICM = {"relaxation": "icm", "levels": 2}  # the coarsest level draws
 
 CASES = {
     "of the array's size": ((12, 16), "12x16", {"order": 4}),
-    "smaller": ((7, 6), "16x16", {"order": 8, "levels": 2}),
+    "smaller": ((7, 6), "16x16", {"order": 5, "levels": 2}),
     "larger, sides no multiple": ((11, 13), "4x5", {"order": 2, "levels": 3}),
     "larger, whole layers": ((12, 16), "4x8", {"order": 2, "boundary": "open"}),
     "open, smaller": ((9, 10), "16x12", {"order": 4, "boundary": "open", "pixel": "source"}),
@@ -54,7 +54,8 @@ def both(shape, array, device, mapping="cut-and-stack", channels=None, dtype=np.
 @pytest.mark.parametrize(
     ("name", "mapping"),
     slow_but(
-        [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER)], product(CASES, MAPPINGS)
+        [*((name, MAPPINGS[0]) for name in CASES), *((name, MAPPINGS[1]) for name in LARGER[::2])],
+        product(CASES, MAPPINGS),
     ),
 )
 def test_the_program_has_the_bytes_and_the_account_of_the_engine(name, mapping):

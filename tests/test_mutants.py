@@ -233,7 +233,7 @@ def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
     whole = driven(None, lambda info, tree, now=False: kept.append((info, deepcopy(tree()))))
     assert [info.level for info, _ in kept if not info.sweep] == [1, 0]  # the steps that enter a level
     assert [report["skipped"] for report in whole[2]] == [0, 0, 0]
-    assert all(driven(found) == whole for _, found in kept[::5])
+    assert all(driven(found) == whole for _, found in kept[::9])
 
 
 def test_how_far_a_run_is():

@@ -101,6 +101,7 @@ def jog(picture, period, width=8):
     return worst
 
 
+@pytest.mark.slow
 def test_bars_and_joints_stay_straight(any_device):
     cloth, wall = bars((132, 132), 44), 255 - planks((96, 132), 24, 44, 2)
     made = [

@@ -353,7 +353,7 @@ def alike(p):
     return p._replace(grid=grid, field=field, sites=np.arange(grid.size, dtype=np.int32))
 
 
-DRAWN = [(False, 0.5, 1.0), (False, 2.0, 0.0), (True, 0.5, 0.0), (True, 1.0, 1.0)]
+DRAWN = [(False, 0.5, 1.0), (True, 0.5, 0.0)]
 
 
 @pytest.mark.parametrize(

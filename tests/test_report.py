@@ -333,7 +333,7 @@ def test_stage_folder_is_checked_and_cleared(tmp_path):
 
 # -- The report of one synthesis: what it says of the use of the sample is what the source map says.
 
-OPTIONS = {"mrf": {"order": 2, "lattice": "9,0,0,9"}, "multires": {"alpha": 0.5}}
+OPTIONS = {"mrf": {"order": 1, "lattice": "9,0,0,9"}, "multires": {"alpha": 0.5}}
 
 
 def colours_synthesis(part):

@@ -115,9 +115,9 @@ def smooth(shape, seed):
 @pytest.mark.parametrize(
     ("search", "sample", "shape", "share"),
     [
-        ("coherent", (80, 80), (64, 64), 0.03),
+        ("coherent", (64, 64), (48, 48), 0.03),
         pytest.param("exact", (80, 80), (64, 64), 0.03, marks=pytest.mark.slow),
-        ("coherent", (12, 32, 32), (8, 24, 24), 0.1),
+        ("coherent", (10, 24, 24), (6, 16, 16), 0.1),
     ],
 )
 def test_a_variable_known_alone_decides_on_the_others(search, sample, shape, share):
