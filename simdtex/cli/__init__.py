@@ -47,7 +47,8 @@ GROUPS = {
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
 MODULES = {
-    **dict.fromkeys(("synth", "extend", "tile", "fill", "mix", "solid", "resume"), "textures"),
+    **dict.fromkeys(("synth", "extend", "tile", "fill", "resume"), "textures"),
+    **dict.fromkeys(("mix", "solid"), "pyramids"),
     **dict.fromkeys(("estimate", "classify"), "simulate"),
     **dict.fromkeys(("live", "demo", "devices", "bench"), "machine"),
     **dict.fromkeys(("schedules", "maspar"), "studies"),
