@@ -74,8 +74,7 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
                 f"simdtex resume {store.where}"
             ) from None
         finally:
-            cancel: Any = client.cancel
-            cancel(list(running.futures))
+            client.cancel(list(running.futures))
 
     return execute
 
