@@ -56,13 +56,6 @@ def new_figure(width: float, height: float) -> Plot:
     return figure
 
 
-def figure_png(figure: Plot) -> bytes:
-    """Return the figure as a PNG, the same bytes every time."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
-
-
 def tidy(axes: Axes, title: str = "", x: str = "", y: str = "") -> None:
     """Set labels and a faint grid below the data, and remove the box."""
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK)
@@ -101,10 +94,14 @@ class Figure:
 
     @cached_property
     def png(self) -> bytes:
-        """The picture as a PNG."""
+        """The picture as a PNG, the same bytes every time."""
         if isinstance(self.picture, bytes):
             return self.picture
-        return figure_png(self.picture) if isinstance(self.picture, Plot) else encoded(self.picture)
+        if not isinstance(self.picture, Plot):
+            return encoded(self.picture)
+        buffer = io.BytesIO()
+        self.picture.savefig(buffer, format="png", metadata={"Software": None})
+        return buffer.getvalue()
 
     @property
     def alt(self) -> str:

@@ -17,7 +17,7 @@ from simdtex.model.light import sample_sentences
 from simdtex.model.source_map import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
 from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
-from simdtex.report.tables import Table
+from simdtex.report.tables import Table, settings_table
 from simdtex.run import Output
 
 Picture = NDArray[np.uint8]
@@ -69,8 +69,7 @@ def write_synthesis(
     job: dict[str, Any] = {name: statistics[name] for name in ("seed", "tiles") if name in statistics}
     job |= {"light": statistics["light"]["light"]} if "light" in statistics else {}
     job |= {"seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
-    settings = [{"What": k, "Value": str(v)} for k, v in job.items() if not isinstance(v, np.ndarray)]
-    sections.append(Section("The job", [Table("The run and the options of its method", settings)]))
+    sections.append(Section("The job", [settings_table("The run and the options of its method", job)]))
     write_report(folder, "A texture and its sample", lead, sections, results, command)
 
 
@@ -231,8 +230,7 @@ def write_classification(
         sections.append(Section("Confusion", [Table("The confusion matrix", rows, note)]))
         results |= {"confusion": confusion, "accuracy": right}
     job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
-    settings = [{"What": k, "Value": str(v)} for k, v in job.items()]
-    sections.append(Section("The job", [Table("The run and its options", settings)]))
+    sections.append(Section("The job", [settings_table("The run and its options", job)]))
     lead = f"{labels.shape[1]} x {labels.shape[0]} pixels and {count - 1} classes, on {statistics['device']}."
     write_report(folder, "Which texture is where", lead, sections, results, command)
 
