@@ -17,6 +17,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+import PIL.Image
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Plot
@@ -24,8 +25,8 @@ from numpy.typing import NDArray
 
 from simdtex import __version__
 from simdtex.io.files import atomic_folder, earlier_files
+from simdtex.io.image import pillow_bytes
 from simdtex.model.display import OKABE_ITO
-from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns
 
 INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
@@ -98,7 +99,7 @@ class Figure:
         if isinstance(self.picture, bytes):
             return self.picture
         if not isinstance(self.picture, Plot):
-            return encoded(self.picture)
+            return pillow_bytes(PIL.Image.fromarray(self.picture), "PNG")
         buffer = io.BytesIO()
         self.picture.savefig(buffer, format="png", metadata={"Software": None})
         return buffer.getvalue()

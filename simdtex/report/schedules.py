@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from simdtex import __version__, schedules
 from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
 from simdtex.experiments.ising import LEVEL, Chains, Finding, Spins
-from simdtex.io.image import to_display
+from simdtex.io.image import pillow_bytes, to_display
 from simdtex.jobs.array import Execution
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -537,6 +536,4 @@ def film(shown: Mapping[str, Steps]) -> bytes:
             frame.paste(PIL.Image.fromarray(colours), (left, 4 * TEXT + GAP))
             left += len(colours[0]) + GAP
         frames.append(frame)
-    buffer = io.BytesIO()
-    frames[0].save(buffer, "PNG", save_all=True, append_images=frames[1:], duration=PAUSE, loop=0)
-    return buffer.getvalue()
+    return pillow_bytes(frames[0], "PNG", save_all=True, append_images=frames[1:], duration=PAUSE, loop=0)

@@ -188,9 +188,7 @@ def write_classification(
     names, count, colours = [one["name"] for one in classes], len(classes), label_colours(256)
     number = np.full(256, count)  # of the class of each label
     number[[one["label"] for one in classes]] = np.arange(count)
-    picture = to_display(image.reshape(*image.shape[:2], -1))
-    shown = picture[..., :3] if picture.shape[-1] > 2 else np.repeat(picture[..., :1], 3, 2)
-    sheet = [("the picture", shown), ("the labels", colours[labels])]
+    sheet = [("the picture", rgb(image)), ("the labels", colours[labels])]
     if truth is not None:
         known = number[truth][..., None] < count
         sheet.append(("the truth", np.where(known, colours[truth], UNTOLD)))
