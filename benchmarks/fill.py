@@ -70,7 +70,7 @@ def score(original, picture, hole):
         if kind == "known":
             asked = asked[:: -(-len(asked) // QUERIES)]
         if len(asked):
-            distance[kind] = np.mean(nearest(made, asked, known, PATCH, APART).distance ** 2)
+            distance[kind] = np.mean(nearest(made, asked, known, PATCH, APART) ** 2)
     steps = {kind: [] for kind in ("known", "seam", "step")}
     for axis in (0, 1):
         size = abs(np.diff(made, axis=axis)).mean(-1)

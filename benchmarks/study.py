@@ -87,7 +87,7 @@ def _share(planes):
     while -(-rows // spacing) * -(-cols // spacing) > MOST:
         spacing += 1
     asked = np.add.outer(np.arange(0, rows, spacing) * cols, np.arange(0, cols, spacing)).ravel()
-    return float((nearest(planes, asked, planes, side, apart=APART // 2).distance < ALIKE).mean())
+    return float((nearest(planes, asked, planes, side, apart=APART // 2) < ALIKE).mean())
 
 
 def salt(sample, output):

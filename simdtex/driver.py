@@ -131,25 +131,19 @@ def execute(
     """
     machine = open_machine(device)
     machine.profile()  # forget what was before
+
+    def seen(progress: Progress) -> Any:
+        assert callback
+        return callback(replace(progress, image=lambda: restored(progress.image(), channel_axis)))
+
     with begin_run(checkpoint, name, rng, inputs, machine.name) as (seed, checkpointing):
-        image, output = run(machine, seed, seeing(callback, channel_axis), checkpointing)
+        image, output = run(machine, seed, callback and seen, checkpointing)
     output.statistics.update(machine.profile() or {})
     picture = restored(image, channel_axis)
     if not full_output:
         return picture
     stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
     return picture, replace(output, stages=stages, made=image)
-
-
-def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:
-    """Return a callback that calls ``callback`` with pictures whose axes are those of the sample."""
-    if callback is None:
-        return None
-
-    def seen(progress: Progress) -> Any:
-        return callback(replace(progress, image=lambda: restored(progress.image(), channel_axis)))
-
-    return seen
 
 
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:

@@ -701,9 +701,7 @@ SHARED = table(Common)
 """The inputs that most functions share."""
 
 TABLES_OF: dict[str, Any] = {
-    **{"synth": Synth, "solid": Solid, "fill": Fill, "extend": Extend, "simulate": Simulate, "estimate": Estimate},
-    "tileset": Tileset,
-    **{"classify": Classify, "mix": Mix},
+    one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Simulate, Estimate, Tileset, Classify, Mix)
 }
 """The tables by job, which has the name of its command."""
 

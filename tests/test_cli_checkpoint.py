@@ -13,8 +13,6 @@ from commands import refused, run
 
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint, read
-from simdtex.cli import COMMANDS, load
-from simdtex.cli.textures import COMMANDS as KEEPING
 from simdtex.io import image
 
 SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5")
@@ -233,8 +231,3 @@ def test_a_second_ctrl_c_stops_at_once(place, monkeypatch):
         patch.setattr(Checkpoint, "stop", impatient)
         assert given(*MRF, "--checkpoint", "kept").exit_code == 130
     assert len(stops) == 1
-
-
-def test_every_command_that_keeps_is_known():
-    having = {name for name in COMMANDS if any(p.name == "checkpoint" for p in load(name).params)}
-    assert set(KEEPING) == having

@@ -13,9 +13,8 @@ from simdtex.experiments.ising import Experiment
 from simdtex.experiments.ising import ising as experiment
 from simdtex.maspar.algorithm import ising
 from simdtex.maspar.array import DIRECTIONS, MAPPINGS, ProcessorArray, path
-from simdtex.maspar.coloring import coloring
 from simdtex.maspar.machine import CLOCK, COSTS, FULL, MP1
-from simdtex.maspar.walk import Walk
+from simdtex.maspar.sites import Walk, coloring
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Key
 from simdtex.ops.sites import coloring as engine

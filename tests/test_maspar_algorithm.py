@@ -12,7 +12,7 @@ from simdtex import maspar
 from simdtex.maspar.algorithm import Level, Pass, Problem, Program, by_lane
 from simdtex.maspar.array import MAPPINGS, ProcessorArray
 from simdtex.maspar.machine import MP1
-from simdtex.maspar.walk import Walk
+from simdtex.maspar.sites import Walk
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.arithmetic import fma32
 from simdtex.ops.lcpdf import Choice, window

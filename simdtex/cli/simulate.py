@@ -19,9 +19,6 @@ from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option, size_option
 
 TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
-MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
-"""The maps of a simulation, the first of which that is given has the size of the output."""
-
 FITS = (".tif", ".tiff", ".npy")
 
 UNLABELLED = 255
@@ -53,6 +50,7 @@ def simulate(
     """
     from simdtex import simulate
     from simdtex.io.volume import write_realisations
+    from simdtex.jobs.inputs import Maps
     from simdtex.run import Output
 
     how, number = take_reading(options, deep=True), 1 if number is None else number
@@ -60,7 +58,7 @@ def simulate(
     georeference = read_georeference(material, output, options, bool(source))
     data = read_inputs("simulate", options, material, how)
     known, pixels = data["known"], material.pixels[0]
-    maps = [one for one in (data[name] for name in MAPS) if isinstance(one, np.ndarray)]
+    maps = [one for one in (data[name] for name in Maps._fields) if isinstance(one, np.ndarray)]
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps if one.ndim >= 2 + material.deep]
     shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     place = georeference | given({name: options.pop(name) for name in ("several", "outside")})

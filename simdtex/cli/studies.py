@@ -27,6 +27,7 @@ from simdtex.cli.options import (
     size_option,
 )
 from simdtex.maspar import EXECUTED
+from simdtex.maspar.array import ARRAYS, MAPPINGS, PREFIX
 from simdtex.schedules import PARALLEL, Schedule
 
 
@@ -140,14 +141,14 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
     default="16k",
     show_default=True,
     metavar="PES",
-    words=("1k", "2k", "4k", "8k", "16k"),
+    words=[name.removeprefix(PREFIX) for name in ARRAYS],
     help="Use the array of this many PEs, or ROWSxCOLS.",
 )
 @option(
     "--mapping",
-    default="cut-and-stack",
+    default=MAPPINGS[0],
     show_default=True,
-    words=("cut-and-stack", "hierarchical"),
+    words=MAPPINGS,
     help="Arrange a picture larger than the array in layers of its size (cut-and-stack), or in a block on each PE.",
 )
 @option(

@@ -406,10 +406,6 @@ def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool | None) -> tuple
     return pixels, hole | gone | unknown_in(planes(pixels))
 
 
-COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth", "tile", "tileset")
-"""Those that keep checkpoints."""
-
-
 @command(
     ("resume state", "Continue the run of --checkpoint state."),
     ("resume more.zarr --workers 4", "Continue an output in tiles with four processes."),
@@ -424,7 +420,7 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
     FILE is the file of --checkpoint, or the .zarr store of --tiles.
     """
     from simdtex.checkpoint import read
-    from simdtex.cli import load
+    from simdtex.cli import COMMANDS, load
 
     if (path / "zarr.json").is_file() or (path / "work").is_dir():
         resume_tiles(path, workers, device, quiet)
@@ -438,11 +434,12 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
     command: dict[str, Any] | None = read(path)[0]["command"]
     if command is None:
         raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
-    if command["name"] not in COMMANDS:
+    again = load(command["name"]) if command["name"] in COMMANDS else None
+    if again is None or all(one.name != "checkpoint" for one in again.params):
         raise ValueError(f"the checkpoint in {path} is of a command that cannot be resumed; remove it")
     if not os.path.isdir(command["folder"]):
         raise ValueError(f"{command['folder']}, the folder of the run in {path}, does not exist; restore it")
-    again, given = load(command["name"]), {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
+    given = {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
     with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
         context.params |= {name: value for name, value in given.items() if value}
         again.invoke(context)

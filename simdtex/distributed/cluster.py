@@ -4,22 +4,22 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import islice
 from logging import CRITICAL, getLogger
-from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from threading import Event, Thread, current_thread, main_thread
+from typing import Any
+
+import distributed
+from distributed import Client, Worker, WorkerPlugin
 
 from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.turns import Execute, do
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
-from simdtex.options import require, whole
-
-if TYPE_CHECKING:
-    from distributed import Client
+from simdtex.options import whole
 
 AHEAD = 3
 """Tasks per worker that the scheduler holds: one is always ready, and the scheduler's memory is bounded."""
@@ -44,7 +44,6 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
 
     ``note`` receives a sentence when there are no workers.
     """
-    distributed: Any = import_module("distributed")
     what = store.where, store.about["name"], None if device is None else str(device)
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:
@@ -75,8 +74,7 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
                 f"simdtex resume {store.where}"
             ) from None
         finally:
-            cancel: Any = client.cancel
-            cancel(list(running.futures))
+            client.cancel(list(running.futures))
 
     return execute
 
@@ -120,6 +118,25 @@ def check_workers(workers: Any, device: Any) -> None:
         raise TypeError("each worker opens its own device; give its name, not an open machine")
 
 
+class Cores(WorkerPlugin):
+    """Gives each worker of a local cluster ``each`` cores of its own, before it opens a device."""
+
+    name = "simdtex-cores"
+
+    def __init__(self, each: int) -> None:
+        self.each = each
+
+    def setup(self, worker: Worker) -> None:
+        """Set the cores of the worker, which its threads and those of its device inherit."""
+        if current_thread() is main_thread():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that starts the workers
+        if not hasattr(os, "sched_setaffinity"):
+            return  # workers compete for cores on this system
+        free = sorted(os.sched_getaffinity(0))
+        first = int(worker.name) * self.each % len(free)
+        os.sched_setaffinity(0, {free[(first + k) % len(free)] for k in range(min(self.each, len(free)))})
+
+
 @contextmanager
 def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     """Yield a client: of a number of processes on this machine, of the scheduler at an address, or the given one.
@@ -129,10 +146,6 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     if workers is None or not isinstance(workers, (int, str)):
         yield workers
         return
-    require("distributed", "distributed")
-    distributed: Any = import_module("distributed")
-    from simdtex.distributed.cores import Cores
-
     if isinstance(workers, str):
         getLogger("distributed.client").setLevel(CRITICAL)  # one sentence reports the end of a run
         try:

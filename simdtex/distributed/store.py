@@ -112,8 +112,6 @@ TALLIES_AT_ONCE = 2**22
 NODES = ("zarr.json", ".zarray", ".zgroup", ".zattrs", ".zmetadata")
 """The metadata files of Zarr; every other file is a chunk."""
 
-PLANES = ("values", "source", "temperature")
-
 
 class Turn(NamedTuple):
     """An operation on every tile.
@@ -349,7 +347,7 @@ class Store:
             axes = ("array", "chunk_y", "chunk_x")
             self._array("checksums", shape, (count, side, side), np.dtype(np.uint32), axes)
         else:
-            for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
+            for name, kind in zip(Field._fields, ("uint16", "int32", "uint16"), strict=True):
                 before = (work.layout.channels,) if name == "values" else ()
                 self._sites(f"work/level{level.number}/{turn.number}/{name}", level, kind, before)
         row = 2 + candidates
@@ -449,12 +447,12 @@ class Store:
     def read(self, level: LevelLayout, turn: int, window: Tile) -> Field:
         """Return the state of a level's sites after the turn of a number, in a window, which may cross the seam."""
         here = f"work/level{level.number}/{turn}"
-        return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
+        return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in Field._fields))
 
     def write(self, turn: Turn, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites after a turn."""
         here = f"work/level{turn.level}/{turn.number}"
-        for name, plane in zip(PLANES, field, strict=True):
+        for name, plane in field._asdict().items():
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
     def held(self, level: LevelLayout, window: Tile) -> Held:

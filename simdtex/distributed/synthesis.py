@@ -129,7 +129,7 @@ def synthesize(
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options, light), as_seed(rng)
     layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
-    require("distributed", "zarr", "dask")
+    require("distributed", "zarr", "dask", "distributed")
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
 
@@ -277,7 +277,7 @@ def _made(store: PathLike) -> Iterator[str]:
 
 def _opened(path: PathLike) -> Any:
     """Return the store at a path; raise ValueError unless this version can continue it."""
-    require("distributed", "zarr", "dask")
+    require("distributed", "zarr", "dask", "distributed")
     from simdtex.distributed.store import FORMAT, Store
 
     where = os.path.abspath(path)

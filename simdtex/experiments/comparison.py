@@ -23,7 +23,7 @@ from simdtex.methods.mrf.options import ORDERS, Options
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback, Progress
-from simdtex.schedules import Active, Info, Schedule, Setting, Watched
+from simdtex.schedules import Schedule, Setting, Watched
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
 
@@ -138,11 +138,7 @@ class Noted(Watched):
     def init(self, setting: Setting) -> Any:
         """Return the schedule's own state."""
         self.claims.append(bool(self.independent(setting.grid, setting.offsets)))
-        return self.schedule.init(setting)
-
-    def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """Return the schedule's own step."""
-        return self.schedule.step(setting, state, active)
+        return super().init(setting)
 
 
 @dataclass(frozen=True)

@@ -83,25 +83,18 @@ def halved(planes: Planes) -> Planes:
     return np.asarray(quarters / np.float32(4), dtype=np.float32)
 
 
-class Found(NamedTuple):
-    """The nearest candidates: ``distance`` (n,) float64, infinite without a candidate, and ``where`` (n,) indices."""
-
-    distance: NDArray[np.float64]
-    where: Indices
-
-
-def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apart: int = 0) -> Found:
-    """Return, for the patches ``asked`` of a picture, the nearest of all patches of another.
+def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apart: int = 0) -> NDArray[np.float64]:
+    """Return the distances (n,) of the patches ``asked`` of a picture from the nearest of all patches of another.
 
     ``asked`` (n,) are the numbers of first pixels in raster order. Distances are the root of the mean squared
-    difference over the side^2 x channels values; of equally near candidates the first is found. A candidate counts only
-    if its row or its column differs from the query's by at least ``apart`` pixels. Memory: under 200 MB beyond the
-    pictures, for any size.
+    difference over the side^2 x channels values, infinite without a candidate. A candidate counts only if its row or
+    its column differs from the query's by at least ``apart`` pixels. Memory: under 200 MB beyond the pictures, for any
+    size.
     """
     size = side * side * queries.shape[2]
     step = max(1, min(BLOCK_ROWS, BLOCK_BYTES // (4 * size)))
     width = max(1, BLOCK_BYTES // (4 * max(step, size)))
-    distance, places = np.empty(len(asked)), np.empty(len(asked), np.intp)
+    distance = np.empty(len(asked))
     for start in range(0, len(asked), step):
         part = asked[start : start + step]
         wanted = _patches(queries, part, side)
@@ -128,8 +121,7 @@ def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apar
         difference = wanted - _patches(candidates, where, side)
         squares = np.einsum("ij,ij->i", difference, difference, dtype=np.float64)
         distance[start : start + step] = np.where(np.isinf(least), np.inf, np.sqrt(squares / size))
-        places[start : start + step] = where
-    return Found(distance, places)
+    return distance
 
 
 def count(planes: Planes, side: int) -> int:
@@ -211,7 +203,7 @@ def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool) -> f
         if min(side for planes in pair for side in planes.shape[:2]) < PATCH:
             break
         candidates, queries = pair if of_output else pair[::-1]
-        means.append(float(nearest(queries, _every(queries), candidates, PATCH).distance.mean()))
+        means.append(float(nearest(queries, _every(queries), candidates, PATCH).mean()))
         pair = [halved(planes) for planes in pair]
     return float(np.mean(means))
 

@@ -216,6 +216,13 @@ def cast(values: Array, dtype: DTypeLike) -> tuple[Array, NDArray[np.bool_]]:
     return found, found != values
 
 
+def plain_array(name: str, values: Any) -> Array:
+    """Return an array-like as `as_array` does; raise ValueError if a mask hides values."""
+    array = as_array(name, values)
+    unmasked(name, array)
+    return np.asarray(array)
+
+
 AXES = {2: "(rows, cols)", 3: "(layers, rows, cols)"}
 """The axes of a picture and of a volume."""
 
@@ -248,10 +255,7 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
         The number of axes does not fit, an axis is empty, or a value is infinite, or NaN or masked unless `unknown` is
         true.
     """
-    pixels = as_array("the sample", array)
-    if not unknown:
-        unmasked("the sample", pixels)
-    pixels = np.asarray(pixels)
+    pixels = np.asarray(as_array("the sample", array)) if unknown else plain_array("the sample", array)
     check_real("the sample", pixels)
     if channel_axis is None and pixels.ndim != axes:
         hint = ", or channel_axis=-1 if its last axis holds the channels" * (pixels.ndim == axes + 1)
@@ -305,13 +309,12 @@ def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...
 
 def pixels_of(name: str, values: Any, axes: int = 2) -> Array:
     """Return the values of a picture, or of a volume with 3 ``axes``, as an array; raise for a wrong type or axes."""
-    pixels = as_array(name, values)
-    unmasked(name, pixels)
+    pixels = plain_array(name, values)
     check_real(name, pixels)
     if pixels.ndim not in (axes, axes + 1) or pixels.size == 0:
         more = AXES[axes].replace(")", ", channels)")
         raise ValueError(f"{name} has the shape {pixels.shape}; give {AXES[axes]} or {more}")
-    return np.asarray(pixels)
+    return pixels
 
 
 class Format(NamedTuple):

@@ -63,6 +63,11 @@ class Window(NamedTuple):
     cols: slice
     levels: int
 
+    @property
+    def at(self) -> tuple[slice, slice]:
+        """Its rows and columns."""
+        return self.rows, self.cols
+
 
 def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     """Return windows that hold the holes of a picture and the neighbourhoods of their sites, from top to bottom.
@@ -289,8 +294,7 @@ class Filling:
         done, inside = checkpointing.found or ([], None)
         finished = [Made(*made) for made in done]
         for number, window in enumerate(parts):
-            at = (window.rows, window.cols)
-            hole = self.hole[at]
+            at, hole = window.at, self.hole[window.at]
             if number == len(finished):
                 sample = self.sample_of(window)
                 seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
@@ -323,8 +327,7 @@ class Filling:
         progress: Progress,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
-        at = (window.rows, window.cols)
-        pasted = partial(paste, at=at, hole=self.hole[at], level=progress.level)
+        pasted = partial(paste, at=window.at, hole=self.hole[window.at], level=progress.level)
         read: Any = progress.source
         return callback(
             replace(
@@ -366,7 +369,7 @@ class Filling:
         """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
             return WindowSample(self.sample, (0, 0), None)
-        at = (window.rows, window.cols)
+        at = window.at
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
@@ -378,7 +381,7 @@ class Filling:
 
     def plan(self, window: Window, sample: WindowSample) -> mrf.Plan:
         """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
-        at, options, guide = (window.rows, window.cols), self.options, None
+        at, options, guide = window.at, self.options, None
         pictures, hole, least = sample.pictures, self.hole[at], window.levels and options.levels is None
         known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
         values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
@@ -452,7 +455,7 @@ class HoleReplay:
         (window,) = parts
         sample = job.sample_of(window)
         self._replay = Replay(job.plan(window, sample), machine, seed)
-        self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, sample.corner
+        self._at, self._hole, self._corner = window.at, job.hole, sample.corner
         self._whole = job.begin()
         self.origin, self.largest_order = (window.rows.start, window.cols.start), self._replay.largest_order
 

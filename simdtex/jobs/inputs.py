@@ -21,13 +21,13 @@ from simdtex.checkpoint import Checkpointing, digest
 from simdtex.driver import Plan, check_shape, check_sides, drive, execute
 from simdtex.inputs import Input, inputs, options_of, parameter_types
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
-from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
+from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of, plain_array
 from simdtex.machine import Machine, memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.light import Relit, Trend, trend, unevenness
 from simdtex.model.pictures import HALVES, Mask, Pictures, Turned, check_alike, few, turned, unknown_in
-from simdtex.options import UNSET, DataWarning, check_real, entries, lists, option_parameters, unmasked
+from simdtex.options import UNSET, DataWarning, check_real, entries, lists, option_parameters
 from simdtex.run import Callback, Output, Progress
 
 SUMS = 1e-3
@@ -271,7 +271,7 @@ def is_several(sample: Any, channel_axis: int | None, axes: int = 2) -> bool:
 
 def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
     """Return a mask as a bool array of ``shape``; raise if it is not one."""
-    found = _unmasked(name, mask)
+    found = plain_array(name, mask)
     if found.dtype != np.bool_:
         raise TypeError(f"{name} holds {found.dtype} values; give True and False")
     _check_size(name, found.shape, of, shape)
@@ -363,7 +363,7 @@ def _warn_beyond(values: NDArray[Any], there: NDArray[np.bool_], pictures: Pictu
 
 def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
     """Return the positions of known pixels in the sample, (rows, cols, 2 or 3)."""
-    place = _unmasked("known_source", source)
+    place = plain_array("known_source", source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
         raise ValueError(
@@ -413,12 +413,6 @@ def _guide(name: str, array: Any, axes: int) -> NDArray[Any]:
         raise ValueError(f"{name} has infinite values; give numbers")
     found = found.astype(np.uint8) if found.dtype == np.bool_ else found
     return found[..., None] if found.ndim == axes else found
-
-
-def _unmasked(name: str, values: Any) -> NDArray[Any]:
-    array = as_array(name, values)
-    unmasked(name, array)
-    return np.asarray(array)
 
 
 def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int, ...]) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from simdtex.maspar.algorithm import Level, Pass, Problem, Program
 from simdtex.maspar.array import MAPPINGS, ProcessorArray
 from simdtex.maspar.machine import COSTS, MP1, Mask
-from simdtex.maspar.walk import Walk
+from simdtex.maspar.sites import Walk
 from simdtex.model.lattice import Grid
 from simdtex.ops.lcpdf import Choice
 

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.maspar import instructions
-from simdtex.maspar.coloring import coloring
 from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import EXP, MP1, NOISE, PHILOX, Mask, Plural
-from simdtex.maspar.walk import Walk
+from simdtex.maspar.sites import Walk, coloring
 from simdtex.model.lattice import Grid
 from simdtex.ops.ising import heat_bath_chances
 from simdtex.ops.lcpdf import Choice, Key, log_legal, turns

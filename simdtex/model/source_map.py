@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.files import atomic_path, read_npz, reading
-from simdtex.io.image import as_array, check_writable, read, write
-from simdtex.options import unmasked
+from simdtex.io.image import check_writable, plain_array, read, write
 
 SourceMap = NDArray[np.int32]
 
@@ -50,8 +49,7 @@ class Use(NamedTuple):
 
 def checked(source: ArrayLike) -> SourceMap:
     """Return a source map as (rows, cols, 2 or 3) int32; raise if ``source`` is not one."""
-    unmasked("the source map", source)
-    positions = np.asarray(source)
+    positions = plain_array("the source map", source)
     if (
         positions.ndim != 3
         or positions.shape[2] not in (2, 3)
@@ -240,9 +238,7 @@ def _maps(
     """Return the map of each sample and the sample's size, None if unknown."""
     shapes: list[tuple[int, ...] | None] = [sample_shape]
     several = positions.shape[2] == 3 and isinstance(other_map, (list, tuple))
-    maps = [as_array("the other map", one) for one in (other_map if several else [other_map])]
-    for one in maps:
-        unmasked("the other map", one)
+    maps = [plain_array("the other map", one) for one in (other_map if several else [other_map])]
     if several:
         shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
     wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)

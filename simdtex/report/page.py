@@ -17,6 +17,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+import PIL.Image
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Plot
@@ -24,8 +25,8 @@ from numpy.typing import NDArray
 
 from simdtex import __version__
 from simdtex.io.files import atomic_folder, earlier_files
+from simdtex.io.image import pillow_bytes
 from simdtex.model.display import OKABE_ITO
-from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns
 
 INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
@@ -54,13 +55,6 @@ def new_figure(width: float, height: float) -> Plot:
     figure = Plot(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
-
-
-def figure_png(figure: Plot) -> bytes:
-    """Return the figure as a PNG, the same bytes every time."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
 
 
 def tidy(axes: Axes, title: str = "", x: str = "", y: str = "") -> None:
@@ -101,10 +95,14 @@ class Figure:
 
     @cached_property
     def png(self) -> bytes:
-        """The picture as a PNG."""
+        """The picture as a PNG, the same bytes every time."""
         if isinstance(self.picture, bytes):
             return self.picture
-        return figure_png(self.picture) if isinstance(self.picture, Plot) else encoded(self.picture)
+        if not isinstance(self.picture, Plot):
+            return pillow_bytes(PIL.Image.fromarray(self.picture), "PNG")
+        buffer = io.BytesIO()
+        self.picture.savefig(buffer, format="png", metadata={"Software": None})
+        return buffer.getvalue()
 
     @property
     def alt(self) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -21,13 +20,13 @@ from numpy.typing import NDArray
 from simdtex import __version__, schedules
 from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
 from simdtex.experiments.ising import LEVEL, Chains, Finding, Spins
-from simdtex.io.image import to_display
+from simdtex.io.image import pillow_bytes, to_display
 from simdtex.jobs.array import Execution
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.report.page import INK, Figure, Part, Section, legend, new_figure, styles, tidy, write_report
-from simdtex.report.sheet import TEXT, contact_sheet
-from simdtex.report.tables import Table, duration_text, number_text, seconds_text
+from simdtex.report.sheet import TEXT, contact_sheet, magnified
+from simdtex.report.tables import Table, duration_text, number_text, seconds_text, settings_table
 from simdtex.schedules.schedule import Masked, Setting
 
 SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
@@ -167,7 +166,7 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
 
     def table(topic: Topic, caption: str, remark: str = "") -> Table:
         rows = [
-            {"Schedule": entry.name, "Equation (14)": _verdict(entry)}
+            {"Schedule": entry.name, "Equation (14)": "keeps (14)" if entry.independent else "breaks (14)"}
             | {heading: _text(name, entry.figure(name)) for heading, name in topic.columns.items()}
             for entry in comparison.entries
         ]
@@ -194,10 +193,6 @@ def _text(name: str, found: Spread | None) -> str:
     return number_text(factor * found.mean, deviation, unit)
 
 
-def _verdict(entry: Entry) -> str:
-    return "keeps (14)" if entry.independent else "breaks (14)"
-
-
 def _kept_levels(entry: Entry) -> str:
     """Return a sentence on a schedule that keeps equation (14) at some levels only, else nothing."""
     kept = [str(level) for level, claim in enumerate(reversed(entry.claims)) if claim]
@@ -215,7 +210,7 @@ def _job(comparison: Comparison) -> Table:
         "output": " x ".join(map(str, comparison.shape)) + " (rows x columns)",
         **comparison.options,
     }
-    return Table("The same for every schedule", [{"What": k, "Value": str(v)} for k, v in about.items()])
+    return settings_table("The same for every schedule", about)
 
 
 def _channels_last(comparison: Comparison, image: NDArray[Any]) -> NDArray[Any]:
@@ -530,7 +525,7 @@ def film(shown: Mapping[str, Steps]) -> bytes:
             before = np.broadcast_to(done[name] & ~np.any(done[name] & now), now.shape)  # a site again: a new sweep
             done[name] = before | now
             scale = max(1, SIDE // max(now.shape))
-            colours = COLOURS[np.where(now, 2, before.astype(int))].repeat(scale, 0).repeat(scale, 1)
+            colours = magnified(COLOURS[np.where(now, 2, before.astype(int))], scale)
             panels.append((f"{name}\n{np.count_nonzero(now):,} of {now.size:,} sites", colours))
         width = sum(len(one[0]) + GAP for _, one in panels) + GAP
         frame = PIL.Image.new("RGB", (width, len(panels[0][1]) + 4 * TEXT + 2 * GAP), "white")
@@ -541,6 +536,4 @@ def film(shown: Mapping[str, Steps]) -> bytes:
             frame.paste(PIL.Image.fromarray(colours), (left, 4 * TEXT + GAP))
             left += len(colours[0]) + GAP
         frames.append(frame)
-    buffer = io.BytesIO()
-    frames[0].save(buffer, "PNG", save_all=True, append_images=frames[1:], duration=PAUSE, loop=0)
-    return buffer.getvalue()
+    return pillow_bytes(frames[0], "PNG", save_all=True, append_images=frames[1:], duration=PAUSE, loop=0)

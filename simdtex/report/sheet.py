@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -132,13 +131,6 @@ def rgb(picture: ArrayLike) -> Picture:
     """Return a picture of any type, (rows, cols[, channels]), as one to display, (rows, cols, 3)."""
     shown = np.atleast_3d(to_display(picture))
     return np.ascontiguousarray(shown[..., :3] if shown.shape[2] >= 3 else shown[..., [0, 0, 0]])
-
-
-def encoded(picture: Picture) -> bytes:
-    """Return a picture, (rows, cols[, channels]), as the bytes of a PNG."""
-    buffer = io.BytesIO()
-    PIL.Image.fromarray(picture).save(buffer, format="PNG")
-    return buffer.getvalue()
 
 
 def magnified(picture: Picture, factor: int) -> Picture:

@@ -17,7 +17,7 @@ from simdtex.model.light import sample_sentences
 from simdtex.model.source_map import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
 from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
-from simdtex.report.tables import Table
+from simdtex.report.tables import Table, settings_table
 from simdtex.run import Output
 
 Picture = NDArray[np.uint8]
@@ -69,8 +69,7 @@ def write_synthesis(
     job: dict[str, Any] = {name: statistics[name] for name in ("seed", "tiles") if name in statistics}
     job |= {"light": statistics["light"]["light"]} if "light" in statistics else {}
     job |= {"seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
-    settings = [{"What": k, "Value": str(v)} for k, v in job.items() if not isinstance(v, np.ndarray)]
-    sections.append(Section("The job", [Table("The run and the options of its method", settings)]))
+    sections.append(Section("The job", [settings_table("The run and the options of its method", job)]))
     write_report(folder, "A texture and its sample", lead, sections, results, command)
 
 
@@ -189,9 +188,7 @@ def write_classification(
     names, count, colours = [one["name"] for one in classes], len(classes), label_colours(256)
     number = np.full(256, count)  # of the class of each label
     number[[one["label"] for one in classes]] = np.arange(count)
-    picture = to_display(image.reshape(*image.shape[:2], -1))
-    shown = picture[..., :3] if picture.shape[-1] > 2 else np.repeat(picture[..., :1], 3, 2)
-    sheet = [("the picture", shown), ("the labels", colours[labels])]
+    sheet = [("the picture", rgb(image)), ("the labels", colours[labels])]
     if truth is not None:
         known = number[truth][..., None] < count
         sheet.append(("the truth", np.where(known, colours[truth], UNTOLD)))
@@ -231,8 +228,7 @@ def write_classification(
         sections.append(Section("Confusion", [Table("The confusion matrix", rows, note)]))
         results |= {"confusion": confusion, "accuracy": right}
     job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
-    settings = [{"What": k, "Value": str(v)} for k, v in job.items()]
-    sections.append(Section("The job", [Table("The run and its options", settings)]))
+    sections.append(Section("The job", [settings_table("The run and its options", job)]))
     lead = f"{labels.shape[1]} x {labels.shape[0]} pixels and {count - 1} classes, on {statistics['device']}."
     write_report(folder, "Which texture is where", lead, sections, results, command)
 

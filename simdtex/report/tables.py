@@ -44,6 +44,12 @@ class Table:
         return [n > 0 and all(_NUMBER.fullmatch(row[name]) for row in self.rows) for n, name in enumerate(self.header)]
 
 
+def settings_table(caption: str, settings: Mapping[str, Any]) -> Table:
+    """Return a table with a row for each setting that is no array."""
+    rows = [{"What": name, "Value": str(value)} for name, value in settings.items() if not hasattr(value, "shape")]
+    return Table(caption, rows)
+
+
 def warns(cell: str) -> bool:
     """Return whether a cell is a warning."""
     return cell.startswith(("breaks", "differs"))

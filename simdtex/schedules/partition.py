@@ -162,8 +162,8 @@ class Synchronous(Partition):
     windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Only on a lattice without neighbours."""
-        return neighbourless(grid)
+        """Only on a lattice without neighbours, since every neighbourhood holds the four nearest sites."""
+        return grid.size == 1
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Return one group for all sites."""
@@ -222,8 +222,3 @@ class Block(Partition):
         row, col = np.indices((grid.rows, grid.cols))
         place: NDArray[Any] = row % self.tile[0] * self.tile[1] + col % self.tile[1]
         return place
-
-
-def neighbourless(grid: Grid) -> bool:
-    """Return whether no site of the lattice has a neighbour: every neighbourhood holds the four nearest."""
-    return grid.size == 1

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.model.lattice import Grid
 from simdtex.ops.sites import luby
-from simdtex.schedules.partition import neighbourless
 from simdtex.schedules.schedule import Active, Info, Setting
 
 
@@ -89,7 +88,7 @@ class RandomSubset(Scattered):
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours."""
-        return neighbourless(grid)
+        return grid.size == 1
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """Return each active site with probability p."""

@@ -182,7 +182,7 @@ def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int3
 
 
 class Watched:
-    """A wrapper of a schedule; a subclass examines its steps.
+    """A wrapper of a schedule, with its claims, states and steps; a subclass examines them.
 
     Parameters
     ----------
@@ -202,15 +202,8 @@ class Watched:
         return self.schedule.init(setting)
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """Return the schedule's own step, after examining it."""
-        state, info = self.schedule.step(setting, state, active)
-        for one in info.apart(setting.machine):
-            self.look(setting, one)
-        return state, info
-
-    def look(self, setting: Setting, info: Info) -> None:
-        """Examine a step."""
-        raise NotImplementedError
+        """Return the schedule's own step."""
+        return self.schedule.step(setting, state, active)
 
 
 class Checked(Watched):
@@ -226,20 +219,23 @@ class Checked(Watched):
     independence and two sites of a step are neighbours. Cost: O(sites x neighbours) per step, on the host.
     """
 
-    def look(self, setting: Setting, info: Info) -> None:
-        """Raise RuntimeError if the step violates a claim of the schedule."""
+    def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
+        """Return the schedule's own step; raise RuntimeError if it violates a claim of the schedule."""
+        state, info = super().step(setting, state, active)
         grid, offsets = setting.grid, setting.offsets
-        if np.unique(info.sites).size != info.sites.size:
-            raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
-        if ((info.sites < 0) | (info.sites >= grid.size)).any():
-            raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
-        met = neighbours_in(grid, offsets, info.sites) if self.independent(grid, offsets) else None
-        if met:
-            here, there = (divmod(site, grid.cols) for site in met)
-            raise RuntimeError(
-                f"the schedule {self.name} claims independent sites, but {here} and {there} are neighbours "
-                "and relax together: equation (14)"
-            )
+        for one in info.apart(setting.machine):
+            if np.unique(one.sites).size != one.sites.size:
+                raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
+            if ((one.sites < 0) | (one.sites >= grid.size)).any():
+                raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
+            met = neighbours_in(grid, offsets, one.sites) if self.independent(grid, offsets) else None
+            if met:
+                here, there = (divmod(site, grid.cols) for site in met)
+                raise RuntimeError(
+                    f"the schedule {self.name} claims independent sites, but {here} and {there} are neighbours "
+                    "and relax together: equation (14)"
+                )
+        return state, info
 
 
 class Trimmed(Watched):
@@ -257,7 +253,7 @@ class Trimmed(Watched):
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
         """Return the schedule's own step, without the rows that do not affect the tile."""
-        state, info = self.schedule.step(setting, state, active)
+        state, info = super().step(setting, state, active)
         sites = info.sites if isinstance(info.sites, np.ndarray) else setting.machine.get(info.sites)
         ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.cols
         for number, (begin, end) in enumerate(ranges.tolist(), 1):
