@@ -180,14 +180,10 @@ class Tiles:
         planes, masks = plain(self.pictures)
         own = regular(planes[0], masks[0]) if isinstance(lattice, str) else lattice
         if own and own.fitted(self.tile) is None:
-            (rows, cols), size = own.fitting(self.tile), self.tile
+            (rows, cols), (high, wide) = own.fitting(self.tile), self.tile
             if own is lattice:
-                raise ValueError(
-                    f"no whole cells of the lattice fit tiles of {size[1]}x{size[0]}; make tiles of {cols}x{rows}"
-                )
-            message = (
-                f"no whole cells of the sample's pattern fit tiles of {size[1]}x{size[0]}; {cols}x{rows} fit better"
-            )
+                raise ValueError(f"no cells of the lattice fit tiles of {wide}x{high}; make tiles of {cols}x{rows}")
+            message = f"no whole cells of the sample's pattern fit tiles of {wide}x{high}; {cols}x{rows} fit better"
             warnings.warn(message, DataWarning, stacklevel=2)
         return None if lattice is None else phases(self.pictures, self.tile, True, lattice)
 
