@@ -795,9 +795,13 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
     path = inside.folder / "grass-view.json"
     until(lambda: path.exists() and path.stat().st_size)
     other = Page(inside.driver, served)
+    count = "const send = page.send.bind(page); page.runs = 0; "
+    count += "page.send = (message, buffers) => { page.runs += message.kind === 'make'; send(message, buffers); }"
     try:
+        other.script(count)
         drop(other.driver, path, place=".start")
         until(lambda: other.status == "The view is restored.")
+        assert other.script("return page.runs") == 2
         now = other.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
         assert now == wanted
         settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")

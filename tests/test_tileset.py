@@ -130,6 +130,15 @@ def test_the_bytes_are_those_of_the_reference(machine):
         assert_same_bits(one, other)
 
 
+@pytest.mark.parametrize(("tile", "better"), [((30, 200), r"\d+x\d+"), ((30, 40), "40x\\d+")])
+def test_a_lattice_that_does_not_fit_a_tile_is_refused_with_tiles_that_fit(tile, better):
+    with pytest.raises(ValueError, match=f"fit tiles of {tile[1]}x{tile[0]}; make tiles of {better}$") as refused:
+        simdtex.tileset(GRAVEL, tile, lattice=((20, 0), (0, 20)), order=2)
+    cols, rows = map(int, str(refused.value).split()[-1].split("x"))
+    made = simdtex.tileset(GRAVEL, (rows, cols), lattice=((20, 0), (0, 20)), order=2, rng=1)
+    assert made.shape == (4 * rows, 4 * cols)
+
+
 def test_a_lattice_has_one_phase_at_all_corners():
     row, col = np.indices((96, 96))
     tone = np.random.default_rng(1).integers(120, 230, (9, 8))

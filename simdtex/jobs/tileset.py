@@ -177,15 +177,15 @@ class Tiles:
         """Return the lattice of a regular sample, also deformed so that it repeats after a tile, if it can."""
         options = self.options.resolved(self.options.of(self.pictures))
         lattice = parse_lattice(options.lattice)
-        found = None if lattice is None else phases(self.pictures, self.tile, True, lattice)
         planes, masks = plain(self.pictures)
-        if lattice and found is None and (own := regular(planes[0], masks[0])):
-            (rows, cols), size = own.fitting(self.tile), self.tile
-            message = (
-                f"no whole cells of the sample's pattern fit tiles of {size[1]}x{size[0]}; {cols}x{rows} fit better"
-            )
+        own = regular(planes[0], masks[0]) if isinstance(lattice, str) else lattice
+        if own and own.fitted(self.tile) is None:
+            (rows, cols), (high, wide) = own.fitting(self.tile), self.tile
+            if own is lattice:
+                raise ValueError(f"no cells of the lattice fit tiles of {wide}x{high}; make tiles of {cols}x{rows}")
+            message = f"no whole cells of the sample's pattern fit tiles of {wide}x{high}; {cols}x{rows} fit better"
             warnings.warn(message, DataWarning, stacklevel=2)
-        return found
+        return None if lattice is None else phases(self.pictures, self.tile, True, lattice)
 
     def pieces(self, lattices: tuple[Lattice, ...] | None, seed: int) -> list[Canvas]:
         """Return the piece of the sample around a corner of each colour, without unknown pixels.

@@ -15,6 +15,7 @@ class Page {
       ...{ colours: [], examples: [], ready: false },
     });
     this.given = this.pending = null; // the file and its maps, to give them again to a server that was started anew
+    this.restoring = false; // a saved view starts its own runs
     this.session = connection.key;
     this.seeds = []; // of the runs that follow
     this.last = { make: "more", paint: "hole" }; // the task of each place
@@ -165,7 +166,8 @@ class Page {
     if (this.again) this.restore(this.again);
     else [this.width, this.height] = message.size;
     this.again = null;
-    if (this.task !== "hole") this.make();
+    if (this.task !== "hole" && !this.restoring) this.make();
+    this.restoring = false;
     if (["hole", "classes"].includes(this.task)) this.showLayer("sample");
   }
 
@@ -424,6 +426,7 @@ class Page {
     const read = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
     const { given, runs, moment } = saved;
     [this.again] = runs;
+    this.restoring = true;
     this.give({ name: given.name, bytes: given.bytes && read(given.bytes), maps: new Map() });
     await this.next("picture");
     for (const { name, bytes: map } of given.maps) {
