@@ -4,6 +4,7 @@
 import ast
 import csv
 import inspect
+import re
 import subprocess
 import sys
 import time
@@ -76,7 +77,7 @@ def chosen(known, names=()):
 def parsed(text):
     """The options of ``"balance=0,preset=paper"``: numbers, True, False and None as Python has them, else words."""
     options = {}
-    for part in filter(None, (part.strip() for part in text.split(","))):
+    for part in filter(None, (part.strip() for part in re.split(r",(?![^(]*\))", text))):
         name, equals, value = (each.strip() for each in part.partition("="))
         if not (equals and name and value):
             raise ValueError(f"{part} is no option: give NAME=VALUE,NAME=VALUE")

@@ -38,9 +38,9 @@ def classify(call: Classify) -> Work:
     Notes
     -----
     Equation (6) with the bandwidth of the nearest neighbour, of whole neighbourhoods, at up to three levels, raw and
-    with compressed contrast, averaged over a small window; a Potts field of labels; and a test of distances and binary
-    patterns: see ``docs/classification.rst``. The labels are the same on every device. A turned, enlarged or
-    differently lit texture is another texture, and strips narrower than the coupling vanish.
+    with compressed contrast; frequencies of binary patterns in small windows; a Potts field of labels; and a test of
+    distances and binary patterns: see ``docs/classification.rst``. The labels are the same on every device. A turned,
+    enlarged or differently lit texture is another texture, and strips narrower than the coupling vanish.
 
     Cost: pixels x exemplars x classes x 66 multiply-adds for each band, and pixels x classes x 7000 multiply-adds for
     the fit; 512x512 pixels and five classes take some 10 s of one core. Memory: 48 bytes for each pixel and class, 100

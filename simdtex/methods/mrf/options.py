@@ -45,7 +45,7 @@ CHANCE = 4096
 """The most candidates that a coherent search weighs at random."""
 
 COARSE = 2
-"""The first level at which it may weigh more of them: there are few sites, and they decide how things connect."""
+"""The first level of the options ``coarse_...``: there are few sites, and they decide how things connect."""
 
 SEARCHED = ("search", "chance", "coarse_chance")
 """The options that say how candidates are searched for, which makes no difference at the coarsest level."""
@@ -135,6 +135,14 @@ class Options:
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
+    )
+    coarse_balance: float = appearance(
+        0.0,
+        Number(0),
+        "Use this balance where sites are 4 pixels apart or more, if that is more than balance",
+        more="Coarse levels decide which parts of the sample are copied, and their sites relax again at finer levels.",
+        slider=(0, 8, 0.5),
+        shown=(),
     )
     novelty: float = appearance(
         1.0,
@@ -392,6 +400,10 @@ class Options:
     def chance_at(self, level: int) -> int:
         """Return how many candidates at random a coherent search weighs at a level."""
         return max(self.chance, self.coarse_chance) if level >= COARSE else self.chance
+
+    def balance_at(self, level: int) -> float:
+        """Return the balance of a level."""
+        return max(self.balance, self.coarse_balance) if level >= COARSE else self.balance
 
     def of(self, pictures: Pictures) -> Pictures:
         """Return the pictures of a sample with their kinds, weights and shares by these options."""
