@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+from functools import partial
 
 import click
 import h5netcdf
@@ -21,6 +22,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rasterio.transform import from_origin
 
+from simdtex import simulate
 from simdtex.cli import main
 from simdtex.cli.command import catch_signals
 from simdtex.io import grids, image
@@ -438,10 +440,12 @@ def saved_rasters(path, bands, nodata=-9999, **more):
     return path
 
 
+def invoke(*words):
+    return CliRunner().invoke(main, [*map(str, words)])
+
+
 def run(*words):
-    return CliRunner().invoke(
-        main, [*map(str, words), "--seed", "1", "--device", "reference", "--order", "2", "--levels", "1"]
-    )
+    return invoke(*words, "--seed", "1", "--device", "reference", "--order", "2", "--levels", "1")
 
 
 @pytest.mark.parametrize("dtype", ["float32", "int16", "float64"])
@@ -595,6 +599,37 @@ def test_netcdf_is_read_by_the_names_of_its_axes(tmp_path, form):
     assert made.exit_code == 0, made.output
     with np.load(tmp_path / "b.npz") as many:
         assert many["y"].tolist() == np.arange(39.0, 51).tolist() and set(many["values"].flat) <= set(tas[1].flat)
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
+def test_names_and_units_of_netcdf_are_kept(tmp_path, suffix):
+    """Of the variable and of each axis, by the command and in Python, for realisations and estimates."""
+    depth = {"units": "m", "positive": "down", "long_name": "depth below sea level", "axis": "Z"}
+    coords = {"depth": ("depth", [10.0, 12, 14, 16], depth)}
+    for axis, n in (("northing", 9), ("easting", 10)):
+        coords[axis] = (axis, 5.0 * np.arange(n), {"units": "km", "long_name": axis})
+    values = np.random.default_rng(2).integers(0, 2, (4, 9, 10)).astype(np.float32)
+    own = {"units": "1", "long_name": "porosity"}
+    rock = xarray.DataArray(values, coords, ("depth", "northing", "easting"), "por", own)
+    rock.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    (tmp_path / "wells.csv").write_text("x,y,z,por\n5,5,12,1\n")
+    wells = ["--known", tmp_path / "wells.csv", "--device", "reference"]
+    for command, how in (("simulate", partial(run, "simulate")), ("estimate", partial(invoke, "estimate", *wells))):
+        out = tmp_path / f"{command}{suffix}"
+        made = how(tmp_path / "a.nc", "-o", out)
+        assert made.exit_code == 0, made.output
+        with xarray.open_dataset(out, engine="zarr" if suffix == ".zarr" else "h5netcdf") as found:
+            assert found.z.attrs == {name: one for name, one in depth.items() if name != "axis"}
+            assert found.x.attrs == {"units": "km", "long_name": "easting"} and found.y.units == "km"
+            assert found.x.values.tolist() == rock.easting.values.tolist()
+            if command == "simulate":
+                assert {name: found.simulation.attrs[name] for name in own} == own
+            else:
+                assert found["mean"].units == "1"
+    level = rock[0].rename(northing="lat")
+    made = simulate(level, 1, origin=(0, 0), cell=(5, 5), finish=0, order=1, levels=1)
+    assert (made.x.attrs, made.y.units) == ({"units": "km", "long_name": "easting"}, "km") and made.units == "1"
+    assert not simulate(level, 1, finish=0, order=1, levels=1).x.attrs, "columns are no kilometres"
 
 
 def test_hdf5_without_names_of_axes_is_read_by_position(tmp_path):

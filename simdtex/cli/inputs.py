@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -56,7 +56,8 @@ PLAIN = Reading()
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``georeference`` is where the cells of the first lie, if it is a grid, and ``crs`` its coordinate reference system;
+    ``georeference`` is where the cells of the first lie, if it is a grid, ``crs`` its coordinate reference system, and
+    ``about`` the attributes of its axes and of its one variable, by name;
     ``deep`` whether they are volumes; ``metadata`` what the file of the first says of its pixels.
     """
 
@@ -67,6 +68,7 @@ class Material(NamedTuple):
     deep: bool = False
     metadata: Metadata | None = None
     crs: str = ""
+    about: Mapping[str, Mapping[str, str]] | None = None
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -179,12 +181,13 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
 
 
 class Read(NamedTuple):
-    """What a file holds: ``pixels``; the ``metadata`` of a picture; the ``georeference`` of a grid, and its ``crs``."""
+    """What a file holds: ``pixels``; the ``metadata`` of a picture; what `Material` has of a grid."""
 
     pixels: NDArray[Any]
     metadata: Metadata | None = None
     georeference: Frame | None = None
     crs: str = ""
+    about: Mapping[str, Mapping[str, str]] | None = None
 
 
 def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
@@ -211,12 +214,14 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
-    return Read(values if len(values) > 1 else values[0], None, grids.Frame(grid.origin, grid.cell), grid.crs)
+    about = {name: one for name, one in grid.about.items() if name in ("x", "y", "z") or [name] == list(grid.values)}
+    frame = grids.Frame(grid.origin, grid.cell)
+    return Read(values if len(values) > 1 else values[0], None, frame, grid.crs, about)
 
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     """Read pictures or grids, or with ``how.deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, metadata, georeferences, crs = zip(*(read_pixels(path, how) for path in paths), strict=True)
+    pictures, metadata, georeferences, crs, about = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len({*volumes}) > 1:
@@ -224,7 +229,8 @@ def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
         raise ValueError(f"{volume} is a volume and {other} is none; give volumes, or pictures")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    return Material(tuple(paths), pixels, None if plain else -1, georeferences[0], volumes[0], metadata[0], crs[0])
+    first = georeferences[0], volumes[0], metadata[0], crs[0], about[0]
+    return Material(tuple(paths), pixels, None if plain else -1, *first)
 
 
 def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
@@ -382,7 +388,7 @@ def read_known(path: Path, files: Files) -> HardData | np.ma.MaskedArray[Any, An
     if (table := read_table(path, how)) is not None:
         return table
     how = how._replace(palette=how.palette and samples.channel_axis is None)
-    values, metadata, georeference, _ = read_pixels(path, how)
+    values, metadata, georeference, *_ = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)

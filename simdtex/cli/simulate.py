@@ -69,7 +69,7 @@ def simulate(
     inputs = data | given(options) | {"shape": shape, "source": bool(source)} | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
-        made = georeferenced(simulate(material.array, number, **inputs, **call), material.crs)
+        made = georeferenced(simulate(described(material), number, **inputs, **call), material.crs)
         return made, Output(None, statistics=made.attrs)
 
     return Task(
@@ -112,7 +112,7 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | georeference
 
     def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
-        made = estimate(material.array, shape=shape, device=device, callback=callback, **inputs)
+        made = estimate(described(material), shape=shape, device=device, callback=callback, **inputs)
         return georeferenced(made, material.crs), Output(None, statistics=made.attrs)
 
     size = "x".join(map(str, shape[::-1]))
@@ -138,6 +138,21 @@ def read_georeference(
     return found
 
 
+def described(material: Material) -> Any:
+    """Return the training image, as an array of xarray if its file describes its axes or its variable."""
+    about = dict(material.about or {})
+    if material.several or not any(about.values()):
+        return material.array
+    import xarray
+
+    dims = [*"zyx"[not material.deep :], *["variable"] * (material.channel_axis is not None)]
+    sides = zip(dims, material.array.shape, strict=True)
+    coordinates = {axis: (axis, np.arange(n), about.pop(axis, {})) for axis, n in sides if axis != "variable"}
+    about.pop("z", None)  # of one layer
+    name, own = next(iter(about.items()), (None, {}))
+    return xarray.DataArray(material.array, coordinates, dims, name, own)
+
+
 def georeferenced(made: Any, crs: str) -> Any:
     """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
     if not crs:
@@ -148,7 +163,9 @@ def georeferenced(made: Any, crs: str) -> Any:
 
         unit = CRS.from_wkt(crs).units_factor[0]
         own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
-        found = found.assign_coords({axis: found[axis].assign_attrs(own) for axis in "xy" if axis in found.coords})
+        found = found.assign_coords(
+            {axis: found[axis].assign_attrs(own | found[axis].attrs) for axis in "xy" if axis in found.coords}
+        )
     for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
         one.encoding["grid_mapping"] = "spatial_ref"
     return found

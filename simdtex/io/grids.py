@@ -12,7 +12,7 @@ import re
 import struct
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from io import BufferedReader
 from math import isfinite, prod
@@ -78,12 +78,15 @@ class CartesianGrid(Brief):
         The size of a cell.
     crs : str
         The coordinate reference system as WKT; empty if unknown.
+    about : dict of str to dict
+        Attributes in CF of the axes ``x``, ``y`` and ``z`` and of variables, by name: ``long_name``, ``units``...
     """
 
     values: dict[str, Array]
     origin: tuple[float, ...]
     cell: tuple[float, ...]
     crs: str = ""
+    about: dict[str, dict[str, str]] = field(default_factory=dict)
 
 
 def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:

@@ -46,7 +46,10 @@ _TAGS = (33550, 33922, 34264, 34735, 42113)
 _NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
 """Names of an axis that do not have its letter."""
 
-Library = tuple[dict[str, Array], tuple[float, ...], tuple[float, ...], str]
+_TOLD = ("long_name", "standard_name", "units", "positive")
+"""Attributes of a coordinate or a variable in the CF conventions that realisations keep."""
+
+Library = tuple[dict[str, Array], tuple[float, ...], tuple[float, ...], str, dict[str, dict[str, str]]]
 """What a library reads of a grid: the members of `simdtex.io.grids.CartesianGrid`."""
 
 
@@ -144,7 +147,7 @@ def read_cells(path: PathLike, most: int) -> Library:
     rows, cols = planes.shape[:2]
     values = {name: planes[None, :: -1 if e < 0 else 1, :: -1 if a < 0 else 1, k] for k, name in enumerate(names)}
     first = min(c, c + a * cols) + abs(a) / 2, min(f, f + e * rows) + abs(e) / 2, 0.0
-    return values, first, (abs(a), abs(e), 1.0), geo.crs
+    return values, first, (abs(a), abs(e), 1.0), geo.crs, {}
 
 
 def write_cells(
@@ -198,9 +201,9 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         classic = file.read(3) == b"CDF"
     how: dict[str, Any] = {"engine": "scipy"} if classic else {"engine": "h5netcdf", "phony_dims": "access"}
     with xarray.open_dataset(os.fspath(path), decode_times=False, **how) as data:
-        told = data.cf.guess_coord_axis().cf
+        guessed = data.cf.guess_coord_axis().cf
         means = {"x": ("X", "longitude"), "y": ("Y", "latitude"), "z": ("Z", "vertical")}
-        known = {**told.coordinates, **told.axes}
+        known = {**guessed.coordinates, **guessed.axes}
         axes = {name: axis for axis, keys in means.items() for key in keys for name in known.get(key, ())}
         found: dict[str, Any] = {}
         for name, one in data.data_vars.items():
@@ -221,9 +224,21 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         arrays = {name: _ascending(one).load() for name, one in found.items()}
         mapping = data.get(str(first.encoding.get("grid_mapping", "")))
         about: Mapping[Any, Any] = {} if mapping is None else mapping.attrs
-    origin, cell = zip(*(axis_place(next(iter(arrays.values())), axis) for axis in "xyz"), strict=True)
+    first = next(iter(arrays.values()))
+    origin, cell = zip(*(axis_place(first, axis) for axis in "xyz"), strict=True)
+    told = {name: told_of(one) for name, one in arrays.items()} | coordinates_told(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
-    return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", "")))
+    return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))), told
+
+
+def told_of(array: Any) -> dict[str, str]:
+    """Return the names and units of an array of xarray that its attributes give."""
+    return {name: str(array.attrs[name]) for name in _TOLD if name in array.attrs}
+
+
+def coordinates_told(array: Any) -> dict[str, dict[str, str]]:
+    """Return the names and units of the coordinates of an array of xarray, by axis: x, y and z."""
+    return {axis: told_of(array.coords[dim]) for dim in array.coords if (axis := axis_of(str(dim)))}
 
 
 def _steps(name: str, array: Any) -> dict[str, Any]:

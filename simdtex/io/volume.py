@@ -440,7 +440,8 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     ----------
     path : path
         ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed), which ``xarray.open_dataarray`` reads;
-        or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
+        or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text, but
+        no units of coordinates.
         ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
         ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
         attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and an
