@@ -373,9 +373,8 @@ class Filling:
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
-        square = 1 << min(
-            31, max(0, window.levels - NEAR)
-        )  # so that a pixel of a reduced window is one of its reduced sample
+        # a pixel of a reduced window is to be one of its reduced sample; all further levels are refused
+        square = 1 << min(31, max(0, window.levels - NEAR))
         top, left = (first + (side.start - first) % square for first, side in zip((top, left), at, strict=True))
         near = (slice(top, window.rows.stop + reach), slice(left, window.cols.stop + reach))
         place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
