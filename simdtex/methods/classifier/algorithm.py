@@ -42,6 +42,9 @@ WORK = 2**32
 SITES_AT_ONCE = 2**17
 """The most sites whose fits are computed together."""
 
+FEWEST_ROWS = 32
+"""The fewest rows whose patterns are compared together, since those around them are needed, too."""
+
 SPREAD = 4
 """Degrees of freedom of the squared difference of a window's measures: see docs/classification.rst."""
 
@@ -79,10 +82,14 @@ class Plan:
         shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
-        part = min(sites, SITES_AT_ONCE)
+        part = min(sites, max(SITES_AT_ONCE, FEWEST_ROWS * shape[1]))
+        slab = min(
+            sites, part + 2 * int(3 * self.options.window + FEWEST_ROWS) * shape[1]
+        )  # with the windows of a part
         planes = experts + PATTERNS * self.options.levels
-        device = sites * (16 * count + experts * bands) + part * 14 * planes
+        device = sites * (16 * count + experts * bands) + slab * 14 * planes
         host = sites * (count * (2 * experts + 22) + 24 * bands + 64 + experts * bands) + part * (24 * planes + 24)
+        host += slab * 3 * planes
         memory.require(machine, device, host)
         model = self.classes
         if not isinstance(model, Model):
@@ -168,7 +175,9 @@ class Run:
             values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
             found = machine.get(exemplars(machine, values, known))
             state.logs[e, :, state.done : end] = found.reshape(len(found), -1, cols)
-        state.logs[-1, :, state.done : end] = self._patterned(state.done, end)
+        band = max(FEWEST_ROWS, SITES_AT_ONCE // cols)
+        for first in range(-(-state.done // band) * band, end, band):
+            state.logs[-1, :, first : first + band] = self._patterned(first, min(first + band, self.grid.rows))
         if end < self.grid.rows:
             state.labels[state.done : end] = self._single(state.logs[:, :, state.done : end]).argmax(0)
         else:
