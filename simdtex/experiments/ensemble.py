@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures of an ensemble of realisations: its uncertainty, and its likeness to the training image.
 
-`probability`, `e_type`, `quantiles`, `connected_volume`, `vertical_proportions` and `standard_error` take an
-`xarray.DataArray` as `simdtex.simulate` returns it, a map or a volume, with its coordinates on the ground. The results
-keep its attributes, and have ``long_name`` and ``units``, which plots of xarray show. Cells outside of a region are
-NaN. Coordinates of a single value, such as z of a map, become attributes.
+`probability`, `e_type`, `quantiles`, `connected_volume`, `vertical_proportions` and `standard_error` take and return an
+`xarray.DataArray`: see `simdtex.experiments.uncertainty`.
 
 For the other figures an ensemble is an array (realisations, rows, cols). Categorical ones hold the values of
 categories, continuous ones integers or floats. The training image is (rows, cols), of the same kind and of any size.
@@ -13,12 +11,11 @@ Axis 0 is down, axis 1 to the right, lags are pixels. No single figure suffices:
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import nan, prod, sqrt
+from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,13 +26,16 @@ from scipy.stats import entropy
 from skimage.morphology import skeletonize
 
 from simdtex.experiments.quality import hashes
-from simdtex.io.hard_data import HardData, place_hard_data
+from simdtex.experiments.uncertainty import (  # noqa: F401 - in __all__
+    connected_volume,
+    e_type,
+    probability,
+    quantiles,
+    standard_error,
+    vertical_proportions,
+)
 from simdtex.io.image import read
-from simdtex.io.rasters import axis_place
-from simdtex.options import moderate, require, unmasked
-
-if TYPE_CHECKING:
-    from xarray import DataArray
+from simdtex.options import moderate, unmasked
 
 Array = NDArray[Any]
 
@@ -483,8 +483,6 @@ class Summary:
         Pixels.
     shares : ndarray of float64, (K, n + 1)
         Share of the pixels.
-    maps : ndarray of float64, (K, rows, cols)
-        Share of the realisations in which a pixel has each category; of continuous values one map, the mean.
     open : ndarray of float64, (rows, cols)
         Entropy of each pixel's shares of categories in bits, 0 if all realisations agree, at most log2 n; of
         continuous values their standard deviation (divisor n - 1), in their unit.
@@ -510,7 +508,6 @@ class Summary:
     categories: Array
     lags: NDArray[np.intp]
     shares: Floats
-    maps: Floats
     open: Floats
     variograms: Floats
     connectivity: Floats
@@ -568,12 +565,10 @@ def summary(
     images, number = [*array, image], len(array)
     at_data = array[:, points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)]
     if len(known):
-        maps = np.stack([(array == k).mean(axis=0) for k in known])
-        left_open = np.asarray(entropy(maps, base=2, axis=0))
+        left_open = np.asarray(entropy([(array == k).mean(axis=0) for k in known], base=2, axis=0))
         fields = [[one == k for one in images] for k in (known[-1:] if len(known) == 2 else known)]
         misses = (at_data != points[:, 2]).sum(axis=1).astype(np.float64)
     else:
-        maps = array.mean(axis=0, dtype=np.float64)[np.newaxis]
         left_open = array.std(axis=0, ddof=int(number > 1), dtype=np.float64)
         fields = [images]
         misses = np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(number)
@@ -588,7 +583,6 @@ def summary(
         categories=known,
         lags=np.arange(lag + 1),
         shares=table(lambda k, n: (images[n] == known[k]).mean()),
-        maps=maps,
         open=left_open,
         variograms=np.repeat(variograms, 2, axis=1) if len(known) == 2 else variograms,  # of two they are the same
         connectivity=np.moveaxis(functions, 2, 0),
@@ -636,146 +630,6 @@ __all__ = [
     *("copied", "copies", "dead_ends", "e_type", "probability", "quantiles", "standard_error", "summary"),
     "vertical_proportions",
 ]
-
-
-def probability(realisations: DataArray, category: float) -> DataArray:
-    """Return the share of the realisations in which each cell has a category, 0 to 1."""
-    found, what = _field(realisations, category).mean("realisation"), label(realisations, "category")
-    return _described(found, realisations, "probability", f"probability of {what} {category}", "")
-
-
-def e_type(realisations: DataArray) -> DataArray:
-    """Return the mean of the realisations at each cell: the E-type estimate of a continuous variable."""
-    found = _field(realisations).mean("realisation")
-    return _described(found, realisations, "e_type", f"E-type of {label(realisations)}")
-
-
-def quantiles(realisations: DataArray, q: ArrayLike = (0.1, 0.5, 0.9)) -> DataArray:
-    """Return quantiles of a continuous variable at each cell, with the dimension ``quantile`` (`numpy.quantile`)."""
-    found = _field(realisations).quantile(q, "realisation")
-    return _described(found, realisations, "quantiles", f"quantile of {label(realisations)}")
-
-
-def connected_volume(realisations: DataArray, category: float, well: ArrayLike) -> DataArray:
-    """Return the volume of the bodies of a category that contain a cell of a well, for each realisation.
-
-    Parameters
-    ----------
-    realisations : DataArray, (realisation, [z,] y, x)
-    category : number
-    well : array_like, (2,), (3,), (n, 2) or (n, 3)
-        x and y on the ground, of all layers, or x, y and z. Bodies that several points meet count once.
-
-    Returns
-    -------
-    DataArray, (realisation,)
-        Cells times the size of a cell, of a map an area; 0 where the well misses the category. Cells are connected by
-        their sides.
-        ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90. P10 is the small one, which is P90 of many reserves.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A point is outside of the cells, or the realisations have other dimensions.
-    """
-    field, wells = _field(realisations, category), np.atleast_2d(np.asarray(well, np.float64))
-    axes = [axis for axis in "zyx" if axis in realisations.dims]
-    if wells.shape[1] not in (2, 3) or {*realisations.dims} != {"realisation", *axes} or axes[-2:] != ["y", "x"]:
-        raise ValueError("give x, y and perhaps z of the well, and realisations of one variable with y and x")
-    origin, cell = zip(*(axis_place(realisations, axis) for axis in "xyz"[: wells.shape[1]]), strict=True)
-    sizes = [realisations.sizes[axis] for axis in axes][-wells.shape[1] :]
-    table = HardData(wells, np.ones((len(wells), 1)), ("well",))
-    hit = ~np.ma.getmaskarray(place_hard_data(table, sizes, origin=origin, cell=cell))
-
-    def cells(one: Array) -> int:
-        labels, _ = ndimage.label(one == 1)
-        bodies = np.unique(labels[np.broadcast_to(hit, labels.shape)])
-        return int(np.isin(labels, bodies[bodies > 0]).sum())
-
-    field = field.transpose("realisation", *axes)
-    units = [realisations[axis].attrs.get("units", "") for axis in axes]
-    unit = units[0] + " \u00b2\u00b3"[len(axes) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
-    what = f"{'volume' if len(axes) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
-    counts = np.array([cells(one) for one in field.values])
-    volume = counts * prod(axis_place(realisations, axis)[1] for axis in axes)
-    found = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
-    return _described(found, realisations, "connected_volume", what, unit)
-
-
-def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] | None = None) -> DataArray:
-    """Return the share of each category in each layer, (category, [realisation,] z), of realisations or a volume.
-
-    Categories are those of the data by default. A plain array is (z, y, x).
-    """
-    data = named(data, "z", "y", "x")
-    names = np.unique(data.values[_known(data).values]) if categories is None else np.asarray(categories)
-    found = (
-        _field(data, named(names, "category", coords={"category": names}), of="z")
-        .mean(("y", "x"))
-        .transpose("category", ...)
-    )
-    return _described(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
-
-
-def standard_error(realisations: DataArray, category: float | None = None) -> DataArray:
-    """Return the standard error of the map after 2, 3, ... realisations, (realisations,), over all cells.
-
-    The map is `probability` or, without a category, `e_type`. A cell's error is the standard deviation of the first n
-    realisations over the root of n, since realisations are independent; the result is the root of the mean of its
-    square over the cells. For half the error four times as many realisations are needed.
-    """
-    field = _field(realisations, category).transpose("realisation", ...)
-    total = squares = np.zeros(field.shape[1:])
-    errors = []
-    for n, one in enumerate(field.values - field.values[0], 1):
-        total, squares = total + one, squares + one**2
-        if n > 1:
-            errors.append(sqrt(max(0.0, np.nanmean(squares - total**2 / n)) / (n * (n - 1))))
-    number = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
-    found = named(errors, "realisations", coords={"realisations": number})
-    unit = None if category is None else ""
-    return _described(found, realisations, "standard_error", "standard error of the map", unit)
-
-
-def named(data: Any, *dims: str, **about: Any) -> DataArray:
-    """Return an array of xarray as it is, and a plain one with the names of its axes."""
-    require("simulate", "xarray")
-    import xarray
-
-    found: DataArray = data if isinstance(data, xarray.DataArray) else xarray.DataArray(data, dims=dims, **about)
-    return found
-
-
-def _known(data: DataArray) -> DataArray:
-    """Return where the data are known: numbers, inside of the region if there is one."""
-    known: DataArray = data.notnull() & data.coords.get("region", True)
-    return known
-
-
-def _field(data: DataArray, category: Any = None, of: str = "realisation") -> DataArray:
-    """Return values, or the indicator of a category, as floats with NaN where they are unknown."""
-    if of not in getattr(data, "dims", ()):
-        raise TypeError(f"give an xarray.DataArray with the dimension {of}, as simdtex.simulate returns")
-    if category is None and json.loads(data.attrs.get("options", "{}")).get("categorical") is True:
-        raise ValueError("the realisations are of categories, which have no mean; use probability, or name a category")
-    found: DataArray = (data if category is None else category == data).astype(float).where(_known(data))
-    return found
-
-
-def label(data: DataArray, unnamed: str = "the values") -> str:
-    """Return the name of a variable for plots; "simulation" is no name."""
-    return str(data.attrs.get("long_name") or (unnamed if data.name in (None, "simulation") else data.name))
-
-
-def _described(found: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
-    """Return a result with a name, and with the attributes of its data but ``long_name`` and ``units``."""
-    alone = {key: one.item() for key, one in found.coords.items() if one.ndim == 0 and key not in found.dims}
-    units = data.attrs.get("units", "") if units is None else units
-    found = found.reset_coords([*alone], drop=True).rename(name)
-    found.attrs = {**data.attrs, **alone, "long_name": long_name, "units": units}
-    for unused in {"missing", "spatial_ref", *([] if units else ["units"])} & {*found.attrs}:
-        del found.attrs[unused]
-    return found
 
 
 def channels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.experiments import ensemble as measures
+from simdtex.experiments import uncertainty
 from simdtex.experiments.ensemble import WINDOW, Summary, connectivity, copies, summary, variogram
 from simdtex.io.image import to_display
 from simdtex.io.rasters import axis_place
@@ -77,7 +77,7 @@ def write_ensemble(
     """
     check_folder(folder)
     found = summary(np.asarray(ensemble), training, data=data, categories=categories)
-    made, own = measures.named(ensemble, "realisation", "y", "x"), np.asarray(training)
+    made, own = uncertainty.named(ensemble, "realisation", "y", "x"), np.asarray(training)
     images, categorical, names = made.values, len(found.categories) > 0, found.categories[_mapped(found)].tolist()
     shown = (images[:, ::-1], own[::-1]) if "cell_y" in made.attrs else (images, own)
     points = _on_ground(made, found.data)
@@ -96,7 +96,7 @@ def write_ensemble(
         f"of {own.shape[1]} x {own.shape[0]}.\n\n{_kept(found)}"
     )
     results = {
-        **{one.name: getattr(found, one.name) for one in fields(Summary) if one.name not in ("maps", "open", "anodi")},
+        **{one.name: getattr(found, one.name) for one in fields(Summary) if one.name not in ("open", "anodi")},
         "anodi": found.anodi._asdict(),
         "mean_open": found.open.mean(),
         "shape": images.shape,
@@ -161,15 +161,15 @@ def _uncertainty(made: DataArray, names: list[Any], data: Floats, found: Summary
     dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
     spread, values = made[0].copy(data=found.open), data[:, 2]
     if not names:
-        planes = [measures.e_type(made), *measures.quantiles(made, QUANTILES)]
+        planes = [uncertainty.e_type(made), *uncertainty.quantiles(made, QUANTILES)]
         panels = {plane.attrs["long_name"] + cut: (plane, values) for plane, cut in zip(planes, CUTS, strict=True)}
         every = np.concatenate([values, *(plane.values.ravel() for plane in planes)])
         limits = float(every.min()), float(every.max())
-        title, most = f"standard deviation of {measures.label(made)}", found.open.max() or 1.0
+        title, most = f"standard deviation of {uncertainty.label(made)}", found.open.max() or 1.0
         what = "The mean of the realisations at every pixel (E-type), and their quantiles 0.1, 0.5 and 0.9."
         how = "The standard deviation of the realisations at every pixel, in the unit of the values"
     else:
-        planes = [measures.probability(made, name) for name in names]
+        planes = [uncertainty.probability(made, name) for name in names]
         known = [(values == name) * 1.0 for name in names]
         panels = {plane.attrs["long_name"]: (plane, of) for plane, of in zip(planes, known, strict=True)}
         limits, title, most = (0.0, 1.0), "entropy, bits", float(np.log2(max(2, len(found.categories))))
@@ -231,7 +231,7 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
         hits = data[data[:, -1] == name, :-1]
         wells = [(f"x {x:g}, y {y:g}", hits[(hits[:, :2] == (x, y)).all(1)]) for x, y in np.unique(hits[:, :2], axis=0)]
         for well, at in [(f"all {len(wells)}", hits), *wells[:SHOWN]] if wells else []:
-            one = measures.connected_volume(made, name, at)
+            one = uncertainty.connected_volume(made, name, at)
             drawn.setdefault(str(name), one)
             cuts = map(number_text, one.quantile(QUANTILES).values)
             rows.append({"Category": str(name), "Well": well} | dict(zip(("P10", "P50", "P90"), cuts, strict=True)))
@@ -250,7 +250,7 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
         parts: list[Part] = [Figure("volumes.png", figure, caption), table]
         sections.append(Section("Volumes connected to wells", parts))
     if (n := len(made)) > 1:
-        curves: list[Any] = [measures.standard_error(made, name) for name in names or [None]]
+        curves: list[Any] = [uncertainty.standard_error(made, name) for name in names or [None]]
         figure = new_figure(5.6, 3)
         axes = figure.subplots()
         for name, one in zip(names or [None], curves, strict=True):
@@ -269,7 +269,7 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
 
 def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     """Return the shares of categories layer by layer, of the realisations and of the training image."""
-    both: list[Any] = [measures.vertical_proportions(one, names.tolist()) for one in (made, training)]
+    both: list[Any] = [uncertainty.vertical_proportions(one, names.tolist()) for one in (made, training)]
     theirs, own = both
     own = own.assign_coords(z=np.linspace(float(made["z"][0]), float(made["z"][-1]), len(training)))
     shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
@@ -462,16 +462,16 @@ def write_volumes(
     `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
     row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
     """
-    made = measures.named(ensemble, "realisation", *AXES)
+    made = uncertainty.named(ensemble, "realisation", *AXES)
     names = np.unique(training) if categorical else np.zeros(0, training.dtype)
     images, drawn = [*made.values, training], names[-1] if categorical else None
     fields = [(one == drawn if categorical else one).astype(np.float64) for one in images]
     what = f"category {drawn}" if categorical else "the values"
     limits = (float(fields[-1].min()), float(fields[-1].max()))
     along = {axis: axis_place(made, axis)[1] * np.arange(n) for axis, n in zip(AXES, training.shape, strict=True)}
-    own = measures.named(fields[-1], *AXES, coords=along, attrs=made.attrs)
-    cuts = [] if categorical else measures.quantiles(made, QUANTILES)
-    middle = [measures.probability(made, names[-1])] if categorical else [measures.e_type(made), *cuts]
+    own = uncertainty.named(fields[-1], *AXES, coords=along, attrs=made.attrs)
+    cuts = [] if categorical else uncertainty.quantiles(made, QUANTILES)
+    middle = [uncertainty.probability(made, names[-1])] if categorical else [uncertainty.e_type(made), *cuts]
     shown = [
         ("training image", own),
         *((f"{one.attrs['long_name']}{cut}", one) for one, cut in zip(middle, CUTS, strict=False)),
