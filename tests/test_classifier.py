@@ -310,7 +310,7 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoo
         ]
         fewer = 2 * np.log(learned.counts[c] / max(learned.counts)) / np.array([9, 13])
         single = -(np.tensordot(share, logs, 1) + share @ fewer) / model.TEMPERATURE
-        energy.append(single - patterns.SHARE * patterned[c] / LOGS)
+        energy.append(single - patterns.WEIGHT * patterned[c] / LOGS)
     gap = energy[1] - energy[0]
     for axis in (0, 1) if smoothing else ():
         gap = ndimage.correlate1d(gap, gaussian(smoothing) / TAPS, axis, mode="mirror")

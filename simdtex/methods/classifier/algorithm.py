@@ -29,7 +29,7 @@ from simdtex.methods.classifier.model import (
     prepared,
     windowed,
 )
-from simdtex.methods.classifier.patterns import NEAR, PATTERNS, SHARE, patterns
+from simdtex.methods.classifier.patterns import NEAR, PATTERNS, WEIGHT, patterns
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
 from simdtex.ops.classes import LOGS, WEIGHTS, exemplars, features, gaussian, potts, window
@@ -48,7 +48,7 @@ FEWEST_ROWS = 32
 SPREAD = 4
 """Degrees of freedom of the squared difference of a window's measures: see docs/classification.rst."""
 
-PATTERN = round(UNITS / LOGS * SHARE)
+PATTERN = round(UNITS / LOGS * WEIGHT)
 """Evidence, in `UNITS`, of one unit of the logarithms of probabilities by patterns."""
 
 STEPS = 64

@@ -34,13 +34,13 @@ DRIFT = 10
 RIDGE = 1e-3
 """Added to variances, relative to them, since the frequencies of a level add up to 1."""
 
-HEAT = 8
-"""Divisor of the logarithms of densities, because windows around near sites show nearly the same."""
+TEMPERATURE = 8
+"""Divisor of the logarithms of densities, since the windows of near sites overlap and are no independent evidence."""
 
-DOUBT = 0.05
+FLOOR = 0.05
 """Added to probabilities, so that the greatest evidence against a class is bounded."""
 
-SHARE = 0.35
+WEIGHT = 0.35
 """Weight of the logarithms of probabilities in the evidence."""
 
 _ROOT, _WHITE = 2**12, 2**20  # units in 1 of roots, and of whitening matrices
@@ -110,10 +110,10 @@ class Discriminant(NamedTuple):
         energy = np.empty((len(self.means), values.shape[1]))
         for one, mean, white, log in zip(energy, self.means, self.whitening, self.logs, strict=True):
             whitened = white @ (values - mean[:, None]) / _WHITE  # sums of integers are the same in any order
-            one[:] = ((whitened * whitened).sum(0) / 2 + log) / HEAT
+            one[:] = ((whitened * whitened).sum(0) / 2 + log) / TEMPERATURE
         chance = exp32(np.maximum(energy.min(0) - energy, -80))
         chance /= np.add.accumulate(chance)[-1]
-        least, most = np.float32(DOUBT), np.float32(1 + DOUBT)
+        least, most = np.float32(FLOOR), np.float32(1 + FLOOR)
         logs: NDArray[np.float32] = np.rint((log32(most) - log32(chance + least)) * np.float32(LOGS))
         return logs.astype(np.uint16)
 
