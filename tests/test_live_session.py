@@ -947,7 +947,7 @@ HOLE = [{"label": 1, "width": 7, "points": [[12, 10], [16, 12]]}]
 
 
 def test_a_filled_hole_is_looked_into(page_inside):
-    page_inside.result(job="fill", hole=HOLE, options={"order": 2})
+    page_inside.result(job="fill", hole=HOLE, options={"order": 2, "finish": 0})
     image, hole = page_inside.latest.image, paint(HOLE, SAMPLE.shape) > 0
     (pane,) = inside(page_inside)
     level, sweep, sets, *_ = pane["sweeps"][-1]
