@@ -46,7 +46,7 @@ _TAGS = (33550, 33922, 34264, 34735, 42113)
 _NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
 """Names of an axis that do not have its letter."""
 
-_TOLD = ("long_name", "standard_name", "units", "positive")
+_CF = ("long_name", "standard_name", "units", "positive")
 """Attributes of a coordinate or a variable in the CF conventions that realisations keep."""
 
 Library = tuple[dict[str, Array], tuple[float, ...], tuple[float, ...], str, dict[str, dict[str, str]]]
@@ -226,19 +226,19 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         about: Mapping[Any, Any] = {} if mapping is None else mapping.attrs
     first = next(iter(arrays.values()))
     origin, cell = zip(*(axis_place(first, axis) for axis in "xyz"), strict=True)
-    told = {name: told_of(one) for name, one in arrays.items()} | coordinates_told(first)
+    told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
     return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))), told
 
 
-def told_of(array: Any) -> dict[str, str]:
+def cf_attributes(array: Any) -> dict[str, str]:
     """Return the names and units of an array of xarray that its attributes give."""
-    return {name: str(array.attrs[name]) for name in _TOLD if name in array.attrs}
+    return {name: str(array.attrs[name]) for name in _CF if name in array.attrs}
 
 
-def coordinates_told(array: Any) -> dict[str, dict[str, str]]:
+def axis_attributes(array: Any) -> dict[str, dict[str, str]]:
     """Return the names and units of the coordinates of an array of xarray, by axis: x, y and z."""
-    return {axis: told_of(array.coords[dim]) for dim in array.coords if (axis := axis_of(str(dim)))}
+    return {axis: cf_attributes(array.coords[dim]) for dim in array.coords if (axis := axis_of(str(dim)))}
 
 
 def _steps(name: str, array: Any) -> dict[str, Any]:

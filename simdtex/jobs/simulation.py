@@ -91,7 +91,7 @@ def simulate(call: Simulate) -> Work:
     {'realisation': 2, 'y': 32, 'x': 40}
     """
     require("simulate", "xarray")
-    from simdtex.model.show import Realisations, Results, described, told_axes
+    from simdtex.model.show import Realisations, Results, described, described_axes
 
     n, first, axes, pictures, known = call.n, call.first, call.axes, call.training, call.known
     sides = ("layers", "rows", "columns")[-axes:]
@@ -191,7 +191,7 @@ def simulate(call: Simulate) -> Work:
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), **along}
         coordinates["seed"] = ("realisation", seeds)
-        coordinates |= told_axes(call.given, along, sides_of_cells)
+        coordinates |= described_axes(call.given, along, sides_of_cells)
         attributes = _attributes(output.statistics, chosen, inputs) | maps.digests()
         if inputs.given and inputs.given.outside is not None:
             coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
@@ -248,7 +248,7 @@ def estimate(call: Estimate) -> Work:
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     require("simulate", "xarray")
-    from simdtex.model.show import Results, described, told_axes
+    from simdtex.model.show import Results, described, described_axes
 
     categorical, nearest, axes = call.categorical, call.nearest, call.axes
     pictures = mrf.Options(categorical=categorical).of(call.training)
@@ -306,7 +306,7 @@ def estimate(call: Estimate) -> Work:
             **{"version": version("simdtex"), "device": output.statistics["device"], "nearest": nearest},
             **{"reach": reach, "bandwidth": call.bandwidth, **digests(pictures, given), **sides_of_cells},
         }
-        return Results(variables, along | told_axes(call.given, along, sides_of_cells), attributes)
+        return Results(variables, along | described_axes(call.given, along, sides_of_cells), attributes)
 
     return Work(run, None, -1, finish)
 

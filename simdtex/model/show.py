@@ -19,7 +19,7 @@ from xarray.core.utils import UncachedAccessor
 from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
-from simdtex.io.rasters import axis_place, coordinates_told
+from simdtex.io.rasters import axis_attributes, axis_place
 from simdtex.model.display import category_colours
 from simdtex.options import require, whole
 
@@ -251,12 +251,12 @@ def described(training: Any, known: Any = None) -> dict[str, str]:
     return {name: str(value) for name, value in found.items() if value}
 
 
-def told_axes(training: Any, along: dict[str, Any], sides: dict[str, float]) -> dict[str, Any]:
+def described_axes(training: Any, along: dict[str, Any], sides: dict[str, float]) -> dict[str, Any]:
     """Return the coordinates of axes that a training image of xarray names, with its names and units.
 
     Coordinates without an origin and a size of cells (``sides``) count rows and columns, and have no units.
     """
-    told = coordinates_told(training) if hasattr(training, "coords") and sides else {}
+    told = axis_attributes(training) if hasattr(training, "coords") and sides else {}
     return {
         axis: ((axis,) if np.ndim(along[axis]) else (), along[axis], own)
         for axis, own in told.items()

@@ -48,7 +48,7 @@ FEWEST_ROWS = 32
 SPREAD = 4
 """Degrees of freedom of the squared difference of a window's measures: see docs/classification.rst."""
 
-PATTERN = round(UNITS / LOGS * WEIGHT)
+PATTERN_FACTOR = round(UNITS / LOGS * WEIGHT)
 """Evidence, in `UNITS`, of one unit of the logarithms of probabilities by patterns."""
 
 STEPS = 64
@@ -83,9 +83,8 @@ class Plan:
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
         part = min(sites, max(SITES_AT_ONCE, FEWEST_ROWS * shape[1]))
-        slab = min(
-            sites, part + 2 * int(3 * self.options.window + FEWEST_ROWS) * shape[1]
-        )  # with the windows of a part
+        around = int(3 * self.options.window) + FEWEST_ROWS  # rows that the windows and neighbourhoods of a part reach
+        slab = min(sites, part + 2 * around * shape[1])
         planes = experts + PATTERNS * self.options.levels
         device = sites * (16 * count + experts * bands) + slab * 14 * planes
         host = sites * (count * (2 * experts + 22) + 24 * bands + 64 + experts * bands) + part * (24 * planes + 24)
@@ -185,7 +184,7 @@ class Run:
         return state._replace(done=end)
 
     @cached_property
-    def _pictured(self) -> list[NDArray[np.uint16]]:
+    def _host_levels(self) -> list[NDArray[np.uint16]]:
         """The levels of the picture in NumPy."""
         return [np.asarray(self.machine.get(one)) for one in self._levels]
 
@@ -194,14 +193,14 @@ class Run:
         slab = slice(max(0, first - len(NEAR) // 2), min(self.grid.rows, end + len(NEAR) // 2))
         here = np.zeros((slab.stop - slab.start, self.grid.cols), bool)
         here[first - slab.start : end - slab.start] = True
-        means, _ = windowed(self.machine, patterns(self._pictured, slab), np.ones_like(here), NEAR, here)
+        means, _ = windowed(self.machine, patterns(self._host_levels, slab), np.ones_like(here), NEAR, here)
         return self.model.discriminant.logarithms(means / float(MEANS)).reshape(-1, end - first, self.grid.cols)
 
     def _single(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
         """Return the evidence of single sites, (classes, ...) int32 in 2**-18: equation (6), and patterns."""
         total = np.empty(logs.shape[1:], np.int32)
         total[:] = self.model.offsets.reshape(-1, *[1] * (total.ndim - 1))
-        for factor, one in zip((*(expert.factor for expert in self.model.experts), PATTERN), logs, strict=True):
+        for factor, one in zip((*(expert.factor for expert in self.model.experts), PATTERN_FACTOR), logs, strict=True):
             total -= np.int32(factor) * one.astype(np.int32)
         return total
 
@@ -291,7 +290,7 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
-            patterned, segments = patterns(self._pictured, slab), []
+            patterned, segments = patterns(self._host_levels, slab), []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
