@@ -978,6 +978,21 @@ def test_a_filled_hole_is_looked_into(page_inside):
     assert "value is given" in page_inside.ask("explained", kind="explain", row=0, col=0)[0]["reason"]
 
 
+def test_moments_of_a_hole_in_uneven_light_have_the_light():
+    """Up to the finish, which changes a pixel by less than the trend from the first row to the last."""
+    picture = (SAMPLE // 16 + np.arange(24, dtype=np.uint8)[:, None, None] * 10).astype(np.uint8)
+    page = Fake(Picture("sky.png", picture, -1))
+    try:
+        page.result(job="fill", hole=[{"label": 1, "width": 5, "points": [[4, 3], [22, 3]]}], options={"order": 2})
+        level, sweep, sets, *_ = inside(page)[0]["sweeps"][-1]
+        page.say(kind="view", layer="picture", left=0, top=0, width=28, height=24, step=1)
+        page.ask("moments", kind="seek", level=level, sweep=sweep, sets=sets)
+        seen = frame(page, after_moments(page), layer="picture")[1][..., :3]
+        assert abs(seen - page.latest.image.astype(int)).max() < 16
+    finally:
+        page.session.close(10)
+
+
 def test_the_sample_of_a_look_is_that_of_the_run(page_inside):
     page_inside.result(width=20, height=18, part=[4, 2, 16, 12])
     told, (small,) = page_inside.ask("inside", kind="inside", open=True)

@@ -157,7 +157,9 @@ class Job:
             name = METHODS["mrf"].partition(":")[0]
             raise ValueError(f'only runs of the method "{name}" can be looked into; make a result by it first')
         call, work = FUNCTIONS[self.kind].prepare(self.sample, **self._keywords)
-        return (HoleReplay if self.kind == "fill" else Replay)(work.run, machine, call.rng)
+        if self.kind == "fill":
+            return HoleReplay(work.run, work.relit, machine, call.rng)
+        return Replay(work.run, machine, call.rng)
 
     def layers(
         self,
