@@ -68,10 +68,11 @@ quick:
 	$(call install,test,[test])
 	@SIMDTEX_REQUIRE_OPENCL= OCL_ICD_VENDORS=/nonexistent $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 $$($(PY) -c '$(QUICK)')
 
+# After a crash of a process --dist loadfile would wait for ever for tests that are done; so the run ends.
 slow:
 	$(call install,slow,[slow])
 	$(device)
-	@$(PY) -m pytest -m slow --numprocesses $(JOBS) --maxprocesses 4 --dist loadfile
+	@$(PY) -m pytest -m slow --numprocesses $(JOBS) --maxprocesses 4 --dist loadfile --max-worker-restart 0 -k '$(ONLY)'
 
 portable:
 	$(call install,test,[test])

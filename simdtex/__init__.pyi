@@ -49,7 +49,6 @@ class MrfOptions(TypedDict, total=False):
     lattice: Literal["auto", "none"] | tuple[tuple[float, float], tuple[float, float]]
     coherence: float
     balance: float
-    coarse_balance: float
     novelty: float
     finish: float | None
     overview: int

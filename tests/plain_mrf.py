@@ -33,7 +33,7 @@ IN_PHASE, FEW = 128, 16  # candidates of a phase, at most, and on average if its
 
 DEFAULTS = {
     **{"order": None, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
-    **{"balance": 0.5, "coarse_balance": 0.0, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
+    **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"lattice": "auto", "reduction": None},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4, "coarse_chance": 0},
@@ -353,7 +353,7 @@ class Level:
             self.of_phase = self.by_phase()
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
-        self.rate = 0 if arranged else max(o.balance, o.coarse_balance if number >= 2 else 0) * differing
+        self.rate = 0 if arranged else o.balance * differing
         self.step_of_charge, self.gain = float32(differing / 1024), 256 if coarsest else 512
         apart = n // self.spacing**2 if self.phased else n  # candidates that lie the spacing apart
         freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0

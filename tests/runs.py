@@ -286,9 +286,6 @@ RUNS = {
     "few-coarse-chance": textures(
         FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
     ),
-    "few-coarse-balance": textures(
-        FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_balance": 3}, samples=((12, 13),), shape=(9, 10)
-    ),
     "few-gibbs": textures(FEW | {"relaxation": "gibbs", "bandwidth": 0.5}, dtype=np.uint16),
     "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
     "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),

@@ -52,10 +52,7 @@ def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name
 
 LARGEST = {
     "mrf": {
-        **{
-            name: GREATEST
-            for name in ("bandwidth", "coherence", "balance", "coarse_balance", "structure", "novelty", "data_weight")
-        },
+        **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},
         **{"finish": 16, "chance": 4096, "coarse_chance": 4096, "overview": MOST},
         **{"xi": -GREATEST, "guide_weight": GREATEST, "weights": (GREATEST,), "shares": (GREATEST,)},
     },

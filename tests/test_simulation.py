@@ -179,6 +179,20 @@ def test_several_variables_are_the_last_dimension(axis):
     assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
 
 
+def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guide_tells_others():
+    training = np.random.default_rng(1).choice(3, (16, 20), p=(0.6, 0.3, 0.1)).astype(np.uint8)
+    shares = np.bincount(training.ravel())
+    usual, told = (simulate(training, categorical=True, **how) for how in ({}, {"proportions": shares.tolist()}))
+    assert np.array_equal(usual, told) and usual.attrs == told.attrs
+    even = simulate(training, categorical=True, proportions=(1, 1, 1))
+    assert not np.array_equal(usual, even)
+    for how in ({"probabilities": np.full((3, *SHAPE), 1 / 3)}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
+        found = simulate(training, n=1, categorical=True, **how)
+        assert json.loads(found.attrs["options"])["proportions"] is None
+    several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
+    assert json.loads(several.attrs["options"])["proportions"] is None
+
+
 def test_attributes_tell_how():
     found = simulate(n=1, levels=1)
     assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}

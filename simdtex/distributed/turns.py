@@ -202,7 +202,7 @@ class Turns:
         after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
         fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
         if turn.phase != "whole":
-            penalty = use_penalty(counts, fair_use, lattices.rate(turn.level), store.penalty(turn))
+            penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn))
             if not lattices.at_equilibrium(after):
                 return store.save(after, penalty)
         if turn.level:

@@ -123,6 +123,10 @@ def simulate(call: Simulate) -> Work:
     if copies:
         sample = copies.pictures(sample)
         guides = guides and (tuple(one.of(guides[0]) for one in copies.copies), guides[1])
+    if categories is not None and not (chosen.proportions or guides or maps.probabilities is not None):
+        every = replace(chosen.of(sample), shares=soft.shares) if copies else kinds
+        if every.pixels[0].shape[-1] == 1:  # of several variables the shares of the first could contradict the others
+            chosen = replace(chosen, proportions=tuple(every.proportions().tolist()))
     plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
     pixels = pictures.pixels[0]
     columns = (axes + (len(pictures.pixels) > 1)) if call.source else 0

@@ -217,7 +217,7 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, number)
-        return Level(setting, self.plan.schedule, relaxation, self.rate(number), self.fair_use(number), self.regions)
+        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(number), self.regions)
 
     def choice(self, number: int) -> Choice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
@@ -321,9 +321,10 @@ class Lattices:
         """N C sigma^2: half of the mean distance between two neighbourhoods."""
         return len(self.offsets) * self.sample.channels * self.sample.variance
 
-    def rate(self, number: int) -> float:
-        """Return lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
-        return 0.0 if self.coarser else self.options.balance_at(number) * self.typical_distance
+    @property
+    def rate(self) -> float:
+        """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
+        return 0.0 if self.coarser else self.options.balance * self.typical_distance
 
     def at_equilibrium(self, state: Counts) -> bool:
         """Return whether all temperatures of the level are 0 and its free sweeps are done."""

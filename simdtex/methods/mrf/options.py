@@ -136,14 +136,6 @@ class Options:
         jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
     )
-    coarse_balance: float = appearance(
-        0.0,
-        Number(0),
-        "Use this balance where sites are 4 pixels apart or more, if that is more than balance",
-        more="Coarse levels decide which parts of the sample are copied, and their sites relax again at finer levels.",
-        slider=(0, 8, 0.5),
-        shown=(),
-    )
     novelty: float = appearance(
         1.0,
         Number(0),
@@ -347,7 +339,7 @@ class Options:
         None,
         Numbers(),
         "Give the categories, in ascending order, these shares of the output",
-        none="the mean of the probabilities; in a volume of one variable without these and a guide the sample's shares",
+        none="the mean of the probabilities; of one variable without these and a guide the training image's shares",
         shown=("simulate",),
     )
     data_weight: float = data(
@@ -401,10 +393,6 @@ class Options:
         """Return how many candidates at random a coherent search weighs at a level."""
         return max(self.chance, self.coarse_chance) if level >= COARSE else self.chance
 
-    def balance_at(self, level: int) -> float:
-        """Return the balance of a level."""
-        return max(self.balance, self.coarse_balance) if level >= COARSE else self.balance
-
     def of(self, pictures: Pictures) -> Pictures:
         """Return the pictures of a sample with their kinds, weights and shares by these options."""
         variables, count = pictures.pixels[0].shape[-1], len(pictures.pixels)
@@ -437,13 +425,9 @@ class Options:
         named = pictures.categorical and any(pictures.categorical)
         finish, structure = 0.0 if pictures.deep else finish, 0.0 if plain else self.structure
         lattice = "none" if plain or named else self.lattice
-        wanted = self.proportions
-        if wanted is None and named and pictures.deep and pictures.pixels[0].shape[-1] == 1:
-            wanted = tuple(pictures.proportions().tolist())
         least = min(min(one.shape[:-1]) for one in pictures.pixels)
         order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
-        found = replace(self, order=order, search=search, finish=finish, structure=structure)
-        return replace(found, lattice=lattice, proportions=wanted)
+        return replace(self, order=order, search=search, finish=finish, structure=structure, lattice=lattice)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:

@@ -101,9 +101,7 @@ def plan(
     check_categories(pictures, given, options.proportions)
     if pictures.deep:
         check_volume(options)
-    asked, options = options.proportions, options.resolved(pictures)
-    if guide or (soft and soft.categories is not None):
-        options = replace(options, proportions=asked)  # a guide, and a map of probabilities, say how much of each
+    options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.neighbourhood, len(shape))
     sides = [picture.shape[:-1] for picture in pictures.pixels]
     if soft and soft.images is not None:  # each picture must serve the sites that it is probable at
