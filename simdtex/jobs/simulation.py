@@ -60,14 +60,16 @@ def simulate(call: Simulate) -> Work:
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
         cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
-        realisation: `simdtex.synthesize` with it returns the same map, unless `region` or a later parameter is used.
+        realisation: `simdtex.synthesize` with it and the ``options`` returns the same map, unless `region` or a later
+        parameter is used.
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
-        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. With `probabilities` or ``proportions``
-        those of all realisations are ``shares_asked`` and ``shares_reached``. All are texts and numbers, so that
-        ``to_netcdf`` and ``to_zarr`` of xarray write them; ``units`` and ``long_name`` are those of a training image of
-        xarray. With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute
-        ``missing``. ``plot(number=8)`` draws the first realisations.
+        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. With `probabilities` or ``proportions``,
+        by default those of the training image if there is one variable and no guide, the shares of all realisations are
+        ``shares_asked`` and ``shares_reached``. All are texts and numbers, so that ``to_netcdf`` and ``to_zarr`` of
+        xarray write them; ``units`` and ``long_name`` are those of a training image of xarray. With `region` there is a
+        coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``. ``plot(number=8)`` draws
+        the first realisations.
     xarray.Dataset
         With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
         x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume
@@ -115,16 +117,16 @@ def simulate(call: Simulate) -> Work:
     copies = maps.of_images(pictures, size)
     if copies and chosen.shares:
         raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
-    kinds = chosen.of(pictures)
+    sample = copies.pictures(pictures) if copies else pictures
+    kinds = chosen.of(sample)
     check_several(call.several, known, kinds)
     categories = kinds.categories(0)
     soft = Soft(maps.of_categories(categories, size, place), copies.probability if copies else None)
-    sample, guides = pictures, inputs.guide
-    if copies:
-        sample = copies.pictures(sample)
-        guides = guides and (tuple(one.of(guides[0]) for one in copies.copies), guides[1])
+    guides = inputs.guide
+    if guides and copies:
+        guides = tuple(one.of(guides[0]) for one in copies.copies), guides[1]
     if categories is not None and not (chosen.proportions or guides or maps.probabilities is not None):
-        every = replace(chosen.of(sample), shares=soft.shares) if copies else kinds
+        every = replace(kinds, shares=soft.shares) if copies else kinds
         if every.pixels[0].shape[-1] == 1:  # of several variables the shares of the first could contradict the others
             chosen = replace(chosen, proportions=tuple(every.proportions().tolist()))
     plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
