@@ -125,10 +125,11 @@ def simulate(call: Simulate) -> Work:
     guides = inputs.guide
     if guides and copies:
         guides = tuple(one.of(guides[0]) for one in copies.copies), guides[1]
-    if categories is not None and not (chosen.proportions or guides or maps.probabilities is not None):
-        every = replace(kinds, shares=soft.shares) if copies else kinds
-        if every.pixels[0].shape[-1] == 1:  # of several variables the shares of the first could contradict the others
-            chosen = replace(chosen, proportions=tuple(every.proportions().tolist()))
+    told = chosen.proportions or guides or maps.probabilities is not None
+    alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
+    if categories is not None and alone and not told:
+        images = replace(kinds, shares=soft.shares) if copies else kinds
+        chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
     plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
     pixels = pictures.pixels[0]
     columns = (axes + (len(pictures.pixels) > 1)) if call.source else 0

@@ -417,12 +417,11 @@ class Options:
         """
         usual = "coherent" if (self.relaxation, self.pixel) == ("icm", "source") else "exact"
         search = usual if self.search == "auto" else self.search
+        named = pictures.categorical and any(pictures.categorical)
         finish = self.finish
         if finish is None:
-            categories = (pictures.categorical and any(pictures.categorical)) or of_palette(pictures.pixels)
-            finish = 0.0 if self.pixel == "density" or categories else FINISH
+            finish = 0.0 if self.pixel == "density" or named or of_palette(pictures.pixels) else FINISH
         plain = self.pixel == "density" or pictures.deep
-        named = pictures.categorical and any(pictures.categorical)
         finish, structure = 0.0 if pictures.deep else finish, 0.0 if plain else self.structure
         lattice = "none" if plain or named else self.lattice
         least = min(min(one.shape[:-1]) for one in pictures.pixels)
