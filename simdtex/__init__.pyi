@@ -56,7 +56,7 @@ class MrfOptions(TypedDict, total=False):
     reduction: int | None
     boundary: Literal["torus", "open"]
     edges: Literal["auto", "reflect", "whole"]
-    phases: Literal["all", "decimated"]
+    phases: int
     search: Literal["auto", "exact", "coherent"]
     chance: int
     coarse_chance: int

@@ -73,7 +73,7 @@ class Problem(NamedTuple):
     field: Field
     sites: np.ndarray
     edges: str
-    phases: str
+    phases: int
     nowhere: float = 0.0
     regular: bool = False
     between: bool = False
@@ -237,7 +237,7 @@ def problem(
     dtype=np.uint8,
     temperatures="mixed",
     edges="whole",
-    phases="all",
+    phases=64,
     count=None,
     weight=0.0,
     guides=0,
@@ -314,7 +314,7 @@ def problems(draw, max_order=9, channels=(1, 2, 3)):
         dtype=draw(st.sampled_from([np.uint8, np.uint16, np.float32])),
         temperatures=draw(st.sampled_from(["mixed", "zero", "one"])),
         edges=edges,
-        phases="all",
+        phases=64,
         count=draw(st.sampled_from([1, 7, 24, 37])),  # PoCL compiles anew for each
         regular=draw(st.booleans()),
         between=draw(st.booleans()),

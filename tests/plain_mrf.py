@@ -35,7 +35,7 @@ DEFAULTS = {
     **{"order": None, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"lattice": "auto", "reduction": None},
-    **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
+    **{"free_sweeps": 2, "pixel": "source", "phases": 1, "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4, "coarse_chance": 0},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
     **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None, "soft_weight": 1.0},
@@ -281,8 +281,9 @@ def number_of_levels(samples, shape, o):
 
     def enough(levels, least):
         spacing = 2 ** (levels - 1)
-        step = 1 if o.phases == "all" else spacing
-        sides = [[max(0, n - (2 * radius * spacing if o.edges == "whole" else 0)) // step for n in y] for y in samples]
+        sides = [
+            [max(0, n - (2 * radius * spacing if o.edges == "whole" else 0)) // spacing for n in y] for y in samples
+        ]
         return sum(rows * cols for rows, cols in sides) >= least
 
     smallest = min(n for sides in (*samples, shape) for n in sides)
@@ -319,7 +320,7 @@ class Level:
         self.held = {(i, j) for i, j in Y.given if i % self.spacing == j % self.spacing == 0}
 
         self.phased = Y.waves is not None and o.search == "coherent"
-        radius, step = isqrt(o.order), 1 if o.phases == "all" or self.phased else self.spacing
+        radius, step = isqrt(o.order), 1 if self.phased else max(1, self.spacing // o.phases)
         self.step = step
         self.places = positions(Y, self.spacing, step, o)
         self.number_of = {place: p for p, place in enumerate(self.places)}
@@ -355,7 +356,7 @@ class Level:
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate = 0 if arranged else o.balance * differing
         self.step_of_charge, self.gain = float32(differing / 1024), 256 if coarsest else 512
-        apart = n // self.spacing**2 if self.phased else n  # candidates that lie the spacing apart
+        apart = n // (self.spacing // step) ** 2  # candidates that lie the spacing apart
         freedom = min(1.0, 256 / apart, (apart / 128) ** 2) if coarsest else 0.0
         self.novelty = float32(o.novelty * freedom * Y.matched * Y.variance)
 
@@ -648,8 +649,11 @@ def of_kind(level, s, numbers):
         most = max(one for one in said if one is not None)
         cost = [2.0**40 if one is None else min(2.0**40, rate * round((most - one) * 1024) / 1024) for one in said]
         cost = charged_too(level, s, cost) if number == 0 else cost
+        inside = len(level.offsets) if level.o.boundary == "torus" else sum(r is not None for r in level.near[s])
+        share = float32(inside) / float32(len(level.offsets))
+        cost = [float32(one) * share for one in cost]
         for k, (n, i, j) in enumerate(places):
-            d[k] += float32(cost[of_pictures[n][i, j]])
+            d[k] += cost[of_pictures[n][i, j]]
     return d
 
 

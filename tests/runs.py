@@ -150,7 +150,11 @@ class Given(NamedTuple):
     def plainly(self, simulated):
         """Image, source and temperature by the plain loops; of a simulation without the temperature."""
         samples, masks, known, source, guide = self.arrays()
-        own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64} if simulated else {}
+        own = (
+            {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "phases": 4, "free_sweeps": 3}
+            if simulated
+            else {}
+        )
         given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": self.maps}
         pictures = samples if len(samples) > 1 else samples[0]
         seed = realisation_seed(SEED, 0) if simulated else SEED
@@ -261,11 +265,11 @@ RUNS = {
     "defaults": textures(samples=((9, 10),), shape=(2, 3)),
     "overview": textures({"order": 2, "overview": 20}, samples=((20, 19),), shape=(9, 10)),
     "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
-    "overview-whole": textures({"order": 1, "edges": "whole", "phases": "all"}, samples=((20, 19),), shape=(9, 8)),
+    "overview-whole": textures({"order": 1, "edges": "whole", "phases": 64}, samples=((20, 19),), shape=(9, 8)),
     "paper": textures({"preset": "paper", "order": 2}, shape=(6, 7)),
     "exact": textures(EXACT),
     "exact-order-8": textures(EXACT | {"order": 8, "xi": -4.0}, samples=((14, 12),)),
-    "exact-three-levels": textures(EXACT | {"levels": 3, "phases": "all"}, samples=((13, 14),), shape=(11, 10)),
+    "exact-three-levels": textures(EXACT | {"levels": 3, "phases": 2}, samples=((13, 14),), shape=(11, 10)),
     "exact-colour": textures(EXACT | OPEN, channels=3),
     "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16, shape=(6, 7)),
     "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(3, 4)),
@@ -284,12 +288,12 @@ RUNS = {
     "few-chance": textures(FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
     "few-levels": textures(FEW | {"levels": 3, "edges": "reflect"}, samples=((13, 14),), shape=(11, 10)),
     "few-coarse-chance": textures(
-        FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
+        FEW | {"order": 1, "levels": 4, "phases": 64, "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
     ),
     "few-gibbs": textures(FEW | {"relaxation": "gibbs", "bandwidth": 0.5}, dtype=np.uint16),
     "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
     "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),
-    "few-whole": textures(FEW | {"order": 5, "edges": "whole", "phases": "all", "xi": -2.5}, masked=0.2, **F4),
+    "few-whole": textures(FEW | {"order": 5, "edges": "whole", "phases": 64, "xi": -2.5}, masked=0.2, **F4),
     "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(2, 3), **F4),
     # schedules
     **{
@@ -314,7 +318,7 @@ RUNS = {
     "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10)),
     "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
     "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
-    "more-whole": textures(MORE | {"edges": "whole", "phases": "all", "balance": 2.0}, samples=((16, 15),)),
+    "more-whole": textures(MORE | {"edges": "whole", "phases": 64, "balance": 2.0}, samples=((16, 15),)),
     "reduced": textures(MORE | {"levels": 3, "reduction": 2}, samples=((24, 25),), shape=(13, 11), tiles=6),
     "reduced-lattice": textures(
         MORE | {"levels": 3, "reduction": 2, "lattice": "5.2,0.3,-0.2,6", "free_sweeps": 1},
@@ -395,7 +399,7 @@ RUNS = {
     "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
     "volume-exact": volume((3, 5, 6), search="exact", relaxation="gibbs", edges="whole", order=1),
     "volume-grey": volume(
-        (4, 8, 9), training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=3, phases="all"
+        (4, 8, 9), training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=3, phases=64
     ),
     "volume-data": volume((8, 14, 15), given=lambda: {"known": wells((8, 14, 15))}, levels=3),
     "volume-guide": volume(
@@ -528,7 +532,7 @@ LARGE = {
     "large brick-exact": ("brick", (128, 128), {"search": "exact"}),
     "large brick-paper": ("brick-64", (40, 40), {"preset": "paper", "order": 8}),
     "large grass-16-bit": ("grass-16", (120, 120), {}),
-    "large gravel-phases": ("gravel-64", (96, 96), {"phases": "all", "edges": "reflect", "order": 8}),
+    "large gravel-phases": ("gravel-64", (96, 96), {"phases": 64, "edges": "reflect", "order": 8}),
     "large grass-draws": ("grass-64", (64, 64), {"relaxation": "gibbs", "search": "coherent", "order": 8}),
     "large luby": ("brick-64", (56, 56), {"schedule": "luby", "order": 8}),
     "large block-exact": ("brick-64", (56, 56), {"schedule": "block", "search": "exact", "order": 8}),

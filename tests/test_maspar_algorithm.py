@@ -33,7 +33,7 @@ CASES = {
     "nearest colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", **ICM}),
     "mode": ((11, 9), "4x8", {"order": 2, "dtype": bool, **ICM}),
     "mode of colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "bandwidth": 0.3, **ICM}),
-    "rows of several units of noise": ((5, 6), "4x4", {"order": 2, "levels": 2, "size": (9, 44), "phases": "all"}),
+    "rows of several units of noise": ((5, 6), "4x4", {"order": 2, "levels": 2, "size": (9, 44), "phases": 64}),
     "one pixel": ((1, 1), "2x2", {"order": 1}),
 }
 

@@ -15,7 +15,15 @@ from simdtex.jobs.simulation import realisation_seed
 xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
-OWN = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "xi": -8.0}
+OWN = {
+    "boundary": "open",
+    "coherence": 0.0,
+    "balance": 1.0,
+    "coarse_chance": 64,
+    "phases": 4,
+    "free_sweeps": 3,
+    "xi": -8.0,
+}
 """The defaults of a simulation that differ from those of a texture; and few sweeps."""
 QUICK = {"order": 2, "xi": -8.0, "device": "reference", "rng": 5, "jobs": 1}
 TRAINING = texture((16, 20))

@@ -291,9 +291,7 @@ class Sample:
             row = ((layer + self.margin)[:, None] * np.int32(self.layer) + row).ravel()
         return row, col, found.reshape(-1, col.size)
 
-    def places(
-        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
-    ) -> Places:
+    def places(self, offsets: NDArray[np.int32], spacing: int, phases: int = 1, edges: str = "whole") -> Places:
         """Return the places of the candidates of a level.
 
         Places outside the pictures, unknown or unusable ones, and those with too large a share of unknown neighbours
@@ -305,8 +303,9 @@ class Sample:
             The neighbourhood.
         spacing : int
             The spacing 2**level of the neighbourhood.
-        phases : {"decimated", "all"}
-            The pixels of the decimated sample, equation (10), or every pixel.
+        phases : int
+            The number of decimated samples along each axis, of equation (10), to whose pixels the places belong, rounded
+            down to a power of 2. From `spacing` on, every pixel is a place.
         edges : {"whole", "reflect", "auto"}
             ``"whole"``: places whose neighbourhood lies in their picture, equation (4). ``"reflect"``: all, if the
             margin is wide enough. ``"auto"``: whole at the finest level, if those are three quarters of all places or
@@ -320,7 +319,7 @@ class Sample:
         key = (offsets.tobytes(), spacing, phases, edges)
         if key in self._places:
             return self._places[key]
-        step, margin = 1 if phases == "all" else spacing, self.margin
+        step, margin = max(1, spacing >> (phases.bit_length() - 1)), self.margin
         row, col, whole = self._crossings(int(offsets.max()) * spacing, step)
         found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
         apart = self._in_pixels(offsets, spacing)

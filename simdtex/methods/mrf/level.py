@@ -192,7 +192,7 @@ class Lattices:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid, places = self.grid(number), self.places(number)
         coarsest, count = number == self.levels - 1, places.positions.size
-        every, spaced = self.exhaustive(number), count // (self.spacing(number) ** 2 if self.phased else 1)
+        every, spaced = self.exhaustive(number), count // (places.spacing // places.step) ** offsets.shape[1]
         candidates = sample.candidates(machine, places, self.planes, every)
         square = square_of(machine, sample, places, every)
         proposal: AllCandidates | CandidateList = AllCandidates(candidates, square)
@@ -296,8 +296,7 @@ class Lattices:
         if not waves:
             return None
         weight = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
-        step = 1 if self.phases == "all" else self.spacing(number)
-        tolerance = np.float32(round(float(weight) ** 2 * waves.half(step)))
+        tolerance = np.float32(round(float(weight) ** 2 * waves.half(self.places(number).step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))
         return Phased(self.machine.put(those), None, weight, tolerance)
@@ -338,28 +337,23 @@ class Lattices:
 
     def fair_use(self, number: int) -> FairUse:
         """Return the positions of the candidates of a level, and the fair use of each."""
-        step = self.spacing(number) if self.phases == "all" else 1
         places = self.places(number)
-        around = int(self.offsets[:, 1].max()) * step
+        around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(number)
         gain = GAIN if number == self.levels - 1 else 2 * GAIN
         asked: dict[str, Any] = {"wanted": self.regions.wanted, "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 
     def places(self, number: int) -> Places:
-        """Return the places of the candidates of a level."""
+        """Return the places of the candidates of a level: all of a regular sample, since few are of a site's phase."""
+        spacing, phases = self.spacing(number), self.options.phases
         edges = "reflect" if self.options.edges == "auto" and self.plan.reduction > 1 else self.options.edges
-        return self.sample.places(self.offsets, self.spacing(number), self.phases, edges)
+        return self.sample.places(self.offsets, spacing, spacing if self.phased else phases, edges)
 
     @property
     def phased(self) -> bool:
         """Whether the candidates of a site are of its phase on the lattice of a regular sample."""
         return self.sample.waves is not None and self.options.search == "coherent"
-
-    @property
-    def phases(self) -> str:
-        """The option ``phases``; all positions of a regular sample, since a site has few candidates of its phase."""
-        return "all" if self.phased else self.options.phases
 
     def chance(self, number: int) -> int:
         """Return the number of random candidates of a level.
@@ -423,6 +417,11 @@ class Level:
     soft: NDArray[np.float32] | None = None
     lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
 
+    @cached_property
+    def inside(self) -> NDArray[np.float32]:
+        """The share of each site's neighbours that lie in the lattice, (H, W)."""
+        return self.grid.inside(self.setting.offsets)
+
     @property
     def number(self) -> int:
         """The l of Algorithm 1, 0 the finest."""
@@ -467,7 +466,8 @@ def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     padded, kinds = level.machine.put(np.pad(own, (0, TAIL))), costs.kinds  # whole vectors are read at the end
     if kinds and level.soft is not None:
         soft = level.regions.costs(level.soft, of_kinds, level.grid) if level.regions else level.soft
-        kinds = kinds._replace(sites=level.machine.put(soft))
+        # distances sum over the neighbours that there are, so the costs beside them are of as many
+        kinds = kinds._replace(sites=level.machine.put(soft * level.inside))
     return level.relaxation._replace(costs=costs._replace(penalty=padded, kinds=kinds))
 
 
@@ -538,14 +538,12 @@ def number_of_levels(
     radius = int(offsets[:, 1].max())
     for sample in samples:
         check_fit(sample, radius, options.neighbourhood)
-    step = 1 if options.phases == "all" else 2
 
     def candidates(levels: int) -> int:
         spacing = 2 ** (levels - 1)
         margin = 0 if options.edges != "whole" else 2 * radius * spacing
-        apart = spacing if step == 2 else 1
         sides = [[max(0, n - margin) for n in sample] for sample in samples]
-        return sum(prod(-(-n // apart) for n in one[:-2]) * prod(n // apart for n in one[-2:]) for one in sides)
+        return sum(prod(-(-n // spacing) for n in one[:-2]) * prod(n // spacing for n in one[-2:]) for one in sides)
 
     most = 1 + int(log2(min(*shape[-2:], *(side for sample in samples for side in sample[-2:]))))
     while most > 1 and not candidates(most):

@@ -215,13 +215,17 @@ class Options:
         symbol="equation (4)",
         paper="whole",
     )
-    phases: str = scales(
-        "decimated",
-        Choice(("all", "decimated")),
-        "Take candidates at coarse levels from all positions of the sample (all), or from the decimated sample "
-        "(decimated)",
+    phases: int = scales(
+        1,
+        Whole(1, 2**16),
+        "Take candidates at coarse levels from up to this many decimations of the sample along each axis; more copy "
+        "less of the sample",
+        more="At a level whose sites are s pixels apart, candidates are s / phases pixels apart, or 1; a number that "
+        "is no power of 2 counts as the next smaller one. With 1 they are those of the decimated sample. The coarsest "
+        "level takes longer, as it evaluates all of them.",
         symbol="equation (10)",
-        paper="decimated",
+        paper=1,
+        jobs={"simulate": 4, "simulate 3-D": 1},
         shown=(),
     )
     search: str = searching(
@@ -285,6 +289,7 @@ class Options:
         Whole(0),
         "Sweep this many times over all sites, including those of the coarser level, after the equilibrium of a level",
         paper=0,
+        jobs={"simulate": 3, "simulate 3-D": 2},
         slider=(0, 8, 1),
         shown=("fill", "extend", "simulate", "schedules"),
     )

@@ -186,7 +186,7 @@ def halvings(scene: Scene, options: Options, levels: int, soft: Soft | None) -> 
     kept = options.categorical or options.pixel == "density" or scene.pictures.pixels[0].dtype == np.bool_
     never = scene.pictures.deep or kept or loose or soft is not None
     if options.reduction is None:
-        never = never or options.search == "exact" or options.phases == "all" or of_palette(scene.pictures.pixels)
+        never = never or options.search == "exact" or options.phases > 1 or of_palette(scene.pictures.pixels)
         shortest = np.hypot(*scene.regular.output.basis.T).min() if scene.regular else np.inf
         while most and shortest < CELL * 2**most:
             most -= 1
