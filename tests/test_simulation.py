@@ -9,6 +9,7 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex.experiments.ensemble import channels
 from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs.simulation import realisation_seed
 
@@ -443,3 +444,12 @@ def test_bad_input_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         simulate(**change)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_shares_near_the_border_are_those_inside():
+    """Sites near the border have fewer neighbours, and there a cost of a category weighs more."""
+    training = channels()[0][:128, :128]
+    found = simdtex.simulate(training, 8, shape=(64, 64), categorical=True, rng=1).values.mean(0)
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 0).mean()) < 0.06
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 1).mean()) < 0.06

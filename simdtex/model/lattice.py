@@ -194,11 +194,19 @@ class Grid:
         if self.torus:
             return np.ones(self.shape, np.float32)
         there = [by[:, None] + line for by, line in zip(offsets.T, self.lines(), strict=True)]
-        held = [(0 <= at) & (at < n) for at, n in zip(there, self.whole.shape, strict=True)]
+        held = [(at >= 0) & (at < n) for at, n in zip(there, self.whole.shape, strict=True)]
         axes = "zyx"[-len(held) :]
         terms = ",".join("n" + axis for axis in axes)
         count = np.einsum(f"{terms}->{axes}", *(one.astype(np.float32) for one in held), optimize=True)
         return np.divide(count, len(offsets), dtype=np.float32)
+
+    def near_edge(self, radius: int) -> NDArray[np.bool_]:
+        """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""
+        found = np.zeros(self.shape, bool)
+        if not self.torus:
+            for near, n in zip(np.ix_(*self.lines()), self.whole.shape, strict=True):
+                found |= (near < radius) | (near >= n - radius)
+        return found
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""

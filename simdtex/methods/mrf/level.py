@@ -287,8 +287,9 @@ class Lattices:
         soft, wanted = self.plan.kinds, self.options.proportions
         if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
             return None
-        of, shares = (None, np.array([wanted]) / sum(wanted)) if wanted else soft.regions()
-        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS))
+        of, shares = (None, np.array([wanted, wanted]) / sum(wanted)) if wanted else soft.regions()
+        radius = int(self.offsets.max())
+        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS), radius)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
