@@ -480,8 +480,8 @@ def shares(level):
 def shares_asked(probability, o):
     """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
 
-    With proportions there are two (`region_of`); else pixels with the same probabilities in sixteenths that are connected, but parts
-    of fewer than 256 pixels are together.
+    With proportions there are two (`region_of`); else pixels with the same probabilities in sixteenths that are
+    connected, but parts of fewer than 256 pixels are together.
     """
     found = SimpleNamespace(of={}, shares=[], charges=[])
     if probability is None or not (o.proportions or o.soft_weight):

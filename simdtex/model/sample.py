@@ -304,8 +304,8 @@ class Sample:
         spacing : int
             The spacing 2**level of the neighbourhood.
         phases : int
-            The number of decimated samples along each axis, of equation (10), to whose pixels the places belong, rounded
-            down to a power of 2. From `spacing` on, every pixel is a place.
+            The number of decimations along each axis, equation (10), whose pixels are places; it is rounded down to a
+            power of 2. From `spacing` on, every pixel is a place.
         edges : {"whole", "reflect", "auto"}
             ``"whole"``: places whose neighbourhood lies in their picture, equation (4). ``"reflect"``: all, if the
             margin is wide enough. ``"auto"``: whole at the finest level, if those are three quarters of all places or
