@@ -103,7 +103,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
 
 
-FORMAT = 10
+FORMAT = 11
 """Format of the store; all other formats are rejected."""
 
 TALLIES_AT_ONCE = 2**22
