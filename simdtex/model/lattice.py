@@ -198,7 +198,8 @@ class Grid:
         axes = "zyx"[-len(held) :]
         terms = ",".join("n" + axis for axis in axes)
         count = np.einsum(f"{terms}->{axes}", *(one.astype(np.float32) for one in held), optimize=True)
-        return np.divide(count, len(offsets), dtype=np.float32)
+        share: NDArray[np.float32] = np.divide(count, len(offsets), dtype=np.float32)
+        return share
 
     def near_edge(self, radius: int) -> NDArray[np.bool_]:
         """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""

@@ -140,9 +140,9 @@ class Options:
         1.0,
         Number(0),
         "Penalise copies of the sample's layout: more departs further from it",
-        more="At the coarsest level, with n decimated pixels, a candidate costs mu C sigma^2 min(1, 256 / n, (n / 128)^2) "
-        "for each neighbour whose source it continues, and four times that for each neighbour whose source it is: mu "
-        "is the novelty. This applies if sites take pixels of the sample.",
+        more="At the coarsest level, with n decimated pixels, a candidate costs mu C sigma^2 min(1, 256 / n, "
+        "(n / 128)^2) for each neighbour whose source it continues, and four times that for each neighbour whose "
+        "source it is: mu is the novelty. This applies if sites take pixels of the sample.",
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate 3-D": 0.25},
         slider=(0, 4, 0.25),
