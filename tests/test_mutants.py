@@ -12,6 +12,7 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.driver import drive
 from simdtex.machine import memory
 from simdtex.methods import mrf
+from simdtex.methods.mrf import level as level_of_a_run
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
 from simdtex.methods.mrf.plan import check_guide
 from simdtex.methods.mrf.record import Record, expected_work
@@ -117,6 +118,12 @@ def test_how_many_levels(sample, shape, given, expected):
 def prepared(machine=REFERENCE, **given):
     options = {"order": 2, "levels": 3, "phases": 64, "edges": "reflect"} | given
     return laid_out(machine, texture((24, 25), seed=3)[..., None], (20, 23), mrf.Options(**options), 5)
+
+
+def test_the_coarsest_level_has_fewer_decimations_if_it_has_many_candidates(monkeypatch):
+    assert [prepared().places(number).step for number in range(3)] == [1, 1, 1]
+    monkeypatch.setattr(level_of_a_run, "ALL", 4 * (24 * 25 // 4**2))
+    assert [prepared().places(number).step for number in range(3)] == [1, 1, 2]
 
 
 def test_which_sites_are_active():

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import log2, prod, sqrt
+from math import isqrt, log2, prod, sqrt
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -41,6 +41,9 @@ FEWEST, WIDE = 32, 8
 
 GAIN = STEPS // 4
 """The most steps by which the penalty of a category changes after a sweep of the coarsest level; twice that below."""
+
+ALL = 2**14
+"""The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
 
 TOGETHER = 2**16
 """Number of sites that one kernel relaxes between two checks of the clock."""
@@ -348,6 +351,9 @@ class Lattices:
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level: all of a regular sample, since few are of a site's phase."""
         spacing, phases = self.spacing(number), self.options.phases
+        if number == self.levels - 1:  # a place of it is one of every finer level, whatever their phases
+            decimated = self.sample.height * self.sample.width // spacing**2
+            phases = min(phases, max(1, isqrt(ALL // max(1, decimated))))
         edges = "reflect" if self.options.edges == "auto" and self.plan.reduction > 1 else self.options.edges
         return self.sample.places(self.offsets, spacing, spacing if self.phased else phases, edges)
 
