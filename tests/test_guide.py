@@ -149,7 +149,7 @@ def of_channels(p, n, **options):
 def test_shares_are_those_asked():
     for share in (0.27, 0.8):
         assert abs(of_channels(np.full((64, 64), share), 2).mean() - share) < 0.03
-    found = of_channels(None, 2, proportions=(0.9, 0.1), shape=(64, 64))
+    found = of_channels(None, 2, proportions=(0.9, 0.1), shape=(128, 128))
     assert abs(found.mean() - 0.1) < 0.03
 
 
