@@ -480,15 +480,15 @@ def shares(level):
 def shares_asked(probability, o):
     """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
 
-    With proportions there are two (`region_of`); else pixels with the same probabilities in sixteenths that are
-    connected, but parts of fewer than 256 pixels are together.
+    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts
+    of fewer than 256 pixels are together.
     """
     found = SimpleNamespace(of={}, shares=[], charges=[])
     if probability is None or not (o.proportions or o.soft_weight):
         return found
     sites = list(np.ndindex(probability.shape[1:]))
     if o.proportions:
-        found.shares = [[one / sum(o.proportions) for one in o.proportions]] * 2  # inside, and near the border
+        found.of, found.shares = dict.fromkeys(sites, 0), [[one / sum(o.proportions) for one in o.proportions]]
     else:
         p = {s: [float(plane[s]) for plane in probability] for s in sites}
         alike = {s: tuple(round(one * 16) for one in p[s]) for s in sites if p[s][0] == p[s][0]}
@@ -516,22 +516,14 @@ def shares_asked(probability, o):
     return found
 
 
-def region_of(level, s):
-    """The region of a site; with proportions 1 if an open lattice does not have all its neighbours, else 0."""
-    if level.o.proportions:
-        return int(level.o.boundary == "open" and None in level.near[s])
-    return level.asked.of.get(level.pixel(s)) if level.asked.shares else None
-
-
 def charge(level, X):
     """After a sweep: a category of which a region has more sites than asked is charged more, in steps."""
     asked = level.asked
     counts = [[0] * len(one) for one in asked.shares]
-    for site in level.sites:
-        s, region = level.pixel(site), region_of(level, site)
+    for s in map(level.pixel, level.sites):
         n, i, j = X.source[s].tolist()
-        if region is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
-            counts[region][level.Y.soft[0][1][n][i, j]] += 1
+        if asked.of.get(s) is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
+            counts[asked.of[s]][level.Y.soft[0][1][n][i, j]] += 1
     for those, shares, charges in zip(counts, asked.shares, asked.charges, strict=True):
         for k, (n, share) in enumerate(zip(those, shares, strict=True)):
             due = share * sum(those)
@@ -541,7 +533,7 @@ def charge(level, X):
 
 def charged_too(level, s, cost):
     """Costs of the categories at a site with the charges of its region; the least of them is 0."""
-    region = region_of(level, s)
+    region = level.asked.of.get(level.pixel(s))
     if region is None:
         return cost
     charges = [float32(one) * level.step_of_charge for one in level.asked.charges[region]]
@@ -657,11 +649,8 @@ def of_kind(level, s, numbers):
         most = max(one for one in said if one is not None)
         cost = [2.0**40 if one is None else min(2.0**40, rate * round((most - one) * 1024) / 1024) for one in said]
         cost = charged_too(level, s, cost) if number == 0 else cost
-        inside = len(level.offsets) if level.o.boundary == "torus" else sum(r is not None for r in level.near[s])
-        share = float32(inside) / float32(len(level.offsets))
-        cost = [float32(one) * share for one in cost]
         for k, (n, i, j) in enumerate(places):
-            d[k] += cost[of_pictures[n][i, j]]
+            d[k] += float32(cost[of_pictures[n][i, j]])
     return d
 
 

@@ -189,26 +189,6 @@ class Grid:
         there: tuple[Any, ...] = (..., *np.ix_(*self.lines()))
         return whole[there] if self.origin else whole
 
-    def inside(self, offsets: NDArray[np.int32]) -> NDArray[np.float32]:
-        """Return the share of each site's neighbours, at ``offsets`` (N, 2 or 3), that lie in the whole lattice."""
-        if self.torus:
-            return np.ones(self.shape, np.float32)
-        there = [by[:, None] + line for by, line in zip(offsets.T, self.lines(), strict=True)]
-        held = [(at >= 0) & (at < n) for at, n in zip(there, self.whole.shape, strict=True)]
-        axes = "zyx"[-len(held) :]
-        terms = ",".join("n" + axis for axis in axes)
-        count = np.einsum(f"{terms}->{axes}", *(one.astype(np.float32) for one in held), optimize=True)
-        share: NDArray[np.float32] = np.divide(count, len(offsets), dtype=np.float32)
-        return share
-
-    def near_edge(self, radius: int) -> NDArray[np.bool_]:
-        """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""
-        found = np.zeros(self.shape, bool)
-        if not self.torus:
-            for near, n in zip(np.ix_(*self.lines()), self.whole.shape, strict=True):
-                found |= (near < radius) | (near >= n - radius)
-        return found
-
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""
         lines = self.lines()

@@ -290,9 +290,8 @@ class Lattices:
         soft, wanted = self.plan.kinds, self.options.proportions
         if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
             return None
-        of, shares = (None, np.array([wanted, wanted]) / sum(wanted)) if wanted else soft.regions()
-        radius = int(self.offsets.max())
-        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS), radius)
+        of, shares = (None, np.array([wanted]) / sum(wanted)) if wanted else soft.regions()
+        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS))
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
@@ -424,11 +423,6 @@ class Level:
     soft: NDArray[np.float32] | None = None
     lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def inside(self) -> NDArray[np.float32]:
-        """The share of each site's neighbours that lie in the lattice, (H, W)."""
-        return self.grid.inside(self.setting.offsets)
-
     @property
     def number(self) -> int:
         """The l of Algorithm 1, 0 the finest."""
@@ -473,8 +467,7 @@ def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     padded, kinds = level.machine.put(np.pad(own, (0, TAIL))), costs.kinds  # whole vectors are read at the end
     if kinds and level.soft is not None:
         soft = level.regions.costs(level.soft, of_kinds, level.grid) if level.regions else level.soft
-        # distances sum over the neighbours that there are, so the costs beside them are of as many
-        kinds = kinds._replace(sites=level.machine.put(soft * level.inside))
+        kinds = kinds._replace(sites=level.machine.put(soft))
     return level.relaxation._replace(costs=costs._replace(penalty=padded, kinds=kinds))
 
 
