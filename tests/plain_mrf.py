@@ -312,6 +312,8 @@ class Level:
         self.sites = list(product(range(self.rows), range(self.cols)))
         torus = o.boundary == "torus"
         self.near = {s: plain.neighbours(*s, o.order, self.rows, self.cols, torus) for s in self.sites}
+        inside = max(0, shape[0] - 2 * isqrt(o.order)) * max(0, shape[1] - 2 * isqrt(o.order))
+        self.bordered = not torus and shape[0] * shape[1] - inside >= 256
         self.offsets = plain.offsets(o.order)
         name, _, parameter = o.schedule.partition(":")
         self.tile = tuple(map(int, (parameter or "16x16").split("x"))) if name == "block" else (self.rows, self.cols)
@@ -480,15 +482,15 @@ def shares(level):
 def shares_asked(probability, o):
     """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
 
-    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts
-    of fewer than 256 pixels are together.
+    With proportions there are two (`region_of`); else pixels with the same probabilities in sixteenths that are
+    connected, but parts of fewer than 256 pixels are together.
     """
     found = SimpleNamespace(of={}, shares=[], charges=[])
     if probability is None or not (o.proportions or o.soft_weight):
         return found
     sites = list(np.ndindex(probability.shape[1:]))
     if o.proportions:
-        found.of, found.shares = dict.fromkeys(sites, 0), [[one / sum(o.proportions) for one in o.proportions]]
+        found.shares = [[one / sum(o.proportions) for one in o.proportions]] * 2  # inside, and near the border
     else:
         p = {s: [float(plane[s]) for plane in probability] for s in sites}
         alike = {s: tuple(round(one * 16) for one in p[s]) for s in sites if p[s][0] == p[s][0]}
@@ -516,14 +518,22 @@ def shares_asked(probability, o):
     return found
 
 
+def region_of(level, s):
+    """The region of a site; with proportions 1 if it lacks neighbours, and 256 or more sites do, else 0."""
+    if level.o.proportions:
+        return int(level.bordered and None in level.near[s])
+    return level.asked.of.get(level.pixel(s)) if level.asked.shares else None
+
+
 def charge(level, X):
     """After a sweep: a category of which a region has more sites than asked is charged more, in steps."""
     asked = level.asked
     counts = [[0] * len(one) for one in asked.shares]
-    for s in map(level.pixel, level.sites):
+    for site in level.sites:
+        s, region = level.pixel(site), region_of(level, site)
         n, i, j = X.source[s].tolist()
-        if asked.of.get(s) is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
-            counts[asked.of[s]][level.Y.soft[0][1][n][i, j]] += 1
+        if region is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
+            counts[region][level.Y.soft[0][1][n][i, j]] += 1
     for those, shares, charges in zip(counts, asked.shares, asked.charges, strict=True):
         for k, (n, share) in enumerate(zip(those, shares, strict=True)):
             due = share * sum(those)
@@ -533,7 +543,7 @@ def charge(level, X):
 
 def charged_too(level, s, cost):
     """Costs of the categories at a site with the charges of its region; the least of them is 0."""
-    region = level.asked.of.get(level.pixel(s))
+    region = region_of(level, s)
     if region is None:
         return cost
     charges = [float32(one) * level.step_of_charge for one in level.asked.charges[region]]

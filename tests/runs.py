@@ -150,7 +150,8 @@ class Given(NamedTuple):
     def plainly(self, simulated):
         """Image, source and temperature by the plain loops; of a simulation without the temperature."""
         samples, masks, known, source, guide = self.arrays()
-        own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64} if simulated else {}
+        own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "phases": 4, "free_sweeps": 3}
+        own = own if simulated else {}
         given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": self.maps}
         pictures = samples if len(samples) > 1 else samples[0]
         seed = realisation_seed(SEED, 0) if simulated else SEED
@@ -385,6 +386,12 @@ RUNS = {
     "soft-gibbs": realisations(
         MORE_FEW | GIBBS | {"categorical": True, "proportions": (2.0, 1.0)},
         **{"kinds": 2, "known": 0.1, "soft": ("categories",), "masked": 0.2, "shape": (6, 7)},
+    ),
+    "soft-border": realisations(
+        MORE_FEW | {"categorical": True, "proportions": (2.0, 1.0), "order": 20},
+        samples=((20, 21),),
+        shape=(10, 29),
+        kinds=2,
     ),
     "soft-all": realisations(
         MORE_FEW | {"categorical": (0,), "levels": 3},

@@ -157,7 +157,7 @@ def test_shares_are_those_asked():
 @pytest.mark.parametrize("weight", [1.0, 4.0])
 def test_shares_of_regions_are_those_asked(weight):
     """Bands of a gradient, and blocks of 32x32 sites; with smaller weights only larger maps come as near."""
-    bands = of_channels(SLOPE, 6, soft_weight=weight).reshape(4, -1).mean(1)
+    bands = of_channels(SLOPE, 24, soft_weight=weight).reshape(4, -1).mean(1)
     assert abs(bands - SLOPE.reshape(4, -1).mean(1)).max() < 0.05
     found = of_channels(np.kron(BLOCKS, np.ones((32, 32))), 8, soft_weight=weight)
     off = abs(found.reshape(4, 32, 4, 32).mean((1, 3)) - BLOCKS)

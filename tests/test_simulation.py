@@ -9,6 +9,7 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex.experiments.ensemble import channels
 from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs.simulation import realisation_seed
 
@@ -16,6 +17,7 @@ xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
 OWN = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "xi": -8.0}
+OWN |= {"phases": 4, "free_sweeps": 3}
 """The defaults of a simulation that differ from those of a texture; and few sweeps."""
 QUICK = {"order": 2, "xi": -8.0, "device": "reference", "rng": 5, "jobs": 1}
 TRAINING = texture((16, 20))
@@ -435,3 +437,11 @@ def test_bad_input_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         simulate(**change)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_shares_near_the_border_are_those_inside():
+    """Sites near the border have fewer neighbours, and there a cost of a category weighs more."""
+    found = simdtex.simulate(channels()[0][:128, :128], 8, shape=(64, 64), categorical=True, rng=1).values.mean(0)
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 0).mean()) < 0.06
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 1).mean()) < 0.06

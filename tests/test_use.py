@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 import simdtex
 from simdtex.model.display import use_colours
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.source_map import counts, effective_use
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.use import FairUse, Regions, use, use_penalty
@@ -136,6 +136,18 @@ def test_a_kind_is_counted_where_a_region_has_a_relaxed_site_of_it():
     soft = np.float32([[[0, 8, 0, 1]] * 2, [[3, 0, 0, 0]] * 2, [[9, 9, 9, 9]] * 2])
     found = regions.costs(soft, np.float32([2, 4, -6, 0]), Grid((2, 4)))
     assert found[:, 0].tolist() == [[0, 7, 0, 1], [4, 0, 3, 0], [9] * 4]
+
+
+@pytest.mark.parametrize("shape", [(5, 9), (3, 5, 6)])
+def test_without_regions_sites_that_lack_neighbours_are_one(shape):
+    offsets = neighbourhood_offsets(2, len(shape))
+    regions = Regions(np.ones((2, 1)), lambda source: source, None, np.float32(1), radius=1)
+    for torus in (False, True):
+        grid = Grid(shape, torus)
+        near = grid.neighbours(np.arange(grid.size, dtype=np.int32), offsets)
+        assert (regions.at(grid) == (near < 0).any(0).reshape(shape)).all()
+    whole = Grid((5, 9), False)
+    assert (regions.at(whole.window(1, 2, 4, 6)) == regions.at(whole)[1:, 2:8]).all()
 
 
 def test_a_price_is_the_mean_of_two_sweeps():

@@ -189,6 +189,14 @@ class Grid:
         there: tuple[Any, ...] = (..., *np.ix_(*self.lines()))
         return whole[there] if self.origin else whole
 
+    def near_edge(self, radius: int) -> NDArray[np.bool_]:
+        """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""
+        found = np.zeros(self.shape, bool)
+        if not self.torus:
+            for near, n in zip(np.ix_(*self.lines()), self.whole.shape, strict=True):
+                found |= (near < radius) | (near >= n - radius)
+        return found
+
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""
         lines = self.lines()

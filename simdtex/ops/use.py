@@ -62,17 +62,22 @@ class Regions:
     """Regions of the output, and the share that is asked of each kind of candidates (category) in each.
 
     ``wanted`` (regions, kinds) float64; ``kinds`` returns the kinds of pixels (n,) of the sample; ``of`` (H, W) int32,
-    the region of each pixel of the output, -1 without one, or None if all are of one; ``unit``, a step of a penalty.
+    the region of each pixel of the output, -1 without one; ``unit``, a step of a penalty. Without ``of``, the sites of
+    an open lattice that lack neighbours, those less than ``radius`` from an edge, are region 1 and all others 0: the
+    fewer neighbours a site has, the less it takes to change its category.
     """
 
     wanted: NDArray[np.float64]
     kinds: Callable[[NDArray[np.int32]], NDArray[np.intp]]
     of: NDArray[np.int32] | None
     unit: np.float32
+    radius: int = 0
 
     def at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the region of each site of a lattice or a window of it."""
-        return np.zeros(grid.shape, np.int32) if self.of is None else grid.cut(grid.decimated(self.of))
+        if self.of is None:
+            return grid.near_edge(self.radius).astype(np.int32)
+        return grid.cut(grid.decimated(self.of))
 
     def counts(self, field: Field, grid: Grid) -> NDArray[np.int64]:
         """Return the number of sites with t < 1 and a source of each kind in each region, (regions x kinds,)."""

@@ -17,7 +17,7 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options, largest_order
-from simdtex.model.given import nearest_data
+from simdtex.model.given import LEAST, nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import lcpdf
@@ -290,8 +290,11 @@ class Lattices:
         soft, wanted = self.plan.kinds, self.options.proportions
         if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
             return None
-        of, shares = (None, np.array([wanted]) / sum(wanted)) if wanted else soft.regions()
-        return Regions(shares, self.sample.category, of, np.float32(self.typical_distance / STEPS))
+        of, shares = (None, np.array([wanted, wanted]) / sum(wanted)) if wanted else soft.regions()
+        unit, radius = np.float32(self.typical_distance / STEPS), int(self.offsets.max())
+        if self.grid(0).near_edge(radius).sum() < LEAST:
+            radius = 0
+        return Regions(shares, self.sample.category, of, unit, radius)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""

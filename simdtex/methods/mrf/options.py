@@ -225,6 +225,7 @@ class Options:
         "coarsest level, which evaluates all of them, fewer decimations count if there are over 16384 candidates.",
         symbol="equation (10)",
         paper=1,
+        jobs={"simulate": 4, "simulate 3-D": 1},
         shown=(),
     )
     search: str = searching(
@@ -288,6 +289,7 @@ class Options:
         Whole(0),
         "Sweep this many times over all sites, including those of the coarser level, after the equilibrium of a level",
         paper=0,
+        jobs={"simulate": 3, "simulate 3-D": 2},
         slider=(0, 8, 1),
         shown=("fill", "extend", "simulate", "schedules"),
     )
