@@ -376,14 +376,16 @@ def test_running_out_of_device_memory_is_a_device_error(any_device):
         greedy(machine)
 
 
-def test_a_launch_that_a_device_gives_up_is_not_called_a_lack_of_memory(any_device):
+def test_after_a_launch_that_a_device_gives_up_there_is_another_context(any_device):
     import pyopencl
 
     machine = OpenCL(any_device)
+    assert OpenCL(any_device).context == machine.context
     error = pyopencl.RuntimeError(SimpleNamespace(code=lambda: pyopencl.status_code.OUT_OF_RESOURCES))
     words = r"^\S.* gave up \(CL_OUT_OF_RESOURCES\), .* watchdog .*, and report it$"
     with pytest.raises(DeviceError, match=words), machine.running():
         raise error
+    assert OpenCL(any_device).context != machine.context
 
 
 def test_an_array_that_is_larger_than_a_device_allows_is_refused(any_device):

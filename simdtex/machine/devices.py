@@ -226,20 +226,34 @@ def _copy_icd_files(folder: Path) -> None:
                 (folder / f"{number}-{entry.name}").write_text(f"{beside if beside.is_file() else library}\n")
 
 
+@functools.cache
+def context(handle: cl.Device) -> cl.Context:
+    """Return the context that all runs on a device share: a driver of a GPU takes a sixth of a second to make one."""
+    import pyopencl
+
+    return pyopencl.Context([handle])
+
+
 def build(context: cl.Context, source: str, options: Sequence[str]) -> dict[str, Any]:
-    """Compile a program, and return its kernels by name; if that fails, try once more without the caches.
+    """Return new kernels of a program by name, compiled once in a context."""
+    return {kernel.function_name: kernel for kernel in _program(context, source, tuple(options)).all_kernels()}
+
+
+@functools.lru_cache(64)
+def _program(context: cl.Context, source: str, options: tuple[str, ...]) -> cl.Program:
+    """Compile a program; if that fails, try once more without the caches of files.
 
     One thread at a time compiles. The compiler's warnings, which pyopencl would repeat, are not shown.
     """
     import pyopencl
 
-    def built() -> dict[str, Any]:
+    def built() -> cl.Program:
         anew = [f"-DREPORTED={_reported}"] * bool(_reported)
-        program = pyopencl.Program(context, source).build(["-w", "-cl-std=CL1.2", *anew, *options])
-        kernels = {kernel.function_name: kernel for kernel in program.all_kernels()}
-        if not kernels:  # of a damaged file, PoCL makes an empty program
+        program = pyopencl.Program(context, source)
+        program.build(["-w", "-cl-std=CL1.2", *anew, *options])
+        if not program.all_kernels():  # of a damaged file, PoCL makes an empty program
             raise DeviceError("the program is empty")
-        return kernels
+        return program
 
     global _reported
     with _lock, warnings.catch_warnings():
@@ -250,12 +264,12 @@ def build(context: cl.Context, source: str, options: Sequence[str]) -> dict[str,
             before, why = (_reported, pyopencl._PYOPENCL_NO_CACHE), one_line(error)
             _reported, pyopencl._PYOPENCL_NO_CACHE = _reported + 1, True
             try:
-                kernels = built()
+                program = built()
             except Exception:
                 _reported, pyopencl._PYOPENCL_NO_CACHE = before
                 raise error from None
     _compile_anew(f"{why}\n", f"a compiled kernel could not be read ({why})")
-    return kernels
+    return program
 
 
 @functools.cache
@@ -265,14 +279,14 @@ def failure(handle: cl.Device) -> str:
 
     try:
         check_fork()
-        context = pyopencl.Context([handle])
-        kernels = build(context, _SOURCE, [])
-        queue = pyopencl.CommandQueue(context)
+        shared = context(handle)
+        kernels = build(shared, _SOURCE, [])
+        queue = pyopencl.CommandQueue(shared)
         given = np.full((64, 2), _NUMBERS, np.float32), np.full(64, _WHOLE, np.uint64)
         result = np.zeros((64, len(_BITS)), np.uint64)
         flags = pyopencl.mem_flags
-        sources = (pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=one) for one in given)
-        target = pyopencl.Buffer(context, flags.WRITE_ONLY, result.nbytes)
+        sources = (pyopencl.Buffer(shared, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=one) for one in given)
+        target = pyopencl.Buffer(shared, flags.WRITE_ONLY, result.nbytes)
         kernels["probe"](queue, (64,), None, *sources, target)
         pyopencl.enqueue_copy(queue, result, target)
     except Exception as error:  # the device is not usable, whatever the reason

@@ -194,7 +194,7 @@ class OpenCL:
         devices.check_fork()
         self.info, self.kind, self.memory = info, info.kind, float(info.memory)
         self.name = f"{info.name.strip()} ({info.platform})"
-        self.context = cl.Context([info.handle])  # type: ignore[list-item]
+        self.context = devices.context(info.handle)
         timed: dict[str, Any] = {"properties": cl.command_queue_properties.PROFILING_ENABLE} if profile else {}
         self.queue = cl.CommandQueue(self.context, **timed)
         self.log = Log(profile)
@@ -335,6 +335,8 @@ class OpenCL:
         try:
             yield
         except cl.Error as error:
+            if error.code not in OUT_OF_MEMORY:
+                devices.context.cache_clear()  # an error of a kernel can leave the context unusable
             if error.code == cl.status_code.OUT_OF_RESOURCES:
                 raise DeviceError(
                     f"{self.name} gave up (CL_OUT_OF_RESOURCES), since a kernel took more registers or memory than "
