@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How like the training image realisations are, with and without hard and soft data.
 
-    python benchmarks/simulation.py [--parts maps,volumes,soft] [--images channels,network,lenses,meanders]
+    python benchmarks/simulation.py [--parts maps,border,volumes,soft] [--images channels,network,lenses,meanders]
                                     [--data 0,50,200,500] [--number 50] [--side N] [--options NAME=VALUE,...]
                                     [--out DIR] [--device TEXT]
 
@@ -11,6 +11,8 @@
 maps     training images of channels, of a network of thin lines without ends, of lenses, and of thin meanders without
          ends; data are read off another one of the same kind, at random places. The row *others* is of five more of the
          same kind. ``--out`` also takes pictures: the training image, two realisations, and the share of category 1.
+border   the share of category 1 by the distance from the border of the map, in pixels: 16 *others* of each kind of
+         *maps*, and 16 realisations, also of a quarter of the side from a quarter of the training image.
 volumes  channels of elliptic cross section along x in 100 x 100 x 30 voxels, at random depths: the share of channels,
          the data missed, and the mean absolute differences, from the training image, of the indicator variograms and
          of the connectivity functions along z, y and x, lags up to a third of a side; *another* is one more draw.
@@ -20,6 +22,7 @@ soft     the shares of channels in 128 x 128 pixels, means of 8 realisations, by
          run without, and *proportions* are asked instead of the first four maps.
 """
 
+from itertools import pairwise
 from pathlib import Path
 
 import common
@@ -43,6 +46,7 @@ SIZES = ((56, 10), (22, 7))  # lengths and heights of lenses, pixels
 SHARE = 0.3  # of lenses, and of channels in a volume; half of it of meanders
 FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
 BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
+DISTANCES, EACH = (0, 3, 8, 16, 32, 1000), 16  # from the border, pixels, and realisations
 
 
 def network(shape, rng=None):
@@ -138,6 +142,25 @@ def maps(images, data, number, side, options, out):
                 files.write(out / f"{name}-{count}.png", sheet(image, made))
 
 
+def border(images, _data, number, side, options, _out):
+    """Rows of the share of category 1 by the distance from the border."""
+    whole, number = side or 250, min(number, EACH)
+    for name, draw in common.chosen(IMAGES, images).items():
+        image = draw((whole, whole), 1)
+        yield [name, "others", *_by_distance(np.stack([draw(image.shape, 1001 + k) for k in range(number)]))]
+        for size, training in ((whole, image), (whole // 4, image[: whole // 2, : whole // 2])):
+            made = simdtex.simulate(training, number, shape=(size, size), **options).values
+            yield [name, size, *_by_distance(made)]
+
+
+def _by_distance(made):
+    row, col = np.indices(made.shape[1:])
+    rows, cols = made.shape[1:]
+    apart = np.minimum(np.minimum(row, rows - 1 - row), np.minimum(col, cols - 1 - col))
+    bands = [made[:, (apart >= least) & (apart < most)] for least, most in pairwise(DISTANCES)]
+    return [f"{one.mean():.3f}" if one.size else "" for one in bands]
+
+
 def model(shape, seed):
     """Sinuous channels in a volume (layers, rows, cols): 1 in channels, 0 elsewhere, uint8."""
     rng = np.random.default_rng(seed)
@@ -227,6 +250,7 @@ OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied
 BANDS = [f"band {p}" for p in (0.125, 0.375, 0.625, 0.875)]
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
+    "border": (border, ["image", "side", *(f"from {least}" for least in DISTANCES[:-1])]),
     "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
     "soft": (soft, ["channels", *map(str, FLAT), *BANDS, "blocks off by", "at most", "dead ends", "js 4x4"]),
 }
