@@ -312,8 +312,6 @@ class Level:
         self.sites = list(product(range(self.rows), range(self.cols)))
         torus = o.boundary == "torus"
         self.near = {s: plain.neighbours(*s, o.order, self.rows, self.cols, torus) for s in self.sites}
-        inside = max(0, shape[0] - 2 * isqrt(o.order)) * max(0, shape[1] - 2 * isqrt(o.order))
-        self.bordered = not torus and shape[0] * shape[1] - inside >= 256
         self.offsets = plain.offsets(o.order)
         name, _, parameter = o.schedule.partition(":")
         self.tile = tuple(map(int, (parameter or "16x16").split("x"))) if name == "block" else (self.rows, self.cols)
@@ -480,20 +478,22 @@ def shares(level):
 
 
 def shares_asked(probability, o):
-    """Regions of the output: the region of each pixel, and of each region the share of each category and its charge.
+    """Regions of the output: of each pixel its region and what is asked, and the charges of each region's categories.
 
-    With proportions there are two (`region_of`); else pixels with the same probabilities in sixteenths that are
-    connected, but parts of fewer than 256 pixels are together.
+    With proportions there is one; else pixels with the same probabilities in sixteenths that are connected, but parts
+    of fewer than 256 pixels are together. The part of a region that lacks neighbours is another, if it has 256 pixels.
     """
-    found = SimpleNamespace(of={}, shares=[], charges=[])
+    found = SimpleNamespace(of={}, p={}, bordered=[])
     if probability is None or not (o.proportions or o.soft_weight):
         return found
-    sites = list(np.ndindex(probability.shape[1:]))
+    rows, cols = probability.shape[1:]
+    sites = list(np.ndindex(rows, cols))
     if o.proportions:
-        found.shares = [[one / sum(o.proportions) for one in o.proportions]] * 2  # inside, and near the border
+        parts = {0: sites}
+        found.p = {s: [one / sum(o.proportions) for one in o.proportions] for s in sites}
     else:
-        p = {s: [float(plane[s]) for plane in probability] for s in sites}
-        alike = {s: tuple(round(one * 16) for one in p[s]) for s in sites if p[s][0] == p[s][0]}
+        found.p = {s: [float(plane[s]) for plane in probability] for s in sites}
+        alike = {s: tuple(round(one * 16) for one in found.p[s]) for s in sites if found.p[s][0] == found.p[s][0]}
         parts = {}
         for s in alike:
             if s in found.of:
@@ -508,37 +508,45 @@ def shares_asked(probability, o):
                         found.of[r] = None
                         left.append(r)
             parts.setdefault((alike[s], s if len(part) >= 256 else None), []).extend(part)
-        for number, part in enumerate(parts.values()):
-            sums = [0.0] * len(probability)
-            for s in sorted(part):
-                found.of[s] = number
-                sums = [a + b for a, b in zip(sums, p[s], strict=True)]
-            found.shares.append([one / len(part) for one in sums])
-    found.charges = [[0] * len(probability) for _ in found.shares]
+    radius = isqrt(o.order) if o.boundary == "open" else 0
+    for number, part in enumerate(parts.values()):
+        found.of |= dict.fromkeys(part, number)
+        near = [s for s in part if min(s[0], rows - 1 - s[0], s[1], cols - 1 - s[1]) < radius]
+        found.bordered.append(len(near) >= 256)
+    found.charges = [[0] * len(probability) for _ in range(2 * len(parts))]
     return found
 
 
 def region_of(level, s):
-    """The region of a site; with proportions 1 if it lacks neighbours, and 256 or more sites do, else 0."""
-    if level.o.proportions:
-        return int(level.bordered and None in level.near[s])
-    return level.asked.of.get(level.pixel(s)) if level.asked.shares else None
+    """The number of a site's region, beyond those of all others if it lacks neighbours; None without one."""
+    asked = level.asked
+    number = asked.of.get(level.pixel(s))
+    apart = number is not None and level.o.boundary == "open" and asked.bordered[number] and None in level.near[s]
+    return number + len(asked.bordered) if apart else number
 
 
 def charge(level, X):
     """After a sweep: a category of which a region has more sites than asked is charged more, in steps."""
     asked = level.asked
-    counts = [[0] * len(one) for one in asked.shares]
+    if not asked.of:
+        return
+    kinds = range(len(asked.charges[0]))
+    counts, due, sizes = ([[0] * len(kinds) for _ in asked.charges] for _ in range(3))
     for site in level.sites:
         s, region = level.pixel(site), region_of(level, site)
+        if region is None:
+            continue
+        for k in kinds:
+            due[region][k] += asked.p[s][k]
+            sizes[region][k] += 1
         n, i, j = X.source[s].tolist()
-        if region is not None and X.t[s] < 1024 and (n, i, j) != NOWHERE:
+        if X.t[s] < 1024 and (n, i, j) != NOWHERE:
             counts[region][level.Y.soft[0][1][n][i, j]] += 1
-    for those, shares, charges in zip(counts, asked.shares, asked.charges, strict=True):
-        for k, (n, share) in enumerate(zip(those, shares, strict=True)):
-            due = share * sum(those)
-            excess = (n - due) / max(n, due, 1) * sum(those) / (sum(those) + 4)
-            charges[k] += round(level.gain * excess)
+    for region, those in enumerate(counts):
+        for k, n in enumerate(those):
+            wanted = due[region][k] / max(1, sizes[region][k]) * sum(those)
+            excess = (n - wanted) / max(n, wanted, 1) * sum(those) / (sum(those) + 4)
+            asked.charges[region][k] += round(level.gain * excess)
 
 
 def charged_too(level, s, cost):

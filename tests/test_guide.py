@@ -124,15 +124,13 @@ def test_regions_are_connected_cells_with_about_the_same_probabilities():
     p[:, 10:30, 30:] = np.array([0.1, 0.2, 0.7])[:, None, None]
     p[:, 3, 3:9], p[:, 6, 3:9] = np.array([[0, 0, 1]]).T, np.array([[0, 0, 1]]).T  # small parts: together
     p[:, 39] = np.nan
-    of, wanted = Soft(p).regions()
-    assert (of[39] == -1).all() and len(np.unique(of)) == len(wanted) + 1 == 4
+    of = Soft(p).regions()
+    assert (of[39] == -1).all() and np.unique(of).tolist() == [-1, 0, 1, 2]
     assert (of[10:30, 30:] == of[12, 33]).all() and (of[[3, 6], 3:9] == of[3, 3]).all() and of[0, 0] == of[8, 24]
-    for number, share in enumerate(wanted):
-        assert np.allclose(share, p[:, of == number].mean(1))
     two = np.full((2, 40, 60), 0.5)
     two[:, :, 20:40] = np.array([[0.9], [0.1]])[..., None]
-    of, wanted = Soft(two).regions()
-    assert len(wanted) == 3 and of[0, 0] != of[0, 59], "which are not connected"
+    of = Soft(two).regions()
+    assert of.max() == 2 and of[0, 0] != of[0, 59], "which are not connected"
 
 
 CHANNELS, _ = channels()
@@ -148,7 +146,7 @@ def of_channels(p, n, **options):
 
 def test_shares_are_those_asked():
     for share in (0.27, 0.8):
-        assert abs(of_channels(np.full((64, 64), share), 2).mean() - share) < 0.03
+        assert abs(of_channels(np.full((64, 64), share), 8).mean() - share) < 0.03
     found = of_channels(None, 2, proportions=(0.9, 0.1), shape=(64, 64))
     assert abs(found.mean() - 0.1) < 0.03
 

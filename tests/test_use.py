@@ -127,27 +127,34 @@ def test_the_penalty_of_a_kind_adds_up_where_it_is_not_as_often_as_asked():
 
 
 def test_a_kind_is_counted_where_a_region_has_a_relaxed_site_of_it():
-    wanted = np.array([[0.5, 0.5], [0.25, 0.75]])
+    grid = Grid((2, 4))
     of = np.repeat(np.int32([[0, 0, 1, -1]]), 2, 0)
-    regions = Regions(wanted, lambda source: source % 2, of, np.float32(0.5))
+    regions = Regions(np.ones((2, 2, 4)), of, lambda source: source % 2, grid, 1, np.float32(0.5))
     temperature = np.array([[0, 1024, 0, 0], [1023, 0, 0, 0]], np.uint16)
     field = Field(None, np.int32([[4, 5, 6, 7], [8, 9, -1, 5]]), temperature)
-    assert regions.counts(field, Grid((2, 4))).tolist() == [2, 1, 1, 0]
+    assert regions.counts(field, grid).tolist() == [2, 1, 1, 0, *[0] * 4]
     soft = np.float32([[[0, 8, 0, 1]] * 2, [[3, 0, 0, 0]] * 2, [[9, 9, 9, 9]] * 2])
-    found = regions.costs(soft, np.float32([2, 4, -6, 0]), Grid((2, 4)))
+    found = regions.costs(soft, np.float32([2, 4, -6, 0, *[0] * 4]), grid)
     assert found[:, 0].tolist() == [[0, 7, 0, 1], [4, 0, 3, 0], [9] * 4]
 
 
-@pytest.mark.parametrize("shape", [(5, 9), (3, 5, 6)])
-def test_without_regions_sites_that_lack_neighbours_are_one(shape):
-    offsets = neighbourhood_offsets(2, len(shape))
-    regions = Regions(np.ones((2, 1)), lambda source: source, None, np.float32(1), radius=1)
-    for torus in (False, True):
-        grid = Grid(shape, torus)
-        near = grid.neighbours(np.arange(grid.size, dtype=np.int32), offsets)
-        assert (regions.at(grid) == (near < 0).any(0).reshape(shape)).all()
-    whole = Grid((5, 9), False)
-    assert (regions.at(whole.window(1, 2, 4, 6)) == regions.at(whole)[1:, 2:8]).all()
+@pytest.mark.parametrize(("shape", "split"), [((100, 110), 0), ((4, 20, 24), 1)])
+def test_the_sites_of_a_region_that_lack_neighbours_are_another(shape, split):
+    """Of the region in which they are 256 or more, at the finest level of an open lattice."""
+    offsets, p = neighbourhood_offsets(2, len(shape)), np.random.default_rng(1).random((2, *shape))
+    of = np.zeros(shape, np.int32)
+    of[..., :20], of[..., 0] = 1, -1
+    for torus, step in ((False, 1), (False, 2), (True, 1)):
+        regions = Regions(p, of, lambda source: source, Grid.of(shape, 1, torus), 1, np.float32(1))
+        grid = Grid.of(shape, step, torus)
+        near = (grid.neighbours(np.arange(grid.size, dtype=np.int32), offsets) < 0).any(0).reshape(grid.shape)
+        found, plain = regions.at(grid), grid.decimated(of)
+        assert (found == np.where(near & (plain == split), plain + 2, plain)).all()
+        for number, share in enumerate(regions.wanted(grid)):
+            those = grid.decimated(p)[:, found == number]
+            assert np.allclose(share, those.mean(1) if those.size else 0)
+        if len(shape) == 2:
+            assert (regions.at(grid.window(1, 2, 4, 6)) == found[1:5, 2:8]).all()
 
 
 def test_a_price_is_the_mean_of_two_sweeps():

@@ -285,8 +285,8 @@ class Soft:
             found.append(np.where(np.isnan(p), 0, cost).astype(np.float32))
         return np.concatenate(found)
 
-    def regions(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Return the region of each cell, -1 without probabilities, and the mean of these in each, (regions, kinds).
+    def regions(self) -> NDArray[np.int32]:
+        """Return the region of each cell, -1 without probabilities of categories.
 
         Cells of a region have the same probabilities of categories, in steps of 1/16, and are connected; parts of fewer
         than `LEAST` cells are one region.
@@ -306,8 +306,7 @@ class Soft:
             of[number == one] = first + np.where(large, large.cumsum(), 0)[parts[number == one]]
             first += 1 + int(large.sum())
         _, of[told] = np.unique(of[told], return_inverse=True)
-        cells = np.bincount(of[told])
-        return of, np.stack([np.bincount(of[told], plane[told]) / cells for plane in p], 1)
+        return of
 
     def _all(self, sample: Sample, source: NDArray[np.integer]) -> Iterator[Kind]:
         """Yield the kinds by category, and those by training image, if their probabilities are given."""

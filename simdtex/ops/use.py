@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Launcher, Operation
+from simdtex.model.given import LEAST
 from simdtex.model.lattice import Grid, sums_around
 from simdtex.model.sample import Candidates
 from simdtex.ops.neighbourhood import Field
@@ -59,37 +60,55 @@ class FairUse:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Regions of the output, and the share that is asked of each kind of candidates (category) in each.
+    """Regions of the output, in which the share of each kind of candidates (category) is controlled.
 
-    ``wanted`` (regions, kinds) float64; ``kinds`` returns the kinds of pixels (n,) of the sample; ``of`` (H, W) int32,
-    the region of each pixel of the output, -1 without one; ``unit``, a step of a penalty. Without ``of``, the sites of
-    an open lattice that lack neighbours, those less than ``radius`` from an edge, are region 1 and all others 0: the
-    fewer neighbours a site has, the less it takes to change its category.
+    ``p`` (kinds, H, W) float64, the probability of each kind that is asked at each pixel of the output; ``of`` (H, W)
+    int32, the region of each pixel, -1 without one; ``kinds`` returns the kinds of pixels (n,) of the sample; ``grid``,
+    the finest lattice; ``radius``, that of the neighbourhood; ``unit``, a step of a penalty.
+
+    The fewer neighbours a site has, the less it takes to change its kind. So the sites of a region that lack neighbours
+    are a region of their own, unless they are fewer than `LEAST` at the finest level. These follow all others.
     """
 
-    wanted: NDArray[np.float64]
+    p: NDArray[np.float64]
+    of: NDArray[np.int32]
     kinds: Callable[[NDArray[np.int32]], NDArray[np.intp]]
-    of: NDArray[np.int32] | None
+    grid: Grid
+    radius: int
     unit: np.float32
-    radius: int = 0
+
+    @cached_property
+    def bordered(self) -> NDArray[np.bool_]:
+        """Whether the sites of each region that lack neighbours are a region of their own, (regions,)."""
+        near = self.of[self.grid.near_edge(self.radius) & (self.of >= 0)]
+        return np.bincount(near, minlength=int(self.of.max()) + 1) >= LEAST
 
     def at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the region of each site of a lattice or a window of it."""
-        if self.of is None:
-            return grid.near_edge(self.radius).astype(np.int32)
-        return grid.cut(grid.decimated(self.of))
+        found: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
+        if not self.bordered.any():
+            return found
+        apart = grid.near_edge(self.radius) & (found >= 0) & self.bordered[found]
+        return np.where(apart, found + len(self.bordered), found)
+
+    def wanted(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the mean of the probabilities at the sites of each region on a lattice, (regions, kinds)."""
+        of, p = self.at(grid), grid.decimated(self.p)
+        there, most = of >= 0, 2 * len(self.bordered)
+        sums = [np.bincount(of[there], plane[there], most) for plane in p]
+        return np.stack(sums, 1) / np.maximum(np.bincount(of[there], minlength=most), 1)[:, None]
 
     def counts(self, field: Field, grid: Grid) -> NDArray[np.int64]:
         """Return the number of sites with t < 1 and a source of each kind in each region, (regions x kinds,)."""
         source, region = grid.latest(field.source), self.at(grid)
         there = (grid.latest(field.temperature) < 1024) & (source >= 0) & (region >= 0)
-        number = region[there] * self.wanted.shape[1] + self.kinds(source[there])
-        return np.bincount(number, minlength=self.wanted.size)
+        number = region[there] * len(self.p) + self.kinds(source[there])
+        return np.bincount(number, minlength=2 * len(self.bordered) * len(self.p))
 
     def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
-        regions, kinds = self.wanted.shape
-        each = np.append(penalty, np.zeros(kinds, np.float32)).reshape(regions + 1, kinds) * self.unit
+        kinds = len(self.p)
+        each = np.append(penalty, np.zeros(kinds, np.float32)).reshape(-1, kinds) * self.unit
         found = soft[:kinds] + np.moveaxis(each[self.at(grid)], -1, 0)
         return np.concatenate([found - found.min(0), soft[kinds:]])
 

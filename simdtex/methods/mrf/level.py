@@ -17,7 +17,7 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options, largest_order
-from simdtex.model.given import LEAST, nearest_data
+from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import lcpdf
@@ -290,11 +290,14 @@ class Lattices:
         soft, wanted = self.plan.kinds, self.options.proportions
         if soft is None or soft.categories is None or not (wanted or self.options.soft_weight):
             return None
-        of, shares = (None, np.array([wanted, wanted]) / sum(wanted)) if wanted else soft.regions()
-        unit, radius = np.float32(self.typical_distance / STEPS), int(self.offsets.max())
-        if self.grid(0).near_edge(radius).sum() < LEAST:
-            radius = 0
-        return Regions(shares, self.sample.category, of, unit, radius)
+        grid, unit = self.grid(0), np.float32(self.typical_distance / STEPS)
+        p, of = soft.categories, np.zeros(grid.shape, np.int32)
+        if wanted:
+            p = np.reshape(wanted, (-1, *[1] * len(grid.shape))) / sum(wanted)
+        else:
+            of = soft.regions()
+        p = np.broadcast_to(p, (len(p), *grid.shape))
+        return Regions(p, of, self.sample.category, grid, int(self.offsets.max()), unit)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
@@ -347,7 +350,7 @@ class Lattices:
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(number)
         gain = GAIN if number == self.levels - 1 else 2 * GAIN
-        asked: dict[str, Any] = {"wanted": self.regions.wanted, "gain": gain} if self.regions else {}
+        asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(number)), "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 
     def places(self, number: int) -> Places:
