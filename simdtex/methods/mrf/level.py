@@ -42,7 +42,7 @@ FEWEST, WIDE = 32, 8
 GAIN = STEPS // 4
 """The most steps by which the penalty of a category changes after a sweep of the coarsest level; twice that below."""
 
-ALL = 2**14
+ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
 
 TOGETHER = 2**16

@@ -222,7 +222,7 @@ class Options:
         "less of the sample",
         more="At a level whose sites are s pixels apart, candidates are s / phases pixels apart, or 1; a number that "
         "is no power of 2 counts as the next smaller one. With 1 they are those of the decimated sample. At the "
-        "coarsest level, which evaluates all of them, fewer decimations count if there are over 16384 candidates.",
+        "coarsest level, which evaluates all of them, fewer decimations count if there are over 4096 candidates.",
         symbol="equation (10)",
         paper=1,
         jobs={"simulate": 4, "simulate 3-D": 1},
