@@ -150,8 +150,10 @@ class Given(NamedTuple):
     def plainly(self, simulated):
         """Image, source and temperature by the plain loops; of a simulation without the temperature."""
         samples, masks, known, source, guide = self.arrays()
-        own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "phases": 4, "free_sweeps": 3}
-        own = own if simulated else {}
+        own = {}
+        if simulated:
+            own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64}
+            own |= {"phases": 4, "free_sweeps": 3}
         given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": self.maps}
         pictures = samples if len(samples) > 1 else samples[0]
         seed = realisation_seed(SEED, 0) if simulated else SEED
