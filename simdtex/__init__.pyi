@@ -206,6 +206,7 @@ class SimulateKeywords(MrfOptions, total=False):
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     origin: Sequence[float] | None
     cell: Sequence[float] | None
+    like: Any
     several: Literal["refuse", "mean", "most"]
     outside: Literal["refuse", "skip"]
     guide: tuple[Any, Any] | None
@@ -228,6 +229,7 @@ class EstimateKeywords(TypedDict, total=False):
     known: ArrayLike | HardData | str | os.PathLike[str] | None
     origin: Sequence[float] | None
     cell: Sequence[float] | None
+    like: Any
     several: Literal["refuse", "mean", "most"]
     outside: Literal["refuse", "skip"]
     shape: tuple[int, ...] | None

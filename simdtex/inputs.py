@@ -141,6 +141,7 @@ class Planned:
     axes: int
     given: Any
     maps: Any
+    place: Any
 
 
 @declared
@@ -459,8 +460,8 @@ class Cells(Sampled):
         Data("(x, y) or (x, y, z)"),
         "Place the centre of the first cell here, in the units of the table of --known",
         "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. "
-        "None is 0.",
-        none="that of a grid TRAINING_IMAGE, else 0,0",
+        "None: see `like`, else 0.",
+        none="see --like, else 0,0",
         takes="numbers",
         metavar="X,Y[,Z]",
         **CELLS,
@@ -468,10 +469,23 @@ class Cells(Sampled):
     cell: Sequence[float] | None = given(
         Data("(x, y) or (x, y, z)"),
         "Make cells of this size, in the same units",
-        "The size of a cell. None is 1; without `origin` and `cell`, coordinates are columns and rows.",
-        none="that of a grid TRAINING_IMAGE, else 1,1",
+        "The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.",
+        none="see --like, else 1,1",
         takes="numbers",
         metavar="DX,DY[,DZ]",
+        **CELLS,
+    )
+    like: Any = given(
+        Data("array or dataset of xarray"),
+        "Place the output where this grid or raster lies, and give it its size",
+        "An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and "
+        "number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to "
+        "lie at one place; else `origin` and `cell`; else those of such a training image.",
+        none="that of --known, --region and other maps that are grids; else --origin and --cell; else that of a grid "
+        "TRAINING_IMAGE",
+        metavar="GRID",
+        reader="read_like",
+        takes="file",
         **CELLS,
     )
     several: Literal["refuse", "mean", "most"] = given(
@@ -514,8 +528,8 @@ class Simulate(Seeded, Guided, Cells):
     first: int = given(Whole(0), "Start with the realisation of this number", default=0)
     shape: tuple[int, ...] | None = given(
         Data("(int, int) or (int, int, int)"),
-        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `known`, or of the "
-        "first map below, if that is an array, else of the training image.",
+        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `like`, `known`, or of "
+        "the first map below, if that is an array, else of the training image.",
     )
     region: ArrayLike | None = given(
         Data("(rows, cols) or (layers, rows, cols) bool array"),

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from simdtex.inputs import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
-    from simdtex.io.grids import Frame
+    from simdtex.io.grids import CartesianGrid
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image, Metadata
     from simdtex.model.source_map import Maps
@@ -32,16 +32,17 @@ TABLES = (".csv", ".tsv", ".txt", ".dat")
 class Reading(NamedTuple):
     """How files are read.
 
-    ``deep``: grids and rasters as cells in ascending order of y, and a file of several layers as a volume; ``palette``:
+    ``deep``: as cells in ascending order of y, rasters too, and a file of several layers as a volume; ``palette``:
     colours of a palette as their indices, which are categories; ``channels``: the last axis of an array of three axes
-    as channels;
-    ``variables``: the names of those of a grid to take; ``missing``: further numbers that mean an unknown value;
-    ``valid``: the range of possible values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
+    as channels; ``ascending``: the order of rows, as in `simdtex.io.image.read`; ``variables``: the names of those
+    of a grid to take; ``missing``: further numbers that mean an unknown value; ``valid``: the range of possible
+    values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
     """
 
     deep: bool = False
     palette: bool = False
     channels: bool = False
+    ascending: bool | None = None
     variables: tuple[str, ...] = ()
     missing: tuple[float, ...] = ()
     valid: tuple[float, float] | None = None
@@ -56,19 +57,21 @@ PLAIN = Reading()
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``georeference`` is where the cells of the first lie, if it is a grid, ``crs`` its coordinate reference system, and
-    ``about`` the attributes of its axes and of its one variable, by name;
-    ``deep`` whether they are volumes; ``metadata`` what the file of the first says of its pixels.
+    ``grid`` is the first if it is a grid; ``deep`` whether they are volumes; ``metadata`` what the file of the first
+    says of its pixels.
     """
 
     paths: tuple[Path, ...]
     pixels: list[NDArray[Any]]
     channel_axis: int | None
-    georeference: Frame | None = None
+    grid: CartesianGrid | None = None
     deep: bool = False
     metadata: Metadata | None = None
-    crs: str = ""
-    about: Mapping[str, Mapping[str, str]] | None = None
+
+    @property
+    def ascending(self) -> bool | None:
+        """How files beside these are read, see `Reading`: an ``.npy`` beside a grid begins with the smallest y."""
+        return False if self.metadata and self.metadata.ascending else None
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -155,11 +158,11 @@ def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = Non
         note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
-def read_picture(path: Path, palette: bool = False) -> Image:
+def read_picture(path: Path, how: Reading = PLAIN) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
 
-    found = image.read(path, palette=palette)
+    found = image.read(path, palette=how.palette, ascending=how.ascending)
     if found.metadata.more:
         note(f"{path} has several frames or pages; only the first is read")
     return found
@@ -171,7 +174,7 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
     from simdtex.io.image import profile_name
 
     # grids and arrays hold numbers alone, in whatever colours
-    told = [(path, one) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
+    told = [(path, one) for path, one in zip(paths, found, strict=True) if one and not one.ascending and one != NOTHING]
     for path, other in told[1:]:
         first, own = told[0]
         if other.profile != own.profile and {*(names := [profile_name(a.profile) for a in (other, own)])} != {"sRGB"}:
@@ -181,13 +184,11 @@ def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> N
 
 
 class Read(NamedTuple):
-    """What a file holds: ``pixels``; the ``metadata`` of a picture; what `Material` has of a grid."""
+    """What a file holds: ``pixels``, the ``metadata`` of a picture, and the ``grid`` if it is one."""
 
     pixels: NDArray[Any]
     metadata: Metadata | None = None
-    georeference: Frame | None = None
-    crs: str = ""
-    about: Mapping[str, Mapping[str, str]] | None = None
+    grid: CartesianGrid | None = None
 
 
 def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
@@ -196,6 +197,7 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
     With ``how.deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
     """
     from simdtex.io import grids
+    from simdtex.io.image import Metadata
 
     grid = None
     if grids.is_grid(path, rasters=how.deep):
@@ -207,21 +209,21 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
 
         grid = volume.read(path) if volume.is_volume(path, how.channels or not how.deep) else None
     if grid is None:
-        found = read_picture(path, how.palette)
+        found = read_picture(path, how)
         if path.suffix.lower() == ".npy" and not how.channels and (count := channels(found.pixels)) > 4:
             note(f"{path} is read as a picture of {count} channels; for a volume use simdtex simulate, with --known")
         return Read(found.pixels, found.metadata)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
-    about = {name: one for name, one in grid.about.items() if name in ("x", "y", "z") or [name] == list(grid.values)}
-    frame = grids.Frame(grid.origin, grid.cell)
-    return Read(values if len(values) > 1 else values[0], None, frame, grid.crs, about)
+    if how.deep:
+        return Read(values if len(values) > 1 else values[0], None, grid)
+    return Read(values[0, ::-1], Metadata(geo=grid.georeference, ascending=True), grid)
 
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     """Read pictures or grids, or with ``how.deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, metadata, georeferences, crs, about = zip(*(read_pixels(path, how) for path in paths), strict=True)
+    pictures, metadata, found = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len({*volumes}) > 1:
@@ -229,8 +231,7 @@ def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
         raise ValueError(f"{volume} is a volume and {other} is none; give volumes, or pictures")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    first = georeferences[0], volumes[0], metadata[0], crs[0], about[0]
-    return Material(tuple(paths), pixels, None if plain else -1, *first)
+    return Material(tuple(paths), pixels, None if plain else -1, found[0], volumes[0], metadata[0])
 
 
 def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
@@ -247,7 +248,7 @@ def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, fi
     found = []
     for paths, out in pairs:
         check_each("--also", paths, samples)
-        maps = read_material(paths)
+        maps = read_material(paths, Reading(ascending=samples.ascending))
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
             check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
             if pixels.shape[:2] != sample.shape[:2]:
@@ -305,6 +306,8 @@ def read_inputs(job: str, options: dict[str, Any], samples: Material, how: Readi
     ``reader(given, files)`` below.
     """
     found: dict[str, Any] = {"channel_axis": samples.channel_axis}
+    if not how.deep:
+        how = how._replace(ascending=samples.ascending)
     for name, one in inputs(job).items():
         if one.reader:
             given, files = options.pop(one.parameter(name)), Files(samples, how, options, name, one.flag(name))
@@ -318,7 +321,11 @@ def read_masks(paths: Sequence[Path], files: Files) -> Any:
 
     _check_flat(files)
     check_each(files.flag, paths, files.samples)
-    masks = [image.read_mask(path, shape) for path, shape in zip(paths, files.samples.sizes, strict=True)]
+    ascending = files.how.ascending
+    masks = [
+        image.read_mask(path, shape, ascending=ascending)
+        for path, shape in zip(paths, files.samples.sizes, strict=True)
+    ]
     return masks if files.samples.several else masks[0]
 
 
@@ -331,7 +338,7 @@ def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[
             raise ValueError(f"{files.flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
         for file in paths:
-            pixels = without_alpha(read_pixels(file).pixels, channels(picture.array))
+            pixels = without_alpha(read_pixels(file, files.how).pixels, channels(picture.array))
             check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
             found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
@@ -350,49 +357,90 @@ def read_number(text: str, files: Files) -> int:
     )
 
 
-def read_map(path: Path, files: Files) -> HardData | NDArray[Any]:
+def read_map(path: Path, files: Files) -> Any:
     """Read a map of a simulation: of probabilities a table, too; any other a picture or a grid, channels in front."""
     from simdtex.io import grids, image
 
     name, how = files.name, files.how._replace(channels=not files.samples.deep)
-    if name == "probabilities" and (table := read_table(path, how)) is not None:
+    if name == "probabilities" and (table := read_table(path, files)) is not None:
         return table
     if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
-        return image.read_mask(path, image.read(path).pixels.shape)
-    pixels = planes(read_pixels(path, how._replace(palette=name == "image_map", variables=())).pixels)
-    if pixels.shape[-1] > 1:
-        return np.moveaxis(pixels, -1, 0)
-    return pixels[..., 0] > 0 if name == "region" else pixels[..., 0]
+        return image.read_mask(path, image.read(path).pixels.shape, ascending=how.ascending)
+    found, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
+    pixels = planes(found)
+    several = pixels.shape[-1] > 1
+    values: Any = in_place(pixels, grid) if grid else pixels if several else pixels[..., 0]
+    if several:
+        return values.transpose("variable", ...) if grid else np.moveaxis(values, -1, 0)
+    return values > 0 if name == "region" else values
 
 
-def read_table(path: Path, how: Reading) -> HardData | None:
-    """Read a table of data; None if a file is none, by its content if that is a grid or a point set, else its name."""
+def read_like(path: Path, files: Files) -> Any:
+    """Read the grid that says where the output lies."""
+    found, _, grid = read_pixels(path, files.how._replace(variables=()))
+    if grid is None or not grid.frame.told:
+        raise ValueError(f"{path} does not say where its cells lie; give a grid or a raster with coordinates")
+    return in_place(found[..., :1], grid)
+
+
+def in_place(pixels: NDArray[Any], grid: CartesianGrid) -> Any:
+    """Return values of a grid, ([layers,] rows, cols, variables), as an array of xarray with its coordinates.
+
+    A single variable has no axis.
+    """
+    import xarray
+
+    dims, several = [*"zyx"[4 - pixels.ndim :]], pixels.shape[-1] > 1
+    coordinates: dict[str, Any] = {"spatial_ref": ((), 0, {"crs_wkt": grid.crs})} if grid.crs else {}
+    for axis, first, size in zip("xyz", *grid.frame, strict=True):
+        cells = np.arange(pixels.shape[dims.index(axis)]) if axis in dims else np.array(0)
+        coordinates[axis] = ((axis,) if axis in dims else (), first + size * cells, grid.about.get(axis, {}))
+    name = None if several else next(iter(grid.values))
+    values, dims = (pixels, [*dims, "variable"]) if several else (pixels[..., 0], dims)
+    sizes = {f"cell_{axis}": size for axis, size in zip("xyz", grid.cell, strict=True)}
+    return xarray.DataArray(values, coordinates, dims, name, sizes | grid.about.get(name or "", {}))
+
+
+def read_table(path: Path, files: Files, valid: tuple[float, float] | None = None) -> HardData | None:
+    """Read a table of data, and say of a picture where y = 0 is.
+
+    None if a file is no table, by its content if that is a grid or a point set, else by its name.
+    """
     from simdtex.io import grids
     from simdtex.io.hard_data import read_hard_data
 
-    kind = grids.kind_of(path)
+    kind, how = grids.kind_of(path), files.how
     if kind != "points" and (kind is not None or path.suffix.lower() not in TABLES):
         return None
-    return read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=how.valid)
+    found = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
+    origin, like = files.options.get("origin"), files.options.get("like")
+    if found.from_top:
+        note(f"{path}: rows count from the top of the output, from 0 on")
+    elif files.samples.grid is None:
+        bottom = f"as in {like}" if like else f"and y = {origin[1] if origin else 0:g} is the bottom row of the output"
+        note(f"{path}: y points north, {bottom}")
+    return found
 
 
-def read_known(path: Path, files: Files) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, files: Files) -> Any:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
-    If values are ``categorical`` and the samples have one channel, a palette is categories.
+    Where a raster or a grid lies goes to ``geo`` of the options. If values are ``categorical`` and the samples have one
+    channel, a palette is categories.
     """
     samples, how = files.samples, files.how
     variables = tuple((how.columns or {}).get("value", ()))
-    how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
-    if (table := read_table(path, how)) is not None:
+    if (table := read_table(path, files, samples.limits)) is not None:
         return table
+    how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     how = how._replace(palette=how.palette and samples.channel_axis is None)
-    values, metadata, georeference, *_ = read_pixels(path, how)
+    values, metadata, grid = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
-    if values.ndim == 4:
-        return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    found = without_alpha(values, channels(values if georeference else samples.pixels[0]))  # a grid has no alpha
+    if grid is not None and how.deep:
+        return in_place(values, grid)
+    files.options["geo"] = metadata and metadata.geo and metadata.geo._replace(nodata=None)  # all of it is known then
+    found = without_alpha(values, channels(values if grid else samples.pixels[0]))  # a grid has no alpha
     return found.reshape(found.shape[:2]) if channels(found) == 1 else found
 
 
@@ -405,6 +453,7 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
         deep,
         bool(options.get("categorical")),
         options.pop("channels", False),
+        deep or None,
         options.pop("variables", ()),
         options.pop("missing"),
         columns=columns or None,
@@ -414,15 +463,12 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
 
 def _check_flat(files: Files) -> None:
     """Raise if pictures of samples are asked for, which are no pictures."""
-    from simdtex.io.grids import kind_of
-
-    path = files.samples.paths[0]
-    if files.samples.deep or (files.how.deep and kind_of(path) == "raster"):
-        what = "a volume" if files.samples.deep else "a raster, whose rows are counted from the south"
-        raise ValueError(f"{path} is {what}; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
+    if files.samples.deep:
+        path = files.samples.paths[0]
+        raise ValueError(f"{path} is a volume; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
 
 
-def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArray[Any]]:
+def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
     """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``; whether it is of labels goes to ``labels`` of the options.
 
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
@@ -436,8 +482,11 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArr
     _check_flat(files)
     (paths, out), samples, labels = pair, files.samples, files.options["labels"]
     check_each(files.flag, paths, samples)
-    found = [read_pixels(path, Reading(palette=True)) for path in (*paths, out)]
-    pictures, is_grid = tuple(one.pixels for one in found), found[-1].georeference is not None
+    how = Reading(files.how.deep, palette=True, channels=True, ascending=files.how.ascending)
+    found = [read_pixels(path, how) for path in (*paths, out)]
+    pictures, is_grid = tuple(one.pixels for one in found), found[-1].grid is not None
+    if volumes := [path for path, one in zip((*paths, out), pictures, strict=True) if one.ndim > 3]:
+        raise ValueError(f"{volumes[0]} is a volume; give a guide of one layer")
     palettes = [one.metadata and one.metadata.palette for one in found]
     if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
         pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
@@ -463,7 +512,8 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, NDArr
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
     files.options["labels"] = labels
-    return (own if samples.several else own[0], wanted)
+    output = in_place(planes(wanted), found[-1].grid) if files.how.deep and is_grid else wanted
+    return (own if samples.several else own[0], output)
 
 
 def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, ENTER, OUTPUTS, READ, WRITE
-from simdtex.cli.inputs import Material, output_shape, read_inputs, read_material, size_text, take_reading
+from simdtex.cli.inputs import Material, in_place, output_shape, read_inputs, read_material, size_text, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option, size_option
+from simdtex.inputs import inputs as inputs_of
 
 TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
 FITS = (".tif", ".tiff", ".npy")
@@ -55,21 +55,20 @@ def simulate(
 
     how, number = take_reading(options, deep=True), 1 if number is None else number
     material = read_material(training_image, how)
-    georeference = read_georeference(material, output, options, bool(source))
     data = read_inputs("simulate", options, material, how)
-    known, pixels = data["known"], material.pixels[0]
-    maps = [one for one in (data[name] for name in Maps._fields) if isinstance(one, np.ndarray)]
+    pixels, maps = material.pixels[0], [data[name] for name in Maps._fields if hasattr(data[name], "shape")]
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps if one.ndim >= 2 + material.deep]
-    shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
-    place = georeference | given({name: options.pop(name) for name in ("several", "outside")})
+    shape = output_shape(size, pixels, data["like"], data["known"], *cells, pixels, axes=2 + material.deep)
+    place = check_place(material, output, options, data, shape, bool(source))
+    known = data["known"]
     if click.get_current_context().params["report"]:
         if source or data["region"] is not None:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(material, shape, getattr(known, "values", known))
-    inputs = data | given(options) | {"shape": shape, "source": bool(source)} | place
+    inputs = data | given(options) | {"shape": shape, "source": bool(source)}
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
-        made = georeferenced(simulate(described(material), number, **inputs, **call), material.crs)
+        made = simulate(described(material), number, **inputs, **call)
         return made, Output(None, statistics=made.attrs)
 
     return Task(
@@ -104,71 +103,57 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     material = read_material(training_image, how)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    georeference = read_georeference(material, output, options)
     data = read_inputs("estimate", options, material, how)
-    shape = output_shape(size, material.pixels[0], data["known"], material.pixels[0], axes=2 + material.deep)
+    pixels = material.pixels[0]
+    shape = output_shape(size, pixels, data["like"], data["known"], pixels, axes=2 + material.deep)
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
-    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask")} | given(options) | georeference
+    check_place(material, output, options, data, shape)
+    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask", "like")} | given(options)
 
     def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
         made = estimate(described(material), shape=shape, device=device, callback=callback, **inputs)
-        return georeferenced(made, material.crs), Output(None, statistics=made.attrs)
+        return made, Output(None, statistics=made.attrs)
 
     size = "x".join(map(str, shape[::-1]))
     return Task(make, f"maps of {size}", str(output), [lambda made, run: write_realisations(output, made)])
 
 
-def read_georeference(
-    material: Material, output: Path, options: dict[str, Any], source: bool = False
+def check_place(
+    material: Material,
+    output: Path,
+    options: dict[str, Any],
+    data: dict[str, Any],
+    shape: tuple[int, ...],
+    source: bool = False,
 ) -> dict[str, Any]:
-    """Return the origin and the size of cells; raise if the output cannot be written.
+    """Return the origin and the size of cells, and how data are placed in them, as parameters of `place_hard_data`.
 
-    As given by options, which are taken out; else of a training image that is a grid; else None.
+    Rows of tables become coordinates. Raises ValueError if places differ, or the output cannot hold the place.
     """
     from simdtex.io.grids import SUFFIXES, check_grid
+    from simdtex.io.hard_data import HardData
+    from simdtex.io.places import located
     from simdtex.io.volume import check_realisations_path
 
-    found: dict[str, Any] = {name: options.pop(name) for name in ("origin", "cell")}
-    if material.georeference:  # whose z is left out if that of the other option is
-        axes = min((len(one) for one in found.values() if one), default=3)
-        found = {name: one or getattr(material.georeference, name)[:axes] for name, one in found.items()}
+    flags = {one.flag(name): data[name] for name, one in inputs_of("simulate").items() if name in data and one.reader}
+    place = located(flags, described(material), options["origin"], options["cell"])
+    lies: dict[str, Any] = place.frame._asdict() if place else {}
     if check_realisations_path(output, source=source) in SUFFIXES:
-        check_grid(output, material.pixels, **found)
-    return found
+        check_grid(output, material.pixels, lies.get("origin"), lies.get("cell"))
+    for name, one in data.items():
+        if isinstance(one, HardData) and one.from_top:
+            data[name] = one.upside_down(shape[-2], place and place.frame)
+    return lies | given({name: options[name] for name in ("several", "outside")})
 
 
 def described(material: Material) -> Any:
-    """Return the training image, as an array of xarray if its file describes its axes or its variable."""
-    about = dict(material.about or {})
-    if material.several or not any(about.values()):
+    """Return the training image, as an array of xarray with its coordinates if it is a grid."""
+    if material.grid is None:
         return material.array
-    import xarray
-
-    dims = [*"zyx"[not material.deep :], *["variable"] * (material.channel_axis is not None)]
-    sides = zip(dims, material.array.shape, strict=True)
-    coordinates = {axis: (axis, np.arange(n), about.pop(axis, {})) for axis, n in sides if axis != "variable"}
-    about.pop("z", None)  # of one layer
-    name, own = next(iter(about.items()), (None, {}))
-    return xarray.DataArray(material.array, coordinates, dims, name, own)
-
-
-def georeferenced(made: Any, crs: str) -> Any:
-    """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
-    if not crs:
-        return made
-    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": crs})).assign_attrs(crs=crs)
-    with suppress(ImportError):  # the extra rasters
-        from rasterio.crs import CRS
-
-        unit = CRS.from_wkt(crs).units_factor[0]
-        own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
-        found = found.assign_coords(
-            {axis: found[axis].assign_attrs(own | found[axis].attrs) for axis in "xy" if axis in found.coords}
-        )
-    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.encoding["grid_mapping"] = "spatial_ref"
-    return found
+    first, *others = material.pixels
+    placed = in_place(first if material.channel_axis else first[..., None], material.grid)
+    return [placed, *others] if others else placed
 
 
 def _say_shares(attributes: dict[str, Any]) -> None:
@@ -185,7 +170,11 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
     data = None
     if known is not None:
         table = isinstance(known, HardData)
-        known = place_hard_data(known, made.shape[1:], **place) if table else np.ma.masked_invalid(known)
+        known = (
+            place_hard_data(known, made.shape[1:], **place)
+            if table
+            else np.ma.masked_invalid(getattr(known, "values", known))
+        )
         cells = np.nonzero(~np.ma.getmaskarray(known))
         data = np.stack([*cells[::-1], known.data[cells].astype(np.float64)], -1)
     shown: dict[str, Any] = {"data": data, "command": command_line()}

@@ -20,6 +20,7 @@ from simdtex.cli.command import ENTER, RESUME, RUNS, command, note
 from simdtex.cli.inputs import (
     Also,
     Folder,
+    Material,
     Reading,
     arranged,
     check_profiles,
@@ -203,6 +204,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
     NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
     """
+    from simdtex.io.decode import NOTHING
+    from simdtex.io.hard_data import HardData
     from simdtex.jobs.synthesis import synthesize
 
     context = click.get_current_context()
@@ -216,6 +219,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     data = read_inputs("synth", options, material, how)
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
+    if isinstance(known, HardData) and not known.from_top:
+        data["known"] = known.upside_down(shape[0])
     if context.params["report"] and (material.several or known is not None or not material.known):
         raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
     if options["tiles"] is not None:
@@ -223,7 +228,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         left_out = ("tiles", "workers", "also", "source_map", "preview")
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
+    # a new picture was taken nowhere
+    like = (material.metadata or NOTHING)._replace(exif=None, geo=options.pop("geo", None))
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
@@ -374,9 +380,9 @@ def fill(
 
     how = Reading(palette=bool(options["categorical"]))
     target, whole = read_lead([picture], output, options, how)
-    pixels, hole = _hole(whole.pixels[0], mask, invert)
+    pixels, hole = _hole(whole, mask, invert)
     whole = whole._replace(pixels=[pixels])
-    texture = read_material(samples, how) if samples else None
+    texture = read_material(samples, how._replace(ascending=whole.ascending)) if samples else None
     if texture:
         check_profiles([whole.paths[0], samples[0]], [whole.metadata, texture.metadata])
     foreign = "maps cannot be filled with --sample, since no pixel comes from the picture" if texture else ""
@@ -392,13 +398,13 @@ def fill(
     )
 
 
-def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def _hole(whole: Material, mask: Path | None, invert: bool | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
-    pixels, gone = np.ma.getdata(pixels), planes(np.ma.getmaskarray(pixels)).any(-1)
+    pixels, gone = np.ma.getdata(whole.pixels[0]), planes(np.ma.getmaskarray(whole.pixels[0])).any(-1)
     if mask:
-        hole = read_mask(mask, pixels.shape) != bool(invert)
+        hole = read_mask(mask, pixels.shape, ascending=whole.ascending) != bool(invert)
     elif invert:
         raise ValueError("--invert requires --mask; leave it out")
     else:

@@ -82,6 +82,8 @@ class Metadata(NamedTuple):
         Red, green and blue of each index of a palette, if the pixels are indices.
     white : int, optional
         The value of white if it is not full scale: the maximum in the header of a PGM or PPM.
+    ascending : bool
+        Whether the picture is of a grid, so that an ``.npy`` of it begins with the smallest y.
     """
 
     profile: bytes | None = None
@@ -91,10 +93,14 @@ class Metadata(NamedTuple):
     geo: rasters.Georeference | None = None
     palette: bytes | None = None
     white: int | None = None
+    ascending: bool = False
 
 
 NOTHING = Metadata()
 """The metadata of a file that has only pixels."""
+
+NUMPY = b"\x93NUMPY"
+"""How an ``.npy`` begins."""
 
 
 class _Found(NamedTuple):
@@ -125,7 +131,7 @@ def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = Fals
 
 
 def _read(data: bytes, most: int, palette: bool) -> _Found:
-    if data.startswith(b"\x93NUMPY"):
+    if data.startswith(NUMPY):
         return _Found(read_npy(io.BytesIO(data), len(data), most))
     if header := _PNM.match(data):
         return _read_pnm(data, header, most)

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.files import BYTES, atomic_path, check_size, check_target, explained, reading
 from simdtex.io.image import cast
-from simdtex.io.rasters import NETCDF, RASTERS, TIFF, is_raster, read_cells, read_netcdf, write_cells
+from simdtex.io.rasters import NETCDF, RASTERS, TIFF, Georeference, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import Brief, DataWarning, check_real, require, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
@@ -62,6 +62,11 @@ class Frame(NamedTuple):
     origin: tuple[float, ...]
     cell: tuple[float, ...]
 
+    @property
+    def told(self) -> bool:
+        """Whether it is a position: the origin 0 with cells of 1 only counts columns and rows."""
+        return any(self.origin) or any(size != 1 for size in self.cell)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CartesianGrid(Brief):
@@ -87,6 +92,17 @@ class CartesianGrid(Brief):
     cell: tuple[float, ...]
     crs: str = ""
     about: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    @property
+    def frame(self) -> Frame:
+        """The position of its cells."""
+        return Frame(self.origin, self.cell)
+
+    @property
+    def georeference(self) -> Georeference | None:
+        """The georeference of a picture of a layer, north at the top; None if the grid has no position."""
+        rows = next(iter(self.values.values())).shape[-2]
+        return Georeference.of_cells(*self.frame, rows, self.crs) if self.frame.told else None
 
 
 def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:

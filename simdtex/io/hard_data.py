@@ -11,7 +11,7 @@ import csv
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, prod
 from operator import index
 from pathlib import Path
@@ -58,12 +58,15 @@ class HardData(Brief):
         The name of each variable.
     lines : tuple of int, or None
         The line of each datum in the file, counted from 1; None if it is not from a text.
+    from_top : bool
+        Whether y is the number of a row, from a column called row, which in a picture counts from the top.
     """
 
     points: Floats
     values: Floats
     names: tuple[str, ...]
     lines: tuple[int, ...] | None = None
+    from_top: bool = False
 
     def __len__(self) -> int:
         return len(self.points)
@@ -71,6 +74,14 @@ class HardData(Brief):
     def where(self, row: int) -> str:
         """Return words for a datum: its line in the file, or its row, counted from 0."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
+
+    def upside_down(self, rows: int, lies: Frame | None = None) -> HardData:
+        """Return a table in cells with y counted from the other edge of a grid of so many rows, as coordinates."""
+        points = self.points.copy()
+        points[:, 1] = rows - 1 - np.floor(points[:, 1] + 0.5)  # the centre of its cell
+        if lies:
+            points = np.array([at + size * one for at, size, one in zip(*lies, points.T, strict=False)]).T
+        return replace(self, points=points, from_top=not self.from_top)
 
 
 def read_hard_data(
@@ -214,7 +225,7 @@ def _of_columns(
             warnings.warn(f"left out, because they hold text: the columns {shown}", DataWarning, stacklevel=2)
     labels = tuple((names and names[k]) or name for k, name in zip(values, _plain(len(values)), strict=True))
     at, numbers = (np.array([found[k] for k in some], np.float64).T.copy() for some in (points, values))
-    data = HardData(at, numbers, labels, lines)
+    data = HardData(at, numbers, labels, lines, listed[points[1]].strip().lower() == "row")
     for k in (*points, *values):
         if None in found[k]:
             row = found[k].index(None)
@@ -367,7 +378,7 @@ def place_hard_data(
     sites, inside = _sites(data, sides, frame(origin, cell), outside == "skip")
     if not inside.all():
         lines = data.lines and tuple(np.array(data.lines)[inside].tolist())
-        data = HardData(data.points[inside], data.values[inside], data.names, lines)
+        data = replace(data, points=data.points[inside], values=data.values[inside], lines=lines)
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading, checking and writing of pictures, without a change of any value.
 
-A picture is an array (rows, cols) or (rows, cols, channels), row 0 at the top. 8-bit, 16-bit and float pixels keep
-their type from the file to the synthesis and back. Pillow reads and writes the 8-bit formats, tifffile every TIFF,
-imagecodecs what has more bits, and OpenEXR the files of that name.
+A picture is an array (rows, cols) or (rows, cols, channels), row 0 at the top, the northern edge. 8-bit, 16-bit and
+float pixels keep their type from the file to the synthesis and back. Pillow reads and writes the 8-bit formats,
+tifffile every TIFF, imagecodecs what has more bits, and OpenEXR the files of that name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import io
 import os
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import rasters
-from simdtex.io.decode import NOTHING, Metadata, decode, native
+from simdtex.io.decode import NOTHING, NUMPY, Metadata, decode, native
 from simdtex.io.files import Refused, Unbuffered, atomic_path, check_target, explained, max_pixels_or_default, reading
 from simdtex.options import Brief, check_real, require, unmasked
 
@@ -50,7 +50,9 @@ class Image(Brief):
     metadata: Metadata = NOTHING
 
 
-def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False) -> Image:
+def read(
+    path: PathLike, *, max_pixels: int | None = None, palette: bool = False, ascending: bool | None = None
+) -> Image:
     """Return the picture in a file, whose format is recognised by its content and not by its name.
 
     Parameters
@@ -65,6 +67,9 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     palette : bool
         Whether a picture with a palette is read as the indices of its colours, (rows, cols) uint8, as categories
         need; the palette is then in the metadata. Other pictures are read as without it.
+    ascending : bool, optional
+        Whether row 0 is the smallest y, as in arrays of cells (True), or the northern edge (False). The first row of a
+        picture is its northern edge, and that of an ``.npy`` the smallest y. None: rows are as in the file.
 
     Returns
     -------
@@ -87,7 +92,11 @@ def read(path: PathLike, *, max_pixels: int | None = None, palette: bool = False
     The whole file is held in memory together with its pixels.
     """
     with reading(path, "the image", max_pixels) as most:
-        return read_bytes(os.fspath(path), Path(path).read_bytes(), max_pixels=most, palette=palette)
+        data = Path(path).read_bytes()
+        found = read_bytes(os.fspath(path), data, max_pixels=most, palette=palette)
+    if ascending is None or ascending == data.startswith(NUMPY):
+        return found
+    return replace(found, pixels=found.pixels[::-1])
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
@@ -140,7 +149,9 @@ def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray
     return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= least)
 
 
-def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None) -> NDArray[np.bool_]:
+def read_mask(
+    path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None, ascending: bool | None = None
+) -> NDArray[np.bool_]:
     """Return the mask in a picture file.
 
     Parameters
@@ -150,7 +161,7 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
         header of a PGM or PPM, and always 1 for bool, floats, and integers that are all 0 or 1.
     shape : (rows, cols)
         The required size; further axes are ignored.
-    max_pixels : int, optional
+    max_pixels, ascending
         As in `read`.
 
     Returns
@@ -163,7 +174,7 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
     ValueError
         `read` cannot read the file, or it has another size.
     """
-    found = read(path, max_pixels=max_pixels)
+    found = read(path, max_pixels=max_pixels, ascending=ascending)
     pixels, white = found.pixels, found.metadata.white
     rows, cols = shape[:2]
     if pixels.shape[:2] != (rows, cols):
@@ -412,7 +423,8 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     metadata : Metadata, optional
         The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
         and the EXIF data (TIFF its texts); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
-        keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers.
+        keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers. Of a grid, an
+        ``.npy`` begins with the smallest y.
 
     Raises
     ------
@@ -425,7 +437,9 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     check_writable(path, pixels.dtype, channels)
     suffix = Path(path).suffix.lower()
-    if suffix != ".npy":
+    if suffix == ".npy":
+        pixels = pixels[::-1] if metadata and metadata.ascending else pixels
+    else:
         pixels = pixels * np.uint8(255) if pixels.dtype == bool else pixels
         pixels = native(pixels[..., 0] if channels == 1 and pixels.ndim == 3 else pixels)
     with atomic_path(path) as temporary:

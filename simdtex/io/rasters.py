@@ -39,6 +39,9 @@ NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How TIFF files begin."""
 
+NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""The transform of a raster without georeference."""
+
 _TAGS = (33550, 33922, 34264, 34735, 42113)
 """TIFF tags of georeference and no-data."""
 
@@ -69,6 +72,12 @@ class Georeference(NamedTuple):
     crs: str
     transform: tuple[float, float, float, float, float, float]
     nodata: float | None = None
+
+    @classmethod
+    def of_cells(cls, origin: Sequence[float], cell: Sequence[float], rows: int, crs: str) -> Georeference:
+        """Return the georeference of a picture, north at the top, of cells whose first is at `origin`."""
+        west, north = origin[0] - cell[0] / 2, origin[1] + cell[1] * (rows - 0.5)
+        return cls(crs, (cell[0], 0.0, west, 0.0, -cell[1], north))
 
     def moved(self, left: int, top: int) -> Georeference:
         """Return the georeference of a raster with this many more columns at the left and rows at the top."""
@@ -106,7 +115,8 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
     """Return the pixels of a raster of at most ``most`` pixels, its georeference, and the names of its bands.
 
     Pixels are (rows, cols) or (rows, cols, bands) in the file's type. Unknown ones are NaN in floats, and masked in
-    integers; a band of alpha is a band. The first row is that of the file, most often the northern one.
+    integers; a band of alpha is a band. The first row is the northern one, and the first column the western one, unless
+    the raster is rotated.
     """
     needs("rasterio", "rasters", "a raster with georeference or no-data")
     import rasterio
@@ -132,6 +142,11 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         pixels = np.ma.getdata(pixels)
     elif pixels.dtype.kind == "f":
         pixels = pixels.filled(np.nan)
+    a, b, c, d, e, f = geo.transform
+    if not (b or d) and geo.transform != NOWHERE:
+        rows, cols = pixels.shape[:2]
+        pixels = pixels[:: -1 if e > 0 else 1, :: -1 if a < 0 else 1]
+        geo = geo._replace(transform=(abs(a), b, min(c, c + a * cols), d, -abs(e), max(f, f + e * rows)))
     return (pixels[..., 0] if len(names) == 1 else pixels), geo, names
 
 
@@ -144,10 +159,9 @@ def read_cells(path: PathLike, most: int) -> Library:
     planes: Any = pixels.reshape(*pixels.shape[:2], -1)
     if np.ma.isMaskedArray(planes):
         planes = np.ma.filled(planes.astype(np.float64), np.nan)
-    rows, cols = planes.shape[:2]
-    values = {name: planes[None, :: -1 if e < 0 else 1, :: -1 if a < 0 else 1, k] for k, name in enumerate(names)}
-    first = min(c, c + a * cols) + abs(a) / 2, min(f, f + e * rows) + abs(e) / 2, 0.0
-    return values, first, (abs(a), abs(e), 1.0), geo.crs, {}
+    values = {name: planes[None, ::-1, :, k] for k, name in enumerate(names)}
+    first = (0.0,) * 3 if geo.transform == NOWHERE else (c + a / 2, f + e * len(planes) - e / 2, 0.0)
+    return values, first, (a, abs(e), 1.0), geo.crs, {}
 
 
 def write_cells(
@@ -160,8 +174,7 @@ def write_cells(
     nodata = float("nan") if bands.dtype.kind == "f" else None
     if np.ma.is_masked(bands) and nodata is None:
         bands, nodata = bands.astype(np.result_type(bands.dtype, np.int16)), -9999.0
-    west, north = origin[0] - cell[0] / 2, origin[1] + cell[1] * (bands.shape[1] - 0.5)
-    geo = Georeference(crs, (cell[0], 0.0, west, 0.0, -cell[1], north), nodata)
+    geo = Georeference.of_cells(origin, cell, bands.shape[1], crs)._replace(nodata=nodata)
     write_raster(path, bands if nodata is None else bands.filled(nodata), geo, list(layers))
 
 

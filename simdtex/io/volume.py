@@ -2,7 +2,7 @@
 """Reading and writing of volumes, without a change of any value, and writing of realisations.
 
 A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
-picture with row 0 at the top. x is the column, y the row, z the depth. Realisations are an `xarray.DataArray`, as
+picture. x is the column, y the row, z the depth. Realisations are an `xarray.DataArray`, as
 `simdtex.simulate` returns; they are written by xarray, as NumPy arrays, or as a grid. The extra ``simulate`` installs
 the libraries: ``pip install 'simdtex[simulate]'``.
 """
@@ -129,8 +129,9 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
     -------
     CartesianGrid
         The variables (nz, ny, nx), the centre of the first cell, and the size of a cell, in the units of the file. An
-        axis whose coordinates descend is reversed. Of rotated axes only the size of a cell is kept, and the origin is
-        0. White is the largest value, as in pictures.
+        axis whose coordinates descend is reversed, and so are the rows of pictures, whose first is the northern edge.
+        Of rotated axes only the size of a cell is kept, and the origin is 0. White is the largest value, as in
+        pictures.
 
     Raises
     ------
@@ -145,9 +146,11 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
         with reading(path, "the volume", max_pixels, kind="a volume") as most, quiet():
             values, georeference = _READERS[target.suffix.lower()](target, most)
     found: dict[str, Array] = {}
+    pictures = target.is_dir() or target.suffix.lower() in (".tif", ".tiff")
     for key, one in values.items():
         if one.ndim not in (3, 4) or one.size == 0 or one.dtype.kind not in "buif":
             raise ValueError(f"{name} has the shape {one.shape} and the type {one.dtype}: give numbers of three axes")
+        one = one[:, ::-1] if pictures else one
         parts = [one] if one.ndim == 3 else np.moveaxis(one, -1, 0)
         found |= {key if len(parts) == 1 else f"{key}_{k}": native(part) for k, part in enumerate(parts)}
     return CartesianGrid(found, *georeference)

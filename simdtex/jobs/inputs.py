@@ -22,6 +22,7 @@ from simdtex.driver import Plan, check_shape, check_sides, drive, execute
 from simdtex.inputs import Input, inputs, options_of, parameter_types
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of, plain_array
+from simdtex.io.places import ascending, located
 from simdtex.machine import Machine, memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
@@ -573,7 +574,18 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
 
 
 def _training(name: str, value: Any, call: Any) -> Pictures:
-    """Return training images; those of three axes, without that of the variables, are volumes."""
+    """Return training images, of which those of three axes, without that of the variables, are volumes.
+
+    Arrays of xarray get their axes in ascending order here, and the call the place of its output.
+    """
+    value, output = ascending(value), {}
+    for one in ("like", "known", "guide", "mask", *Maps._fields):
+        if hasattr(call, one):
+            output[one] = ascending(getattr(call, one))
+            setattr(call, one, output[one])
+    call.place = located(output, value, call.origin, call.cell)
+    if call.place:
+        call.origin, call.cell = call.place.frame
     first = value[0] if isinstance(value, (list, tuple)) and value else value
     call.axes = 3 if getattr(first, "ndim", 2) - (call.channel_axis is not None) > 2 else 2
     call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))

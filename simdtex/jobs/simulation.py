@@ -7,13 +7,14 @@ import json
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from simdtex.driver import check_sides, drive
 from simdtex.inputs import Cells, Estimate, Simulate
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
+from simdtex.io.places import Place
 from simdtex.jobs.inputs import (
     Inputs,
     Maps,
@@ -42,9 +44,6 @@ from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.options import moderate, require, resolve, whole, within_32_bits
 from simdtex.run import Callback, Output, Progress
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_TOGETHER = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""
@@ -101,10 +100,9 @@ def simulate(call: Simulate) -> Work:
         raise ValueError("shape is of a volume and the training image is a picture; give a training volume")
     if call.shape is not None:
         within_32_bits(check_sides(call.shape, sides), 1)
-    frame(call.origin, call.cell)  # raises early
     maps = call.maps = Maps(**{name: getattr(call, name) for name in Maps._fields})
-    size = maps.shape(axes) or pictures.pixels[0].shape[:-1]
-    if isinstance(known, np.ndarray) and known.ndim == axes + (call.channel_axis is not None):
+    size = _like(call) or maps.shape(axes) or pictures.pixels[0].shape[:-1]
+    if call.like is None and isinstance(known, np.ndarray) and known.ndim == axes + (call.channel_axis is not None):
         size = known.shape if call.channel_axis is None else np.moveaxis(known, call.channel_axis, -1).shape[:-1]
     size = call.shape = check_sides(size if call.shape is None else call.shape, sides)
     place = placing(call)
@@ -191,14 +189,14 @@ def simulate(call: Simulate) -> Work:
             raise
         return made, Output(None, statistics={"seed": seed, "device": machine.name})
 
-    def finish(arrays: NDArray[Any], output: Output) -> xarray.DataArray | xarray.Dataset:
+    def finish(arrays: NDArray[Any], output: Output) -> Any:
         dims = ["realisation", *"zyx"[-axes:], "variable"][: arrays.ndim]
         along, sides_of_cells = grid_axes(size, call.origin, call.cell)
         seed = output.statistics["seed"]
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), **along}
         coordinates["seed"] = ("realisation", seeds)
-        coordinates |= described_axes(call.given, along, sides_of_cells)
+        coordinates |= described_axes(call.place, along, sides_of_cells)
         attributes = _attributes(output.statistics, chosen, inputs) | maps.digests()
         if inputs.given and inputs.given.outside is not None:
             coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
@@ -214,13 +212,14 @@ def simulate(call: Simulate) -> Work:
             for name, those in (("asked", asked), ("reached", reached)) if told.size else ():
                 attributes[f"shares_{name}"] = " ".join(f"{one:.3f}" for one in those / those.sum())
         attributes |= sides_of_cells | described(call.given, known)
-        result = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+        made = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+        result = georeferenced(made, call.place)
         if not call.source:
             return result
         names = (*(("layer",) if axes > 2 else ()), "row", "column", "image")
         lattice = dims[: 1 + axes]
         places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
-        return Results({"simulation": result, **places}, attrs=attributes)
+        return Results({"simulation": result, **places}, attrs=result.attrs)
 
     return Work(run, chosen, None if call.channel_axis is None else -1, finish)
 
@@ -262,10 +261,10 @@ def estimate(call: Estimate) -> Work:
     least = min(min(one.shape[-3:-1]) for one in pictures.pixels)
     reach = least // 8 if call.reach is None else call.reach
     whole("reach", reach, 0, least - 1)
-    known, size = call.known, pictures.pixels[0].shape[:-1]
+    known, size = call.known, _like(call) or pictures.pixels[0].shape[:-1]
     if known is None:
         raise ValueError("an estimate requires data; give known")
-    if isinstance(known, np.ndarray) and known.ndim == axes:
+    if call.like is None and isinstance(known, np.ndarray) and known.ndim == axes:
         size = known.shape
     size = check_sides(size if call.shape is None else call.shape, ("layers", "rows", "columns")[-axes:])
     along, sides_of_cells = grid_axes(size, call.origin, call.cell)
@@ -298,7 +297,7 @@ def estimate(call: Estimate) -> Work:
         found[:, given.whole.ravel()] = certain
         return found.T.reshape(*size, -1), Output(None, statistics={"device": machine.name})
 
-    def finish(found: NDArray[Any], output: Output) -> xarray.Dataset:
+    def finish(found: NDArray[Any], output: Output) -> Any:
         dims, maps = tuple("zyx"[-axes:]), np.moveaxis(found, -1, 0)
         units = {"units": about["units"]} if "units" in (about := described(call.given)) else {}
         variables: dict[str, Any] = {
@@ -313,9 +312,40 @@ def estimate(call: Estimate) -> Work:
             **{"version": version("simdtex"), "device": output.statistics["device"], "nearest": nearest},
             **{"reach": reach, "bandwidth": call.bandwidth, **digests(pictures, given), **sides_of_cells},
         }
-        return Results(variables, along | described_axes(call.given, along, sides_of_cells), attributes)
+        made = Results(variables, along | described_axes(call.place, along, sides_of_cells), attributes)
+        return georeferenced(made, call.place)
 
     return Work(run, None, -1, finish)
+
+
+def _like(call: Simulate | Estimate) -> tuple[int, ...] | None:
+    """Return the sides of ``like``, which gives the output's; None without."""
+    if call.like is None:
+        return None
+    if not hasattr(call.like, "sizes") or call.place is None or not {"x", "y"} <= {*call.like.sizes}:
+        raise ValueError("like has no coordinates x and y; give an array of xarray that has, or shape, origin and cell")
+    size = tuple(call.like.sizes.get(axis, 1) for axis in "zyx"[-call.axes :])
+    if call.shape is not None and tuple(call.shape) != size:
+        raise ValueError(f"shape is {call.shape} and like has {size}; leave shape out")
+    return size
+
+
+def georeferenced(made: Any, place: Place | None) -> Any:
+    """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
+    if place is None or not place.crs:
+        return made
+    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
+    with suppress(ImportError):  # the extra rasters
+        from rasterio.crs import CRS
+
+        unit = CRS.from_wkt(place.crs).units_factor[0]
+        own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
+        found = found.assign_coords(
+            {axis: found[axis].assign_attrs(own | found[axis].attrs) for axis in "xy" if axis in found.coords}
+        )
+    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+        one.encoding["grid_mapping"] = "spatial_ref"
+    return found
 
 
 def check_several(several: str, known: Any, pictures: Pictures) -> None:

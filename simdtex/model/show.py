@@ -19,7 +19,8 @@ from xarray.core.utils import UncachedAccessor
 from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
-from simdtex.io.rasters import axis_attributes, axis_place
+from simdtex.io.places import Place
+from simdtex.io.rasters import axis_place
 from simdtex.model.display import category_colours
 from simdtex.options import require, whole
 
@@ -187,12 +188,11 @@ def _label(values: Any) -> str:
 def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Figure, Colorbar]:
     """Return a figure of maps, (maps, y, x), and the last colour bar: one for all, or of each map if ``how`` is a list.
 
-    Rows ascend to the north if the coordinates are on the ground, as in reports.
+    North, the largest y, is at the top, as in reports; coordinates on the ground have labels.
     """
     ground, rows, cols = "cell_y" in made.attrs, made.sizes["y"], made.sizes["x"]
     (left, wide), (low, high) = axis_place(made, "x"), axis_place(made, "y")
-    ends = (low - high / 2, low + high * (rows - 0.5))
-    extent = (left - wide / 2, left + wide * (cols - 0.5), *(ends if ground else ends[::-1]))
+    extent = (left - wide / 2, left + wide * (cols - 0.5), low - high / 2, low + high * (rows - 0.5))
     down = -(-len(titles) // ACROSS)
     across = -(-len(titles) // down)
     inches = MAP_INCHES / max(rows * high, cols * wide)
@@ -201,7 +201,7 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     grid = figure.subplots(down, across, squeeze=False).ravel()
     # smaller maps have a pixel for each cell
     smooth = "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
-    where = {"origin": "lower" if ground else "upper", "extent": extent, "interpolation": smooth}
+    where = {"origin": "lower", "extent": extent, "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
         own = how if isinstance(how, dict) else how[n]
         image = axes.imshow(planes[n], **where, **own)
@@ -251,12 +251,12 @@ def described(training: Any, known: Any = None) -> dict[str, str]:
     return {name: str(value) for name, value in found.items() if value}
 
 
-def described_axes(training: Any, along: dict[str, Any], sides: dict[str, float]) -> dict[str, Any]:
-    """Return the coordinates of axes that a training image of xarray names, with its names and units.
+def described_axes(place: Place | None, along: dict[str, Any], sides: dict[str, float]) -> dict[str, Any]:
+    """Return the coordinates of axes with the names and units of a place.
 
     Coordinates without an origin and a size of cells (``sides``) count rows and columns, and have no units.
     """
-    told = axis_attributes(training) if hasattr(training, "coords") and sides else {}
+    told = place.about if place and sides else {}
     return {
         axis: ((axis,) if np.ndim(along[axis]) else (), along[axis], own)
         for axis, own in told.items()

@@ -57,7 +57,8 @@ def write_ensemble(
     training : array_like, (rows, cols)
         The training image.
     ensemble : xarray.DataArray or array_like, (realisations, rows, cols)
-        That of `simdtex.simulate` with coordinates on the ground has them on all axes, and north at the top.
+        That of `simdtex.simulate` with coordinates on the ground has them on all axes. Row 0 is the smallest y, and
+        north is at the top.
     data : array_like, (m, 3), optional
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
@@ -79,7 +80,7 @@ def write_ensemble(
     found = summary(np.asarray(ensemble), training, data=data, categories=categories)
     made, own = uncertainty.named(ensemble, "realisation", "y", "x"), np.asarray(training)
     images, categorical, names = made.values, len(found.categories) > 0, found.categories[_mapped(found)].tolist()
-    shown = (images[:, ::-1], own[::-1]) if "cell_y" in made.attrs else (images, own)
+    shown = images[:, ::-1], own[::-1]
     points = _on_ground(made, found.data)
     sections = [
         Section("The realisations", [_realisations(*shown, found)]),
@@ -206,7 +207,7 @@ def _maps(
     low, high = limits
     for axes, (title, (plane, values)) in zip(grid, panels.items(), strict=False):
         how = {"cmap": colours, "vmin": low, "vmax": high, "add_colorbar": False}
-        image = plane.plot.imshow(ax=axes, yincrease="cell_y" in plane.attrs, **how)
+        image = plane.plot.imshow(ax=axes, **how)
         (_, up), (_, along) = (axis_place(plane, axis) for axis in plane.dims)
         # cells of a plane through layers are squares
         axes.set_aspect(1 if "y" in plane.dims[:1] else along / up)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the cells of an output lie: their place as the arrays of xarray and the options of a run give it.
+
+y points north. Values have the axes ([z,] y, x), each in ascending order of its coordinate, so that row 0 is the
+southern edge. The grids that belong to the output give its place; a training image gives it only if none of them does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from simdtex.io.grids import Frame, frame
+from simdtex.io.rasters import axis_attributes, axis_of, axis_place
+
+SAME = 0.01
+"""The most by which cells of one place differ in their position, in cells."""
+
+
+class Place(NamedTuple):
+    """Where the cells of an array lie.
+
+    ``name`` is that of the array in messages, ``sides`` its numbers of cells along x, y and, of a volume, z, ``crs``
+    its coordinate reference system as WKT, empty if unknown, and ``about`` has the attributes of its axes, by name.
+    """
+
+    name: str
+    frame: Frame
+    sides: tuple[int, ...] = ()
+    crs: str = ""
+    about: Mapping[str, Mapping[str, str]] = {}
+
+    @property
+    def told(self) -> bool:
+        """Whether it is a place, and coordinates are no mere numbers of columns and rows."""
+        return self.frame.told or bool(self.crs) or any(self.about.values())
+
+    def __str__(self) -> str:
+        at, size = (", ".join(f"{number:.12g}" for number in numbers) for numbers in self.frame)
+        return f"{self.name} lies at {at} with cells of {size}"
+
+
+def ascending(array: Any) -> Any:
+    """Return an array of xarray with its axes called z, y and x in this order, and in ascending order of coordinates.
+
+    Any other array, and one without the axes y and x, is returned as it is; of a list, each.
+    """
+    if isinstance(array, (list, tuple)):
+        return type(array)([ascending(one) for one in array])
+    if not hasattr(array, "coords"):
+        return array
+    named = {dim: axis for dim in array.dims if (axis := axis_of(str(dim)))}
+    if sorted(named.values())[:2] != ["x", "y"]:
+        return array
+    others = {dim: axis for dim, axis in named.items() if dim != axis}
+    array = array.drop_vars([axis for axis in others.values() if axis in array.coords]).rename(others)
+    down = [axis for axis in named.values() if axis in array.coords and array[axis][0] > array[axis][-1]]
+    in_order = iter(sorted(named.values(), reverse=True))
+    order = [next(in_order) if dim in named.values() else dim for dim in array.dims]
+    return array.isel(dict.fromkeys(down, slice(None, None, -1))).transpose(*order)
+
+
+def place_of(name: str, array: Any) -> Place | None:
+    """Return the place of an array that `ascending` has returned; None if it has no coordinates."""
+    if not hasattr(array, "coords") or not {"x", "y"} <= {*array.dims} & {*array.coords}:
+        return None
+    lies = frame(*zip(*(axis_place(array, axis) for axis in "xyz"), strict=True))
+    about = array.attrs, *(one.attrs for one in array.coords.values() if one.ndim == 0)
+    crs = next((str(one[key]) for one in about for key in ("crs_wkt", "crs") if key in one), "")
+    sides = tuple(array.sizes[axis] for axis in "xyz" if axis in array.dims)
+    return Place(name, lies, sides, crs, axis_attributes(array))
+
+
+def located(output: Mapping[str, Any], training: Any, origin: Any, cell: Any) -> Place | None:
+    """Return the place of an output; None if nothing gives it.
+
+    The arrays of ``output``, by their names in messages, give it, else ``origin`` and ``cell``, as the user gave them,
+    else the training image. Arrays are as `ascending` returns them. Raises ValueError if two places differ.
+    """
+    options, free = frame(origin, cell), origin is None and cell is None
+    ends = {
+        name: one[-1] if isinstance(one, tuple) else one for name, one in output.items()
+    }  # of a guide, the output's
+    found = [place for name, one in ends.items() if (place := place_of(name, one))]
+    told = [place for place in found if place.told]
+    image = place_of("the training image", training[0] if isinstance(training, (list, tuple)) else training)
+    first = told[0] if told else image if image and image.told and not found else None
+    if first is None:
+        return None if free else Place("the output", options)
+    own = zip(first.frame, (origin, cell), strict=True)
+    wanted = frame(*(one[: None if free else len(options.origin)] if given is None else given for one, given in own))
+    given = Place("that of origin and cell", wanted, about=first.about)
+    for other in (*told[1:], given) if told else ():
+        _check_same(first, other)
+    if told or free:
+        return first._replace(crs=next((place.crs for place in told if place.crs), first.crs))
+    return given._replace(crs=first.crs if origin is None or cell is None else "")
+
+
+def _check_same(one: Place, other: Place) -> None:
+    """Raise unless cells lie at the same place."""
+    for at, size, to, side, n in zip(*one.frame, *other.frame, one.sides, strict=False):
+        if max(abs(to - at), abs(to - at + (n - 1) * (side - size))) > SAME * size:
+            raise ValueError(f"{one}, and {other}; give one place")
+    if one.crs and other.crs and one.crs != other.crs:
+        with suppress(ImportError):  # the extra rasters, without which only the texts can be compared
+            from rasterio.crs import CRS
+
+            if CRS.from_user_input(one.crs) == CRS.from_user_input(other.crs):
+                return
+        raise ValueError(
+            f"{one.name} and {other.name} have different coordinate reference systems; warp one of them, as by gdalwarp"
+        )
