@@ -112,11 +112,11 @@ def test_a_sample_may_be_unknown_in_parts(folder):
 def test_a_table_is_kept(folder):
     args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv"]
     out = made(*args, "--source-map", "s.npz")
-    assert out[4, 3] == 200 and out[7, 10] == 17
-    known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")
+    assert out[-1 - 4, 3] == 200 and out[-1 - 7, 10] == 17, "y points north"
+    known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")[::-1]
     sample = pixels("sample.png")
     assert np.array_equal(out, simdtex.synthesize(sample, (14, 20), known=known, **OPTIONS))
-    assert (load_source_map(folder / "s.npz")[4, 3] == -1).all()
+    assert (load_source_map(folder / "s.npz")[-1 - 4, 3] == -1).all()
 
 
 @pytest.mark.parametrize("name", ["known.png", "known.tif"])

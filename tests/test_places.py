@@ -122,6 +122,14 @@ def test_maps_are_the_same_in_every_file(flag, monkeypatch):
         assert np.array_equal(found[1] if flag == "--guide" else found, TRUTH), name
 
 
+def test_a_mask_of_a_raster_is_a_picture():
+    """Of a map of row and column, only values of the white rows are taken."""
+    rows = np.arange(ROWS, dtype=np.uint8)[:, None] * np.ones((1, COLS), np.uint8)
+    raster("ti.tif", rows)
+    plain("mask.png", (rows > 4).astype(np.uint8) * np.uint8(255))
+    assert made("simulate", "ti.tif", "--sample-mask", "mask.png")["values"].min() == 5
+
+
 def test_every_output_shows_the_same_map():
     raster("known.tif", KNOWN)
     words = ("simulate", "ti.npy", "--known", "known.tif")
@@ -148,7 +156,7 @@ def test_a_picture_is_made_with_the_north_at_the_top():
     grid("ti.gslib", TRUTH)
     there = ~np.isnan(KNOWN)[::-1]
     for name in (*FILES, "wells.csv", "rows.csv"):
-        if name in ("a.npy", "wells.csv"):
+        if name in ("a.npy", "wells.csv"):  # see below
             continue
         FILES.get(name, table)(name, KNOWN)
         for sample in ("ti.png", "ti.gslib"):

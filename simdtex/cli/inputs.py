@@ -207,7 +207,8 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
     elif how.deep or path.suffix.lower() in (".npy", ".tif", ".tiff"):  # the reader of pictures names other formats
         from simdtex.io import volume  # whose libraries take long to load
 
-        grid = volume.read(path) if volume.is_volume(path, how.channels or not how.deep) else None
+        deep = volume.is_volume(path, how.channels or not how.deep)
+        grid = volume.read(path, ascending=how.deep) if deep else None
     if grid is None:
         found = read_picture(path, how)
         if path.suffix.lower() == ".npy" and not how.channels and (count := channels(found.pixels)) > 4:

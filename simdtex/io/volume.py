@@ -111,7 +111,7 @@ def is_volume(path: PathLike, channels: bool = False) -> bool:
     return False
 
 
-def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
+def read(path: PathLike, *, max_pixels: int | None = None, ascending: bool = False) -> CartesianGrid:
     """Return the volume in a file, or in a folder of slices.
 
     Parameters
@@ -124,14 +124,15 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
     max_pixels : int, optional
         The most values that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
+    ascending : bool
+        Whether pictures, whose first row is the northern edge, are turned so that row 0 is the smallest y.
 
     Returns
     -------
     CartesianGrid
         The variables (nz, ny, nx), the centre of the first cell, and the size of a cell, in the units of the file. An
-        axis whose coordinates descend is reversed, and so are the rows of pictures, whose first is the northern edge.
-        Of rotated axes only the size of a cell is kept, and the origin is 0. White is the largest value, as in
-        pictures.
+        axis whose coordinates descend is reversed. Of rotated axes only the size of a cell is kept, and the origin is
+        0. White is the largest value, as in pictures.
 
     Raises
     ------
@@ -146,7 +147,7 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
         with reading(path, "the volume", max_pixels, kind="a volume") as most, quiet():
             values, georeference = _READERS[target.suffix.lower()](target, most)
     found: dict[str, Array] = {}
-    pictures = target.is_dir() or target.suffix.lower() in (".tif", ".tiff")
+    pictures = ascending and (target.is_dir() or target.suffix.lower() in (".tif", ".tiff"))
     for key, one in values.items():
         if one.ndim not in (3, 4) or one.size == 0 or one.dtype.kind not in "buif":
             raise ValueError(f"{name} has the shape {one.shape} and the type {one.dtype}: give numbers of three axes")
