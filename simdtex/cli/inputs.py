@@ -513,7 +513,8 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
     files.options["labels"] = labels
-    output = in_place(planes(wanted), found[-1].grid) if files.how.deep and is_grid else wanted
+    grid = found[-1].grid
+    output = in_place(planes(wanted), grid) if files.how.deep and grid else wanted
     return (own if samples.several else own[0], output)
 
 

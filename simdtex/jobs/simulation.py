@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest
 from simdtex.driver import check_sides, drive
 from simdtex.inputs import Cells, Estimate, Simulate
-from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.places import Place
 from simdtex.jobs.inputs import (
@@ -92,7 +91,7 @@ def simulate(call: Simulate) -> Work:
     {'realisation': 2, 'y': 32, 'x': 40}
     """
     require("simulate", "xarray")
-    from simdtex.model.show import Realisations, Results, described, described_axes
+    from simdtex.model.show import Realisations, Results, described
 
     n, first, axes, pictures, known = call.n, call.first, call.axes, call.training, call.known
     sides = ("layers", "rows", "columns")[-axes:]
@@ -191,12 +190,11 @@ def simulate(call: Simulate) -> Work:
 
     def finish(arrays: NDArray[Any], output: Output) -> Any:
         dims = ["realisation", *"zyx"[-axes:], "variable"][: arrays.ndim]
-        along, sides_of_cells = grid_axes(size, call.origin, call.cell)
+        along, sides_of_cells = grid_axes(size, call.place)
         seed = output.statistics["seed"]
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), **along}
         coordinates["seed"] = ("realisation", seeds)
-        coordinates |= described_axes(call.place, along, sides_of_cells)
         attributes = _attributes(output.statistics, chosen, inputs) | maps.digests()
         if inputs.given and inputs.given.outside is not None:
             coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
@@ -254,7 +252,7 @@ def estimate(call: Estimate) -> Work:
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     require("simulate", "xarray")
-    from simdtex.model.show import Results, described, described_axes
+    from simdtex.model.show import Results, described
 
     categorical, nearest, axes = call.categorical, call.nearest, call.axes
     pictures = mrf.Options(categorical=categorical).of(call.training)
@@ -267,7 +265,7 @@ def estimate(call: Estimate) -> Work:
     if call.like is None and isinstance(known, np.ndarray) and known.ndim == axes:
         size = known.shape
     size = check_sides(size if call.shape is None else call.shape, ("layers", "rows", "columns")[-axes:])
-    along, sides_of_cells = grid_axes(size, call.origin, call.cell)
+    along, sides_of_cells = grid_axes(size, call.place)
     check_several(call.several, known, pictures)
     given = check_known(known, size, None, pictures, place=placing(call))
     mrf.check_categories(pictures, given)
@@ -312,8 +310,7 @@ def estimate(call: Estimate) -> Work:
             **{"version": version("simdtex"), "device": output.statistics["device"], "nearest": nearest},
             **{"reach": reach, "bandwidth": call.bandwidth, **digests(pictures, given), **sides_of_cells},
         }
-        made = Results(variables, along | described_axes(call.place, along, sides_of_cells), attributes)
-        return georeferenced(made, call.place)
+        return georeferenced(Results(variables, along, attributes), call.place)
 
     return Work(run, None, -1, finish)
 
@@ -354,12 +351,13 @@ def check_several(several: str, known: Any, pictures: Pictures) -> None:
         raise ValueError("several is 'mean', which invents categories; give 'most', or 'refuse'")
 
 
-def grid_axes(size: tuple[int, ...], origin: Any, cell: Any) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the coordinates of cells, and the sizes of a cell as attributes; rows and columns without both."""
-    at, sides = ((), ()) if origin is None and cell is None else frame(origin, cell)
+def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the coordinates of cells and the sizes of a cell as attributes; without a place, columns and rows."""
+    at, sides = place.frame if place else ((), ())
     found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
     for axis, first, side in zip("xyz", at, sides, strict=False):
-        found[axis] = first + side * found[axis] if axis in found else first
+        values, about = first + side * found.get(axis, 0), place.about.get(axis, {}) if place else {}
+        found[axis] = ((axis,) if axis in found else (), values, about)
     return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
 
 

@@ -19,7 +19,6 @@ from xarray.core.utils import UncachedAccessor
 from xarray.plot.accessor import DataArrayPlotAccessor, DatasetPlotAccessor
 
 from simdtex.io.image import as_array, pixels_of, to_display
-from simdtex.io.places import Place
 from simdtex.io.rasters import axis_place
 from simdtex.model.display import category_colours
 from simdtex.options import require, whole
@@ -249,16 +248,3 @@ def described(training: Any, known: Any = None) -> dict[str, str]:
         own = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
         found |= {name: value for name, value in own.items() if value}
     return {name: str(value) for name, value in found.items() if value}
-
-
-def described_axes(place: Place | None, along: dict[str, Any], sides: dict[str, float]) -> dict[str, Any]:
-    """Return the coordinates of axes with the names and units of a place.
-
-    Coordinates without an origin and a size of cells (``sides``) count rows and columns, and have no units.
-    """
-    told = place.about if place and sides else {}
-    return {
-        axis: ((axis,) if np.ndim(along[axis]) else (), along[axis], own)
-        for axis, own in told.items()
-        if own and axis in along
-    }

@@ -210,6 +210,7 @@ def _maps(
         image = plane.plot.imshow(ax=axes, **how)
         (_, up), (_, along) = (axis_place(plane, axis) for axis in plane.dims)
         # cells of a plane through layers are squares
+        axes.locator_params(axis="x", nbins=4)  # coordinates on the ground are long
         axes.set_aspect(1 if "y" in plane.dims[:1] else along / up)
         axes.set_title("")
         axes.set_title(title, loc="left", fontsize=10, color=INK)
