@@ -29,7 +29,7 @@ UNLABELLED = 255
     ("simulate facies.png -o many.nc -n 50 --categorical --known wells.csv", "Make 50 realisations that honour wells."),
     ("simulate facies.png -o many.zarr -n 10 --size 500x500 --report page", "Set the size, and write a page."),
     ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
-    usual="output number size seed known categorical columns like origin cell report dry_run device quiet",
+    usual="output number size seed known categorical columns origin cell report dry_run device quiet",
 )
 @TRAINING_IMAGE
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
