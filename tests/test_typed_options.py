@@ -25,7 +25,7 @@ from simdtex.methods import classifier, mrf, pyramid
 from simdtex.options import Number, documented, option, resolve
 
 ROOT = Path(simdtex.__file__).parents[1]
-SAMPLES = SimpleNamespace(channel_axis=None)
+SAMPLES = SimpleNamespace(channel_axis=None, ascending=None)
 
 
 def test_the_types_follow_from_the_tables():
