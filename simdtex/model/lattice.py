@@ -296,6 +296,14 @@ def coloring_sublattice(
     return None
 
 
+def gathered(array: NDArray[Any], index: NDArray[np.integer[Any]], none: float) -> NDArray[Any]:
+    """Return ``array[..., index]``, and ``none`` where the index is negative: there is nothing to read."""
+    there = index >= 0
+    found = np.full((*array.shape[:-1], *index.shape), none, array.dtype)
+    found[..., there] = array[..., index[there]]
+    return found
+
+
 def sums_around(values: NDArray[Any], reach: int) -> NDArray[np.int64]:
     """Return the sum of integers over 2 reach + 1 places along each axis around each place, clipped to the array."""
     found: NDArray[np.int64] = values.astype(np.int64)

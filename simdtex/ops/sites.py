@@ -24,6 +24,7 @@ from simdtex.model.lattice import (
     Sublattice,
     coloring_of_layers,
     coloring_sublattice,
+    gathered,
     neighbourhood_offsets,
 )
 
@@ -232,7 +233,7 @@ def _greedy(
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
-    rank = np.append(rank, -1)  # for -1, no neighbour
+    rank = np.append(rank, -1)  # -1 in `near`, no neighbour, means this last one on purpose
     colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
     while left.size:
         now = left[(rank[near[:, left]] < rank[left]).all(0)]
@@ -288,11 +289,10 @@ def luby(
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
         while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
             r = grid.neighbours(undecided, offsets)
-            there = r >= 0
-            beaten = there & (host[r] == IN)
-            above = (draws[r] > draws[undecided]) | ((draws[r] == draws[undecided]) & (r > undecided))
-            rival = there & (host[r] == UNDECIDED) & above
-            host[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
+            near, drawn = gathered(host, r, OUT), gathered(draws, r, -1)
+            above = (drawn > draws[undecided]) | ((drawn == draws[undecided]) & (r > undecided))
+            beaten, rival = (near == IN).any(0), ((near == UNDECIDED) & above).any(0)
+            host[undecided] = np.where(beaten, OUT, np.where(rival, UNDECIDED, IN))
         return np.asarray(host == IN, np.uint8).reshape(active.shape)
     priority = machine.empty((sites,), np.uint32)
     state, following = (machine.empty(grid.shape, np.uint8) for _ in range(2))

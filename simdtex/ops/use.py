@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Launcher, Operation
 from simdtex.model.given import LEAST
-from simdtex.model.lattice import Grid, sums_around
+from simdtex.model.lattice import Grid, gathered, sums_around
 from simdtex.model.sample import Candidates
 from simdtex.ops.neighbourhood import Field
 
@@ -88,7 +88,7 @@ class Regions:
         found: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
         if not self.bordered.any():
             return found
-        apart = grid.near_edge(self.radius) & (found >= 0) & self.bordered[found]
+        apart = grid.near_edge(self.radius) & gathered(self.bordered, found, False)
         return np.where(apart, found + len(self.bordered), found)
 
     def wanted(self, grid: Grid) -> NDArray[np.float64]:
@@ -109,7 +109,7 @@ class Regions:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
         kinds = len(self.p)
         each = np.append(penalty, np.zeros(kinds, np.float32)).reshape(-1, kinds) * self.unit
-        found = soft[:kinds] + np.moveaxis(each[self.at(grid)], -1, 0)
+        found = soft[:kinds] + np.moveaxis(each[self.at(grid)], -1, 0)  # -1, no region, means the last on purpose
         return np.concatenate([found - found.min(0), soft[kinds:]])
 
 
