@@ -227,13 +227,13 @@ def _greedy(
         r = k * cols + m
         at = np.minimum(np.searchsorted(bare, r), n - 1)
         other = bare[at] == r
-        near[:, first : first + here.size] = np.where(other & (r != here), at, -1)
+        near[:, first : first + here.size] = np.where(other & (r != here), at, n)
         fixed = np.nonzero(~other)
         taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
-    rank = np.append(rank, -1)  # -1 in `near`, no neighbour, means this last one on purpose
+    rank = np.append(rank, -1)  # the last, n in `near`, is that of no neighbour
     colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
     while left.size:
         now = left[(rank[near[:, left]] < rank[left]).all(0)]
@@ -241,7 +241,7 @@ def _greedy(
         if (colors[now] >= most).any():
             return None
         those = near[:, now]
-        taken[those[those >= 0], np.broadcast_to(colors[now], those.shape)[those >= 0]] = True
+        taken[those[those < n], np.broadcast_to(colors[now], those.shape)[those < n]] = True
         rank[now] = -1
         left = left[colors[left] == UNCOLORED]
     return colors
@@ -283,9 +283,9 @@ def luby(
     ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
     priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
-    grid, sites = replace(grid, tile=None), grid.size
+    grid, sites, begin = replace(grid, tile=None), grid.size, grid.key[0]
     if machine is None:
-        draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
+        draws = random.draw4(seed, level, count, begin + np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
         while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
             r = grid.neighbours(undecided, offsets)
@@ -299,7 +299,7 @@ def luby(
     machine.launch(
         "luby_priority",
         (sites,),
-        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
+        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), np.uint64(begin), active, priority, state),
     )
     while True:
         for _ in range(ROUNDS):

@@ -168,10 +168,8 @@ class Lattices:
         if not self.coarser:
             return None
         coarser = self.coarser.sample
-        inside = np.flatnonzero(coarser.inside).astype(np.int32)
-        found = np.full(coarser.inside.size, -1, np.int32)
-        found[inside] = self.sample.index(coarser.place(inside))
-        return found
+        first = self.sample.index(coarser.place(np.arange(coarser.inside.size, dtype=np.int32)))
+        return np.where(coarser.inside.ravel(), first, np.int32(-1))
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the level's sample."""
