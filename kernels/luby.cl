@@ -9,15 +9,16 @@
 #define IN 1
 #define OUT 2
 
-// Before the first round. active (rows, cols); priority, state (rows, cols)  out. One work-item per site.
-__kernel void luby_priority(const int sites, const ulong seed, const uint level, const uint count,
+// Before the first round. active (rows, cols); priority, state (rows, cols)  out; `begin` as in the lattice. One work-item
+// per site.
+__kernel void luby_priority(const int sites, const ulong seed, const uint level, const uint count, const ulong begin,
                             __global const uchar *restrict active, __global uint *restrict priority,
                             __global uchar *restrict state)
 {
     const int site = get_global_id(0);
     if (site >= sites)
         return;
-    priority[site] = draw4(seed, level, count, site, PURPOSE_SCHEDULE, 0).x;
+    priority[site] = draw4(seed, level, count, begin + site, PURPOSE_SCHEDULE, 0).x;
     state[site] = active[site] ? UNDECIDED : OUT;
 }
 

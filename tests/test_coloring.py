@@ -1,5 +1,7 @@
 """Sets of sites that do not neighbour: the colouring against equation (14), and Luby's random independent sets."""
 
+from dataclasses import replace
+
 import numpy as np
 import plain
 import pytest
@@ -304,7 +306,7 @@ def test_every_site_is_a_member_sooner_or_later():
 
 @pytest.mark.parametrize(("spacing", "tile"), [(2, None), (4, None), (1, (2, 3))])
 def test_a_level_is_a_lattice_of_its_own_and_tiles_do_not_matter(machine, spacing, tile):
-    grid = Grid.of((19, 22), spacing, True, tile)
+    grid = replace(Grid.of((19, 22), spacing), tile=tile)
     expected = choose(Grid(grid.shape), 5)
     assert_same_bits(choose(grid, 5), expected)
     assert_same_bits(choose(grid, 5, machine=machine), expected)

@@ -279,7 +279,7 @@ def tiles_of(grid, i, j):
     ids=str,
 )
 def test_exactly_the_neighbours_in_another_tile_are_read_elsewhere(height, width, spacing, tile, order, torus):
-    grid = Grid.of((height, width), spacing, torus, tile)
+    grid = replace(Grid.of((height, width), spacing, torus), tile=tile)
     sites, offsets = np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order)
     found = grid.neighbours(sites, offsets)
     bare = replace(grid, tile=None).neighbours(sites, offsets)

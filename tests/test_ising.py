@@ -1,7 +1,7 @@
 """The Ising model: its exact energy, heat-bath runs, which schedules sample it, and ``simdtex schedules --ising``."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ EXACT = ["coloring", "coloring-fixed", "luby", "checkerboard", "raster", "random
 def problem(seed=0, shape=(6, 5), torus=True, tile=None, temperatures=(1.5, 3.0), seeds=3, count=None):
     """Spins of chains, some sites of the lattice, and the chances."""
     rng = np.random.default_rng(seed)
-    grid = Grid.of(shape, torus=torus, tile=tile)
+    grid = replace(Grid.of(shape, torus=torus), tile=tile)
     rows = 2 * shape[0] if tile else shape[0]
     spins = rng.integers(0, 2, (len(temperatures) * seeds, rows, shape[1]), dtype=np.uint8)
     sites = rng.permutation(np.arange(grid.size, dtype=np.int32))[:count].astype(np.int32)

@@ -1,5 +1,7 @@
 """Lattices, neighbourhoods and boundaries, equations (3), (10) and (11), against plain loops."""
 
+from dataclasses import replace
+
 import numpy as np
 import plain
 import pytest
@@ -61,10 +63,13 @@ def test_the_neighbours_of_every_site(height, width, spacing, order, torus):
 
 def test_what_a_kernel_is_told():
     picture, volume = Grid.of((7, 9), 2, False), Grid.of((5, 7, 9), 2, False)
-    assert picture.struct.tolist() == (1, 4, 5, 0, 0, 0, 0, 0, 0, 1, 4, 5, 2, 7, 9, 0, 0, 20)
-    assert volume.struct.tolist() == (3, 4, 5, 0, 0, 0, 0, 0, 0, 3, 4, 5, 2, 7, 9, 0, 0, 60)
-    window = Grid.of((20, 30), 2, True, (3, 4)).window(-2, 7, 10, 6)
-    assert window.struct.tolist() == (1, 10, 6, 0, 1, 0, 0, 8, 7, 1, 10, 15, 2, 20, 30, 0, 0, 60)
+    assert picture.struct.tolist() == (1, 4, 5, 0, 0, 0, 0, 0, 0, 1, 4, 5, 2, 7, 9, 0, 0, 20, 0)
+    assert volume.struct.tolist() == (3, 4, 5, 0, 0, 0, 0, 0, 0, 3, 4, 5, 2, 7, 9, 0, 0, 60, 0)
+    window = replace(Grid.of((20, 30), 2), tile=(3, 4)).window(-2, 7, 10, 6)
+    assert window.struct.tolist() == (1, 10, 6, 0, 1, 0, 0, 8, 7, 1, 10, 15, 2, 20, 30, 0, 0, 60, 0)
+    part = replace(Grid.of((7, 9), 2, False), key=(50, 100, 4))
+    assert part.struct.tolist() == (1, 4, 5, 0, 0, 0, 0, 0, 0, 1, 4, 5, 8, 7, 100, 0, 0, 20, 50)
+    assert part.places(np.array([0, 1, 5])).tolist() == [50, 58, 850], "its pixels are 4 of the output's along a side"
 
 
 def vectors(pattern, reach=12):

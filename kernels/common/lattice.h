@@ -15,10 +15,11 @@ typedef struct {
     int around_layers, around_rows, around_cols; // whether the axis wraps around
     int front, top, left;                        // the first site's place in the whole lattice
     int whole_layers, whole_rows, whole_cols;    // sites of the whole lattice
-    int step;                                    // pixels of the whole picture from site to site
-    int picture_rows, picture_cols;              // pixels of the whole picture, or of a layer
+    int step;                                    // pixels of the output from site to site
+    int picture_rows, picture_cols;              // pixels of the output, or of a layer
     int tile_rows, tile_cols;                    // where > 0, what lies in another tile is read
     int elsewhere;                               // so many sites on, where an older picture stands
+    ulong begin;                                 // the pixel of the output at site (0, 0) of the whole lattice
 } Lattice;
 
 // An offset (AXES,) in layers, rows and columns.
@@ -34,12 +35,12 @@ static inline int wrap(const int i, const int n)
     return k < 0 ? k + n : k;
 }
 
-// The pixel of the whole picture at site (i, j): what keys its random numbers.
+// The pixel of the output at site (i, j): what keys its random numbers.
 static inline ulong place_of(const Lattice g, const int i, const int j)
 {
     const ulong layer = AXES > 2 ? wrap(g.front + i / g.rows, g.whole_layers) : 0;
     const ulong row = wrap(g.top + (AXES > 2 ? i % g.rows : i), g.whole_rows), col = wrap(g.left + j, g.whole_cols);
-    return ((layer * g.picture_rows + row) * g.picture_cols + col) * g.step;
+    return g.begin + ((layer * g.picture_rows + row) * g.picture_cols + col) * g.step;
 }
 
 // Number of the neighbour of site (i, j) at an offset, equation (3). -1 outside an open lattice or a window, and where a

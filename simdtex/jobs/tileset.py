@@ -153,7 +153,7 @@ class Tiles:
                     canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
                 seen = callback and partial(_show, callback, job, begin / every, grid.size / every)
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                made, output = drive(self.plan(canvas, grid), machine, seed, seen, now)
+                made, output = drive(self.plan(canvas, grid, begin * rows * cols), machine, seed, seen, now)
                 finished.append((Canvas(made, np.asarray(output.source)), output.statistics | {"job": job}))
                 inside = None
                 if number < 2:
@@ -233,15 +233,16 @@ class Tiles:
             strip = down.cut(pairs[here, below] * rows, -half, rows, 2 * half)
             canvas.paste(row * rows, col * cols - half, strip)
 
-    def plan(self, canvas: Canvas, grid: NDArray[np.intp]) -> mrf.Plan:
-        """Return the plan of the run that makes the unknown pixels of tiles with a grid of corners."""
+    def plan(self, canvas: Canvas, grid: NDArray[np.intp], begin: int) -> mrf.Plan:
+        """Return the plan of a run that makes the unknown pixels of tiles; the runs before it have ``begin`` pixels."""
         known = canvas.place[..., 0] >= 0
         given = Given(canvas.values, np.repeat(known[..., None], canvas.values.shape[-1], -1), canvas.place)
         shape, guide = known.shape, None
         if len(self.pictures.pixels) > 1:
             samples = tuple(np.full((*one.shape[:2], 1), n) for n, one in enumerate(self.pictures.pixels))
             guide = samples, self.labels(grid)[..., None]
-        return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile)
+        key = begin, shape[1]
+        return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile, key=key)
 
     def labels(self, grid: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return the number of the sample of each pixel, which is that of the nearest corner, NaN half way."""

@@ -49,7 +49,8 @@ LATTICE = np.dtype(
             *("whole_layers", "whole_rows", "whole_cols", "step", "picture_rows", "picture_cols"),
             *("tile_rows", "tile_cols", "elsewhere"),
         )
-    ],
+    ]
+    + [("begin", np.uint64)],
     align=True,
 )
 """The struct ``Lattice`` of kernels/common/lattice.h."""
@@ -76,6 +77,9 @@ class Grid:
     tile : (int, int), optional
         Rows and columns of tiles. Neighbours in another tile are then read from an older picture, which lies below the
         picture in the same array (`simdtex.ops.snapshot`).
+    key : (int, int, int)
+        The number of the picture's first pixel in a larger output, the columns of that, 0: those of the picture, and
+        its pixels along a pixel of the picture.
 
     Notes
     -----
@@ -89,13 +93,12 @@ class Grid:
     picture: tuple[int, ...] | None = None
     origin: tuple[int, ...] | None = None
     tile: tuple[int, int] | None = None
+    key: tuple[int, int, int] = (0, 0, 1)
 
     @classmethod
-    def of(
-        cls, picture: tuple[int, ...], step: int = 1, torus: bool = True, tile: tuple[int, int] | None = None
-    ) -> Grid:
+    def of(cls, picture: tuple[int, ...], step: int = 1, torus: bool = True) -> Grid:
         """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols), in pixels."""
-        return cls(tuple(-(-side // step) for side in picture), torus, step, tuple(picture), tile=tile)
+        return cls(tuple(-(-side // step) for side in picture), torus, step, tuple(picture))
 
     @property
     def pixels(self) -> tuple[int, ...]:
@@ -148,7 +151,8 @@ class Grid:
         numbers = np.zeros((), LATTICE)
         one, none = (1,) * (3 - len(self.shape)), (0,) * (3 - len(self.shape))
         axes = (*one, *self.shape), (*none, *self.around), (*none, *self.first), (*one, *self.whole.shape)
-        others = (self.step, *self.pixels[-2:], *(self.tile or (0, 0)), self.size)
+        (*_, rows, cols), (begin, across, size) = self.pixels, self.key
+        others = (self.step * size, rows, across or cols, *(self.tile or (0, 0)), self.size, begin)
         numbers[()] = (*chain(*axes), *others)
         struct: np.void = numbers[()]  # type: ignore[assignment]
         return struct
@@ -198,16 +202,16 @@ class Grid:
         return found
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-        """Return the pixel indices of sites of this grid in the whole picture: the keys of random numbers."""
+        """Return the pixel indices of sites of this grid in the whole output: the keys of random numbers."""
         lines = self.lines()
         place = [line[at] * self.step for line, at in zip(lines, np.unravel_index(sites, self.shape), strict=True)]
-        return np.ravel_multi_index(tuple(place), self.pixels)
+        (*high, cols), (begin, across, size) = self.pixels, self.key
+        return begin + size * np.ravel_multi_index(tuple(place), (*high, across or cols))
 
     def decimated(self, picture: NDArray[Any]) -> NDArray[Any]:
         """Return the pixels of the whole picture (..., H, W), or volume, at the sites of the whole lattice."""
-        there: tuple[Any, ...] = (..., *(slice(None, None, self.step),) * len(self.shape))
-        found: NDArray[Any] = picture[there]
-        return found
+        there: Any = (..., *(slice(None, None, self.step),) * len(self.shape))
+        return np.asarray(picture[there])
 
     def latest(self, array: NDArray[Any]) -> NDArray[Any]:
         """Return an array over sites (..., rows, cols) without the older picture below it, if there is one."""
@@ -294,6 +298,14 @@ def coloring_sublattice(
                 if fitting and found.shortest() > order:
                     return found
     return None
+
+
+def gathered(array: NDArray[Any], index: NDArray[np.integer[Any]], none: float) -> NDArray[Any]:
+    """Return ``array[..., index]``, and ``none`` where the index is negative: there is nothing to read."""
+    there = index >= 0
+    found = np.full((*array.shape[:-1], *index.shape), none, array.dtype)
+    found[..., there] = array[..., index[there]]
+    return found
 
 
 def sums_around(values: NDArray[Any], reach: int) -> NDArray[np.int64]:

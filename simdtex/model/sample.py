@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.guide import AnyGuide, Colocated
-from simdtex.model.lattice import in_three_axes
+from simdtex.model.lattice import gathered, in_three_axes
 from simdtex.model.pictures import NothingUsable, Pictures
 from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest, structure
@@ -83,8 +83,7 @@ class Candidates(NamedTuple):
 
     def number_of(self, source: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the number of the candidate at each pixel index, on the host; -1 at none, or for a negative index."""
-        found: NDArray[np.int32] = np.where(source < 0, np.int32(-1), self.index_of[source])
-        return found
+        return gathered(self.index_of, source, -1)
 
     @property
     def made(self) -> int:
@@ -458,11 +457,10 @@ class Sample:
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the pixel index of places as `place` returns them; -1 if the first number is below 0."""
         row, col = (place[..., axis + (self.layer > 0)] for axis in (0, 1))
+        boxes: Any = np.array(self.boxes).T
+        first, rows, cols = gathered(boxes, place[..., -1], 0) if len(self.boxes) > 1 else boxes[:, 0]
         if self.reduction > 1:
-            _, rows, cols = np.array(self.boxes)[place[..., 2] if place.shape[-1] == 3 else 0].T
-            row, col = np.minimum(row // self.reduction, rows.T - 1), np.minimum(col // self.reduction, cols.T - 1)
-        tops, several = np.array([top for top, *_ in self.boxes]), len(self.boxes) > 1
-        first = tops[np.maximum(place[..., -1], 0)] if several else 0
+            row, col = np.minimum(row // self.reduction, rows - 1), np.minimum(col // self.reduction, cols - 1)
         row = row + ((place[..., 0] + first + self.margin) * self.layer if self.layer else first)
         found = (row + self.margin) * self.cols + col + self.margin
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)

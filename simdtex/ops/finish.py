@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, gathered
 from simdtex.model.sample import Sample
 from simdtex.ops.neighbourhood import Field
 
@@ -78,25 +78,22 @@ def _finished(
     source = field.source.ravel()
     shown, usable = sample.working[: sample.shown].astype(np.int64), sample.inside.ravel()
     values = field.values[: sample.shown].reshape(sample.shown, -1).astype(np.int64)
-    place, nowhere = np.maximum(source[sites], 0), source[sites] < 0
-    own = shown[:, place]
+    own = gathered(shown, source[sites], 0)
 
-    def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> NDArray[np.int64]:
         row, col = (np.stack(np.divmod(pixel, np.int32(sample.cols))) + offset[:, None]).astype(np.int64)
         at = np.stack([row, col]) - sample.margin
-        there = (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
-        pixels = np.where(there, row * sample.cols + col, 0)
-        return there & usable[pixels], pixels
+        there = (pixel >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+        found = np.where(there, row * sample.cols + col, -1)
+        return np.where(gathered(usable, found, False), found, -1)
 
     total, sums = np.zeros(sites.size, np.int64), np.zeros(own.shape, np.int64)
     for offset, weight in zip(offsets, weights.tolist(), strict=True):
         r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
-        known, p = within(source[r], -offset)
-        known &= (r >= 0) & (source[r] >= 0)
-        missed, q = within(place, offset)
-        missed &= (r >= 0) & ~known & (given.ravel()[r] > 0)
-        by = np.where(known, shown[:, p] - own, np.where(missed, values[:, r] - shown[:, q], 0))
-        total += weight * (known | missed)
-        sums += weight * by
-    by = ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
-    return np.where(nowhere, np.int16(0), by)
+        p = within(gathered(source, r, -1), -offset)
+        q = np.where((p < 0) & (gathered(given.ravel(), r, 0) > 0), within(source[sites], offset), -1)
+        there = (source[sites] >= 0) & ((p >= 0) | (q >= 0))
+        by = np.where(p < 0, gathered(values, r, 0) - gathered(shown, q, 0), gathered(shown, p, 0) - own)
+        total += weight * there
+        sums += weight * np.where(there, by, 0)
+    return ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array
 from simdtex.model.guide import UNKNOWN
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, gathered
 
 
 class Field(NamedTuple):
@@ -71,17 +71,16 @@ def near(
 ) -> Near:
     """Return the neighbourhoods of sites."""
     r = grid.neighbours(sites, offsets)
-    source, t = field.source.ravel(), field.temperature.ravel()[r]
-    touched = np.where((r >= 0) & (t < 1024), source[r], np.int32(-1))
+    source, t = gathered(field.source.ravel(), r, -1), gathered(field.temperature.ravel(), r, 1024)
+    touched = np.where(t < 1024, source, np.int32(-1))
     u = (1024 - t.astype(np.float32)) / np.float32(1024)
     if confidences.own:
-        u = np.where((r >= 0) & (source[r] < 0), u * confidences.hard, u)
-    u = np.where(r < 0, np.float32(0), u)[:, None]
-    channels = len(field.values)
+        u = np.where(source < 0, u * confidences.hard, u)
+    u, channels = u[:, None], len(field.values)
     if confidences.guides:
         r = np.concatenate([r, sites[None]])
         u = np.concatenate([u, np.zeros_like(u[:1])])
-    x = np.moveaxis(field.values.reshape(channels, -1)[:, r], 0, 1)
+    x = np.moveaxis(gathered(field.values.reshape(channels, -1), r, 0), 0, 1)
     if confidences.own:
         u = np.repeat(u, channels, 1)
         guides, known, here = confidences.guides, confidences.known, (r >= 0).astype(np.float32)[:, None]
@@ -92,4 +91,4 @@ def near(
             u[:, -known:] = here * confidences.hard
             u[-1, -known:] = confidences.centre_known
         u = np.where(x == UNKNOWN, np.float32(0), u)
-    return Near(sites, x, u, touched, source[sites])
+    return Near(sites, x, u, touched, field.source.ravel()[sites])

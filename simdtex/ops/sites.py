@@ -24,6 +24,7 @@ from simdtex.model.lattice import (
     Sublattice,
     coloring_of_layers,
     coloring_sublattice,
+    gathered,
     neighbourhood_offsets,
 )
 
@@ -226,13 +227,13 @@ def _greedy(
         r = k * cols + m
         at = np.minimum(np.searchsorted(bare, r), n - 1)
         other = bare[at] == r
-        near[:, first : first + here.size] = np.where(other & (r != here), at, -1)
+        near[:, first : first + here.size] = np.where(other & (r != here), at, n)
         fixed = np.nonzero(~other)
         taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
-    rank = np.append(rank, -1)  # for -1, no neighbour
+    rank = np.append(rank, -1)  # the last, n in `near`, is that of no neighbour
     colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
     while left.size:
         now = left[(rank[near[:, left]] < rank[left]).all(0)]
@@ -240,7 +241,7 @@ def _greedy(
         if (colors[now] >= most).any():
             return None
         those = near[:, now]
-        taken[those[those >= 0], np.broadcast_to(colors[now], those.shape)[those >= 0]] = True
+        taken[those[those < n], np.broadcast_to(colors[now], those.shape)[those < n]] = True
         rank[now] = -1
         left = left[colors[left] == UNCOLORED]
     return colors
@@ -282,24 +283,23 @@ def luby(
     ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
     priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
-    grid, sites = replace(grid, tile=None), grid.size
+    grid, sites, begin = replace(grid, tile=None), grid.size, grid.key[0]
     if machine is None:
-        draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
+        draws = random.draw4(seed, level, count, begin + np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
         while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
             r = grid.neighbours(undecided, offsets)
-            there = r >= 0
-            beaten = there & (host[r] == IN)
-            above = (draws[r] > draws[undecided]) | ((draws[r] == draws[undecided]) & (r > undecided))
-            rival = there & (host[r] == UNDECIDED) & above
-            host[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
+            near, drawn = gathered(host, r, OUT), gathered(draws, r, -1)
+            above = (drawn > draws[undecided]) | ((drawn == draws[undecided]) & (r > undecided))
+            beaten, rival = (near == IN).any(0), ((near == UNDECIDED) & above).any(0)
+            host[undecided] = np.where(beaten, OUT, np.where(rival, UNDECIDED, IN))
         return np.asarray(host == IN, np.uint8).reshape(active.shape)
     priority = machine.empty((sites,), np.uint32)
     state, following = (machine.empty(grid.shape, np.uint8) for _ in range(2))
     machine.launch(
         "luby_priority",
         (sites,),
-        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
+        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), np.uint64(begin), active, priority, state),
     )
     while True:
         for _ in range(ROUNDS):

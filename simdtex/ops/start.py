@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, gathered
 from simdtex.ops.neighbourhood import Field
 
 
@@ -33,16 +33,17 @@ def start(
 
     ``squares`` (n,) is given if the level above has a sample of half the size: the first pixel of each of its pixels'
     squares of 2x2 in this sample, of ``cols`` columns. Each site then takes a pixel of the square that the site of the
-    level above at or before it has, at temperature 0: pieces of the sample keep their arrangement.
+    level above at or before it has, at temperature 0: pieces of the sample keep their arrangement. A site below one
+    without a source has a given value, which is not set here: its source is -1, and its values are 0.
     """
     (channels, plane), shape = pixels.shape, grid.shape
     if machine is None and squares is not None:
         assert above
         row, col = (first + np.arange(n) for first, n in zip(grid.first, shape, strict=True))
         there = np.ix_(row // 2 - grid.first[0] // 2, col // 2 - grid.first[1] // 2)
-        source = squares[np.maximum(above.source[there], 0)] + (row % 2 * cols)[:, None] + col % 2
-        source = source.astype(np.int32)
-        return Field(pixels[:, source].astype(np.uint16), source, np.zeros(shape, np.uint16))
+        square = gathered(squares, above.source[there], -1)
+        source = np.where(square < 0, -1, square + (row % 2 * cols)[:, None] + col % 2).astype(np.int32)
+        return Field(gathered(pixels, source, 0).astype(np.uint16), source, np.zeros(shape, np.uint16))
     if machine is None:
         lo, hi, *_ = random.draw4(seed, 0, 0, grid.places(np.arange(grid.size)), random.START)
         source = positions[random.below(lo, hi, positions.size)].reshape(shape)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, gathered
 from simdtex.ops.neighbourhood import Field
 
 
@@ -15,7 +15,7 @@ def temperature(machine: Launcher | None, sites: Array, field: Field, offsets: A
     """Return the new temperatures of sites in 1/1024, (S,) uint16; ``xi`` is in 1/1024, too."""
     if machine is None:
         r = grid.neighbours(sites, offsets)
-        t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
+        t = gathered(field.temperature.ravel(), r, 0).astype(np.int32)
         members = np.maximum(1, (r >= 0).sum(0))
         return (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
     cooled = machine.empty((sites.size,), np.uint16)

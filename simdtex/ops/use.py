@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Launcher, Operation
 from simdtex.model.given import LEAST
-from simdtex.model.lattice import Grid, sums_around
+from simdtex.model.lattice import Grid, gathered, sums_around
 from simdtex.model.sample import Candidates
 from simdtex.ops.neighbourhood import Field
 
@@ -86,9 +86,7 @@ class Regions:
     def at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the region of each site of a lattice or a window of it."""
         found: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
-        if not self.bordered.any():
-            return found
-        apart = grid.near_edge(self.radius) & (found >= 0) & self.bordered[found]
+        apart = grid.near_edge(self.radius) & gathered(self.bordered, found, False)
         return np.where(apart, found + len(self.bordered), found)
 
     def wanted(self, grid: Grid) -> NDArray[np.float64]:
@@ -108,8 +106,8 @@ class Regions:
     def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
         kinds = len(self.p)
-        each = np.append(penalty, np.zeros(kinds, np.float32)).reshape(-1, kinds) * self.unit
-        found = soft[:kinds] + np.moveaxis(each[self.at(grid)], -1, 0)
+        each = penalty.reshape(-1, kinds) * self.unit
+        found = soft[:kinds] + gathered(each.T, self.at(grid), 0)
         return np.concatenate([found - found.min(0), soft[kinds:]])
 
 
@@ -121,8 +119,7 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
     """
     if machine is None:
         known = grid.latest(field.temperature) < 1024
-        source = grid.latest(field.source)[known]
-        number = candidates.index_of[source[source >= 0]]
+        number = candidates.number_of(grid.latest(field.source)[known])
         return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
     counts = machine.put(np.zeros(candidates.size, np.int32))
     sites = grid.size

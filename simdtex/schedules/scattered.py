@@ -93,7 +93,8 @@ class RandomSubset(Scattered):
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """Return each active site with probability p."""
         wanting = active.numbers()
-        bits = random.draw4(setting.seed, setting.level, steps, wanting, random.SCHEDULE)[0]
+        place = setting.grid.key[0] + wanting
+        bits = random.draw4(setting.seed, setting.level, steps, place, random.SCHEDULE)[0]
         return wanting[bits < self.p * 2.0**32]
 
 
@@ -114,7 +115,8 @@ class RandomScan(Scattered):
         """Return one of the active sites."""
         wanting = active.numbers()
         first, at = divmod(steps, AHEAD)
-        lo, hi = (bits[at : at + 1] for bits in _ahead(setting.seed, setting.level, first * AHEAD))
+        ahead = _ahead(setting.seed, setting.level, first * AHEAD, setting.grid.key[0])
+        lo, hi = (bits[at : at + 1] for bits in ahead)
         return wanting[random.below(lo, hi, wanting.size)]
 
 
@@ -122,7 +124,7 @@ AHEAD = 1024
 
 
 @lru_cache(maxsize=8)
-def _ahead(seed: int, level: int, first: int) -> list[NDArray[np.uint32]]:
+def _ahead(seed: int, level: int, first: int, begin: int) -> list[NDArray[np.uint32]]:
     """Return random bits of many steps; a call for each step would take a hundred times as long."""
     steps = first + np.arange(AHEAD)
-    return random.draw4(seed, level, steps, np.zeros(AHEAD), random.SCHEDULE)[:2]
+    return random.draw4(seed, level, steps, np.full(AHEAD, begin), random.SCHEDULE)[:2]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from simdtex.methods.mrf.level import Lattices, with_penalty
 from simdtex.model.explanation import Explanation, Neighbours, Ranked
-from simdtex.model.lattice import MOST_ORDER, neighbourhood_offsets
+from simdtex.model.lattice import MOST_ORDER, gathered, neighbourhood_offsets
 from simdtex.ops import lcpdf
 from simdtex.ops.costs import continuing
 from simdtex.ops.neighbourhood import Field, near
@@ -165,10 +165,11 @@ def _neighbours(
         r, source, offsets = (np.pad(array, ((0, 1), (0, 0))) for array in (r, source, offsets))
         r[-1], source[-1] = pixel, -1
     there, made = r >= 0, len(values[0]) - relaxation.confidences.guides
-    pixels = sample.picture(values[:, :made].transpose(1, 0, 2), field.source.ravel()[r])[:, 0]
+    pixels = sample.picture(values[:, :made].transpose(1, 0, 2), gathered(field.source.ravel(), r, -1))[:, 0]
     if given:
-        own = grid.places(r[:, 0] % grid.size)
-        known, told = (one.reshape(-1, one.shape[-1])[own] for one in (given.known, given.values))
+        number = np.where(there, r % grid.size, -1)[:, 0]
+        planes = (grid.decimated(np.moveaxis(one, -1, 0)) for one in (given.known, given.values))
+        known, told = (gathered(plane.reshape(len(plane), -1), number, 0).T for plane in planes)
         pixels = np.where(known, told, pixels)
     neighbours = Neighbours(
         offsets=offsets.astype(np.int32),

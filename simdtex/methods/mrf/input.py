@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ class Input:
 
     A pixel of ``sample`` and a site of X are means over squares of ``reduction`` pixels. ``coarser`` is the input, of
     half the size, of levels whose spacing is twice the reduction or more; if it is None, they have this input, too.
+    ``key`` is the number of the first pixel of X in a larger output, and the columns of that; (0, 0): X is the output.
     """
 
     sample: Sample
@@ -41,6 +42,7 @@ class Input:
     remedy: str = SMALLER
     reduction: int = 1
     coarser: Input | None = None
+    key: tuple[int, int] = (0, 0)
 
     @property
     def kinds(self) -> Soft | None:
@@ -58,7 +60,8 @@ class Input:
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the sample."""
-        return Grid.of(self.shape, 2**number // self.reduction, self.options.boundary == "torus")
+        grid = Grid.of(self.shape, 2**number // self.reduction, self.options.boundary == "torus")
+        return replace(grid, key=(*self.key, self.reduction)) if self.key[1] else grid
 
     def of(self, number: int) -> Input:
         """Return the input of a level: this one, or a coarser one."""

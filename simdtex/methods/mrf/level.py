@@ -162,12 +162,14 @@ class Lattices:
     def squares(self) -> NDArray[np.int32] | None:
         """The first pixel of the square of each pixel of the sample of half the size; None if there is no such sample.
 
-        If there is one, the level above has it, and the only level of this sample begins with its arrangement.
+        If there is one, the level above has it, and the only level of this sample begins with its arrangement. -1 for
+        pixels that no site has: those of the margin, and those that are unknown or may not be taken.
         """
         if not self.coarser:
             return None
         coarser = self.coarser.sample
-        return self.sample.index(coarser.place(np.arange(coarser.rows * coarser.cols, dtype=np.int32)))
+        first = self.sample.index(coarser.place(np.arange(coarser.inside.size, dtype=np.int32)))
+        return np.where(coarser.inside.ravel(), first, np.int32(-1))
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the level's sample."""
