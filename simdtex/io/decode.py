@@ -16,7 +16,7 @@ import PIL.Image
 from numpy.typing import NDArray
 
 from simdtex.io import rasters
-from simdtex.io.files import Refused, check_array, check_size, needs, quiet, read_npy
+from simdtex.io.files import Refused, check_array, check_beside, check_size, needs, quiet, read_npy
 
 Array = NDArray[Any]
 
@@ -364,6 +364,7 @@ def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[floa
         if not (found := _pictures(tiff)):
             raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
         series, page, axes = found[0], found[0].keyframe, found[0].axes
+        check_beside(path, (one.parent.filehandle.path for one in series.pages if one.parent is not tiff))
         if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):
             raise Refused("has pages of several sizes or types: save a stack of pages of one")
         layers, variables = ("".join(axis for axis in axes if axis in kind) for kind in ("ZIQ", "CS"))

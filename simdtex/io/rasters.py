@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.files import Refused, check_array, needs, quiet
+from simdtex.io.files import Refused, check_array, check_beside, needs, quiet
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]
@@ -118,6 +118,11 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         in_memory = isinstance(source, bytes)
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
         raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
+        if not in_memory:
+            own = [Path(where).with_suffix(".mp#")] * (raster.driver == "ILWIS")
+            check_beside(where, [*raster.files, *own])
+            if own and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(where).read_bytes()):
+                raise Refused("is a list of maps of ILWIS: give one of its maps")
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
         pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
@@ -199,6 +204,8 @@ def read_netcdf(path: PathLike, most: int) -> Library:
 
     with open(path, "rb") as file:
         classic = file.read(3) == b"CDF"
+    if not classic:
+        _check_own(path)
     how: dict[str, Any] = {"engine": "scipy"} if classic else {"engine": "h5netcdf", "phony_dims": "access"}
     with xarray.open_dataset(os.fspath(path), decode_times=False, **how) as data:
         guessed = data.cf.guess_coord_axis().cf
@@ -229,6 +236,24 @@ def read_netcdf(path: PathLike, most: int) -> Library:
     told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
     return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))), told
+
+
+def _check_own(path: PathLike) -> None:
+    """Raise Refused if a link or the values of a dataset of HDF5 are in another file."""
+    import h5py
+
+    with h5py.File(path) as file:
+
+        def found(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
+            one = file[name] if isinstance(link, h5py.HardLink) else None
+            other = not isinstance(link, (h5py.HardLink, h5py.SoftLink))
+            if isinstance(one, h5py.Dataset):
+                parts = one.virtual_sources() if one.is_virtual else ()
+                other = bool(one.external) or any(part.file_name != "." for part in parts)
+            return name if other else None
+
+        if (name := file.visititems_links(found)) is not None:
+            raise Refused(f"takes {name[:100]} from another file: save all values in one file")
 
 
 def cf_attributes(array: Any) -> dict[str, str]:
