@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 import warnings
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import product
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -38,6 +39,9 @@ NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 
 TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How TIFF files begin."""
+
+MOST_PAGES = 2**16
+"""The most pages of a TIFF, with smaller copies of each."""
 
 _TAGS = (33550, 33922, 34264, 34735, 42113)
 """TIFF tags of georeference and no-data."""
@@ -89,15 +93,37 @@ def axis_of(name: str) -> str | None:
     return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
 
 
-def is_raster(file: BinaryIO) -> bool:
-    """Return whether a TIFF has georeference, no-data or a mask, which the reader of pictures would not heed."""
+@contextmanager
+def open_tiff(file: Any) -> Iterator[Any]:
+    """Open a TIFF; raise Refused if its directories are more than `MOST_PAGES`, or lead back to an earlier one."""
     import tifffile
 
+    with tifffile.TiffFile(file, _multifile=False) as tiff:
+        form, data, at, count, seen = tiff.tiff, tiff.filehandle, tiff.pages.first.offset, 0, set[int]()
+        with suppress(struct.error):  # a damaged directory after the first, at which all readers stop
+            while at:
+                seen.add(at)
+                data.seek(at)
+                (tags,) = struct.unpack(form.tagnoformat, data.read(form.tagnosize))
+                entries = data.read(tags * form.tagsize)
+                (at,) = struct.unpack(form.offsetformat, data.read(form.offsetsize))
+                count += 1
+                for k in range(0, len(entries), form.tagsize):
+                    if struct.unpack_from(form.tagformat1, entries, k)[0] == 330:  # SubIFDs
+                        count += struct.unpack_from(form.tagformat2, entries, k + 4)[0]
+                if at in seen or count > MOST_PAGES:
+                    raise Refused(f"has more than {MOST_PAGES} pages, or a page twice: save the picture alone")
+        yield tiff
+
+
+def is_raster(file: BinaryIO) -> bool:
+    """Return whether a TIFF has georeference, no-data or a mask, which the reader of pictures would not heed."""
     file.seek(0)
     try:
-        with quiet(), tifffile.TiffFile(file) as tiff:
-            pages: Any = tiff.pages
-            return any(tag in pages.first.tags for tag in _TAGS) or any(page.subfiletype & 4 for page in pages)
+        with quiet(), open_tiff(file) as tiff:
+            return any(tag in tiff.pages.first.tags for tag in _TAGS) or any(
+                page.subfiletype & 4 for page in tiff.pages
+            )
     except Exception:  # the reader of pictures reports the error
         return False
 
