@@ -16,7 +16,7 @@ import PIL.Image
 from numpy.typing import NDArray
 
 from simdtex.io import rasters
-from simdtex.io.files import Refused, check_array, check_size, needs, quiet, read_npy
+from simdtex.io.files import Refused, check_array, check_beside, check_size, needs, quiet, read_npy
 
 Array = NDArray[Any]
 
@@ -311,7 +311,7 @@ def _pictures(tiff: Any) -> list[Any]:
 def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
     import tifffile
 
-    with tifffile.TiffFile(io.BytesIO(data), _multifile=False) as tiff:
+    with rasters.open_tiff(io.BytesIO(data)) as tiff:
         page, more, found = tiff.pages.first, tiff.pages.is_multipage, _pictures(tiff)
         if found:
             page, more = found[0].keyframe, len(found) > 1 or prod(found[0].shape) > prod(found[0].keyframe.shape)
@@ -350,9 +350,7 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
 
 def is_stack(path: Any) -> bool:
     """Return whether a TIFF has layers, or several variables as pages."""
-    import tifffile
-
-    with quiet(), tifffile.TiffFile(path, _multifile=False) as tiff:
+    with quiet(), rasters.open_tiff(path) as tiff:
         if not (found := _pictures(tiff)):
             return bool(tiff.pages.is_multipage or tiff.is_imagej)
         return not set(found[0].axes) <= set("YXS")
@@ -364,12 +362,11 @@ def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[floa
     Pixels are shown as those of pictures are, but palettes give their indices, and alpha is kept. The place is the
     origin, 0, and the size of a cell (x, y, z).
     """
-    import tifffile
-
-    with tifffile.TiffFile(path, _multifile=False) as tiff:
+    with rasters.open_tiff(path) as tiff:
         if not (found := _pictures(tiff)):
             raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
         series, page, axes = found[0], found[0].keyframe, found[0].axes
+        check_beside(path, (one.parent.filehandle.path for one in series.pages if one.parent is not tiff))
         if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):
             raise Refused("has pages of several sizes or types: save a stack of pages of one")
         layers, variables = ("".join(axis for axis in axes if axis in kind) for kind in ("ZIQ", "CS"))

@@ -85,6 +85,14 @@ def needs(library: str, extra: str, what: str) -> None:
         raise Refused(f"is {what}: pip install 'simdtex[{extra}]' to read it")
 
 
+def check_beside(path: PathLike, others: Iterable[PathLike]) -> None:
+    """Raise Refused unless all files to which a file refers are in its folder, also if they are links."""
+    folders = Path(os.path.realpath(path)).parent, Path(path).parent.resolve()
+    for one in map(os.path.realpath, others):
+        if Path(one).parent not in folders:
+            raise Refused(f"refers to {one} in another folder: save all values in one file")
+
+
 @contextmanager
 def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
     """Check a regular file and yield the most pixels to read; errors of the block name the file and a remedy.

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 import warnings
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import product
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -18,7 +19,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.files import Refused, check_array, needs, quiet
+from simdtex.io.files import Refused, check_array, check_beside, needs, quiet
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]
@@ -41,6 +42,9 @@ TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """The transform of a raster without georeference."""
+
+MOST_PAGES = 2**16
+"""The most pages of a TIFF, with smaller copies of each."""
 
 _TAGS = (33550, 33922, 34264, 34735, 42113)
 """TIFF tags of georeference and no-data."""
@@ -98,15 +102,37 @@ def axis_of(name: str) -> str | None:
     return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
 
 
-def is_raster(file: BinaryIO) -> bool:
-    """Return whether a TIFF has georeference, no-data or a mask, which the reader of pictures would not heed."""
+@contextmanager
+def open_tiff(file: Any) -> Iterator[Any]:
+    """Open a TIFF; raise Refused if its directories are more than `MOST_PAGES`, or lead back to an earlier one."""
     import tifffile
 
+    with tifffile.TiffFile(file, _multifile=False) as tiff:
+        form, data, at, count, seen = tiff.tiff, tiff.filehandle, tiff.pages.first.offset, 0, set[int]()
+        with suppress(struct.error):  # a damaged directory after the first, at which all readers stop
+            while at:
+                seen.add(at)
+                data.seek(at)
+                (tags,) = struct.unpack(form.tagnoformat, data.read(form.tagnosize))
+                entries = data.read(tags * form.tagsize)
+                (at,) = struct.unpack(form.offsetformat, data.read(form.offsetsize))
+                count += 1
+                for k in range(0, len(entries), form.tagsize):
+                    if struct.unpack_from(form.tagformat1, entries, k)[0] == 330:  # SubIFDs
+                        count += struct.unpack_from(form.tagformat2, entries, k + 4)[0]
+                if at in seen or count > MOST_PAGES:
+                    raise Refused(f"has more than {MOST_PAGES} pages, or a page twice: save the picture alone")
+        yield tiff
+
+
+def is_raster(file: BinaryIO) -> bool:
+    """Return whether a TIFF has georeference, no-data or a mask, which the reader of pictures would not heed."""
     file.seek(0)
     try:
-        with quiet(), tifffile.TiffFile(file) as tiff:
-            pages: Any = tiff.pages
-            return any(tag in pages.first.tags for tag in _TAGS) or any(page.subfiletype & 4 for page in pages)
+        with quiet(), open_tiff(file) as tiff:
+            return any(tag in tiff.pages.first.tags for tag in _TAGS) or any(
+                page.subfiletype & 4 for page in tiff.pages
+            )
     except Exception:  # the reader of pictures reports the error
         return False
 
@@ -128,6 +154,11 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         in_memory = isinstance(source, bytes)
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
         raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
+        if not in_memory:
+            own = [Path(where).with_suffix(".mp#")] * (raster.driver == "ILWIS")
+            check_beside(where, [*raster.files, *own])
+            if own and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(where).read_bytes()):
+                raise Refused("is a list of maps of ILWIS: give one of its maps")
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
         pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
@@ -212,6 +243,8 @@ def read_netcdf(path: PathLike, most: int) -> Library:
 
     with open(path, "rb") as file:
         classic = file.read(3) == b"CDF"
+    if not classic:
+        _check_own(path)
     how: dict[str, Any] = {"engine": "scipy"} if classic else {"engine": "h5netcdf", "phony_dims": "access"}
     with xarray.open_dataset(os.fspath(path), decode_times=False, **how) as data:
         guessed = data.cf.guess_coord_axis().cf
@@ -242,6 +275,24 @@ def read_netcdf(path: PathLike, most: int) -> Library:
     told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
     return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))), told
+
+
+def _check_own(path: PathLike) -> None:
+    """Raise Refused if a link or the values of a dataset of HDF5 are in another file."""
+    import h5py
+
+    with h5py.File(path) as file:
+
+        def found(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
+            one = file[name] if isinstance(link, h5py.HardLink) else None
+            other = not isinstance(link, (h5py.HardLink, h5py.SoftLink))
+            if isinstance(one, h5py.Dataset):
+                parts = one.virtual_sources() if one.is_virtual else ()
+                other = bool(one.external) or any(part.file_name != "." for part in parts)
+            return name if other else None
+
+        if (name := file.visititems_links(found)) is not None:
+            raise Refused(f"takes {name[:100]} from another file: save all values in one file")
 
 
 def cf_attributes(array: Any) -> dict[str, str]:

@@ -32,6 +32,7 @@ from simdtex.io.files import (
     Refused,
     atomic_folder,
     atomic_path,
+    check_beside,
     check_folder_writable,
     check_size,
     check_target,
@@ -210,8 +211,9 @@ def _raw(path: Path, most: int) -> _Read:
 def _beside(path: Path, name: str, most: int) -> bytes:
     """Return the data of the file that a header names, a file of its own folder within the limits."""
     file = path.with_name(Path(name).name or "..")
-    if file.name != name or name == "LIST" or "%" in name or file.resolve().parent != path.resolve().parent:
+    if file.name != name or name == "LIST" or "%" in name:
         raise Refused(f"names the data file {name[:100]!r}: put the data into one file in the folder of the header")
+    check_beside(path, [file])
     with reading(file, "the data file", most):
         return file.read_bytes()
 
