@@ -267,7 +267,7 @@ def _made(store: PathLike) -> Iterator[str]:
     path = Path(store)
     if path.exists():
         raise ValueError(
-            f"{path} is there already; remove it, give another name, or continue with: simdtex resume {path}"
+            f"{path} is there already; give another name, or continue with: simdtex resume {path}"
         )
     if not path.parent.is_dir():
         raise ValueError(f"the folder {path.parent} does not exist; make it first")
