@@ -237,7 +237,7 @@ def empty(path):
 @pytest.mark.parametrize("damage", [cut, flipped, empty])
 def test_a_damaged_checkpoint_says_so(damage, file):
     damage(stopped(file))
-    refused(file, "is no checkpoint, or is damaged; give another file, or begin anew with a new name")
+    refused(file, "is no checkpoint, or is damaged; give another file, or begin anew")
 
 
 def test_nothing_is_unpickled(file):

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 SHEET = 4096
 """The most pixels a side of a picture of copies; a larger one is reduced."""
 
-TABLES = (".csv", ".tsv", ".txt", ".dat")
-"""How the name of a table of known values ends; a file of any other name is a picture."""
-
 
 class Reading(NamedTuple):
     """How files are read.
@@ -368,10 +365,10 @@ def read_map(path: Path, files: Files) -> HardData | NDArray[Any]:
 def read_table(path: Path, how: Reading) -> HardData | None:
     """Read a table of data; None if a file is none, by its content if that is a grid or a point set, else its name."""
     from simdtex.io import grids
-    from simdtex.io.hard_data import read_hard_data
+    from simdtex.io.hard_data import SUFFIXES, read_hard_data, suffix_of
 
     kind = grids.kind_of(path)
-    if kind != "points" and (kind is not None or path.suffix.lower() not in TABLES):
+    if kind != "points" and (kind is not None or suffix_of(path) not in SUFFIXES):
         return None
     return read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=how.valid)
 

@@ -83,7 +83,9 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
         for other in folders[1:]:
             own = [one for one, known in other.found.files.items() if known == role]
             if not own:
-                raise ValueError(f"{other.lead.parent} has no {role} map and {path.parent} has one; add it, or move that elsewhere")
+                raise ValueError(
+                    f"{other.lead.parent} has no {role} map and {path.parent} has one; add it, or move that"
+                )
             those.append(own[0])
         found.append(read_material(those))
         if found[-1].sizes != lead.sizes:

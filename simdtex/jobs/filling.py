@@ -186,7 +186,9 @@ def extend(call: Extend) -> Work:
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
     if 2 * across >= cols or 2 * along >= rows:
-        raise ValueError(f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one, or a larger picture")
+        raise ValueError(
+            f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one, or a larger picture"
+        )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
