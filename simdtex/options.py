@@ -409,7 +409,7 @@ LARGEST = 1e100
 
 def moderate(name: str, *arrays: NDArray[Any]) -> None:
     """Raise ValueError if arrays have values beyond `LARGEST`."""
-    if any(np.abs(array, dtype=np.float64).max() > LARGEST for array in arrays):
+    if any(max(float(array.max()), -float(array.min())) > LARGEST for array in arrays):
         raise ValueError(f"{name} has values beyond {LARGEST:g}: give them in a larger unit")
 
 

@@ -422,7 +422,7 @@ def _may_be_lit(call: Fill, options: Options, known: NDArray[Any]) -> bool:
     The trend is of the whole picture, does not wrap around, and changes pixels.
     """
     whole, tones = call.reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
-    return whole and tones and options.finish != 0 and bool(np.abs(known, dtype=np.float64).max() <= EXACT)
+    return whole and tones and options.finish != 0 and max(float(known.max()), -float(known.min())) <= EXACT
 
 
 def _fewest_levels(pictures: Pictures) -> int:
