@@ -483,6 +483,13 @@ def test_bad_input_to_fill_is_refused_with_a_remedy(case):
     assert "\n" not in str(caught.value)
 
 
+def test_the_remedy_for_a_picture_with_scattered_holes_works():
+    image, hole = texture((40, 40)), np.random.default_rng(0).random((40, 40)) < 0.7
+    with pytest.raises(ValueError, match="a smaller order, such as order=2,"):
+        fill(image, hole, order=18)
+    assert (fill(image, hole, order=2)[~hole] == image[~hole]).all()
+
+
 BAD_EXTEND = {
     "nothing to add": ({}, ValueError, "nothing to add; give top, bottom, left or right, or seamless=True"),
     **{side: ({side: -3}, ValueError, f"{side} is -3; give 0 or more") for side in ("top", "bottom", "left", "right")},

@@ -499,6 +499,10 @@ class Folder:
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
+        self.note_unknown()
+
+    def note_unknown(self) -> None:
+        """Say which pictures of the folder are left out."""
         if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
             note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
 
