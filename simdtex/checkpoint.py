@@ -250,7 +250,7 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
     try:
         about, tree = read_state(path)
     except Damaged:
-        raise ValueError(f"{path} is no checkpoint, or is damaged; remove it, and run the command again") from None
+        raise ValueError(f"{path} is no checkpoint, or is damaged; give another file, or begin anew") from None
     except OSError as error:
         raise ValueError(f"{path} cannot be read ({error.strerror}); give another file") from None
     check_version(f"the checkpoint {path}", about, FORMAT)

@@ -104,14 +104,16 @@ class Switch:
 
 @dataclass(frozen=True)
 class Numbers:
-    """A tuple of numbers of 0 or more, one of which is above 0."""
+    """A tuple of numbers from 0 to ``most``, one of which is above 0; relative numbers may be counts up to 2**53."""
+
+    most: float = GREATEST
 
     def check(self, name: str, value: Any) -> None:
         """Raise unless the value is such a tuple."""
         if not isinstance(value, tuple) or not value:
             raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
         for number in value:
-            real(f"one of {name}", number, 0)
+            real(f"one of {name}", number, 0, self.most)
         if not any(value):
             raise ValueError(f"{name} are all 0; give a number above 0")
 
@@ -407,7 +409,7 @@ LARGEST = 1e100
 
 def moderate(name: str, *arrays: NDArray[Any]) -> None:
     """Raise ValueError if arrays have values beyond `LARGEST`."""
-    if any(np.abs(array, dtype=np.float64).max() > LARGEST for array in arrays):
+    if any(max(float(array.max()), -float(array.min())) > LARGEST for array in arrays):
         raise ValueError(f"{name} has values beyond {LARGEST:g}: give them in a larger unit")
 
 

@@ -182,7 +182,7 @@ def test_another_device_is_noted(whole, file):
 def test_other_paths_are_refused(tmp_path):
     photo = tmp_path / "photo.png"
     photo.write_bytes(b"mine")
-    refused(photo, r"photo.png is no checkpoint, or is damaged; remove it")
+    refused(photo, r"photo.png is no checkpoint, or is damaged; give another file")
     refused(tmp_path, "is a folder: add a file name")
     refused(tmp_path / "a" / "b", "does not exist: create it first")
     with pytest.raises(ValueError, match="every is -1"):
@@ -237,7 +237,7 @@ def empty(path):
 @pytest.mark.parametrize("damage", [cut, flipped, empty])
 def test_a_damaged_checkpoint_says_so(damage, file):
     damage(stopped(file))
-    refused(file, "is no checkpoint, or is damaged; remove it, and run the command again")
+    refused(file, "is no checkpoint, or is damaged; give another file, or begin anew")
 
 
 def test_nothing_is_unpickled(file):

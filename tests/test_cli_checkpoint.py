@@ -163,7 +163,7 @@ def test_what_is_no_checkpoint(place):
     refused("nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
     (place / "other").mkdir()
     refused("other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
-    refused("sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")
+    refused("sample.png is no checkpoint, or is damaged; give another file", "resume", "sample.png")
     refused("sample.png is an input and would be overwritten", *SYNTH, "--checkpoint", "sample.png")
     refused("out.png would be written twice", *SYNTH, "--checkpoint", "out.png")
 
@@ -180,7 +180,7 @@ def test_what_was_begun_elsewhere(place, monkeypatch):
     edited(about["command"] | {"folder": "/nowhere"})
     refused("/nowhere, the folder of the run in kept, does not exist; restore it", "resume", "kept")
     edited(about["command"] | {"name": "bench"})
-    refused("is of a command that cannot be resumed; remove", "resume", "kept")
+    refused("is of a command that cannot be resumed; run that", "resume", "kept")
     edited(None)
     refused("was started in Python; make the same call with checkpoint='kept'", "resume", "kept")
 

@@ -197,7 +197,7 @@ def test_a_dry_run_counts_the_arrays_of_the_store(folder):
         ),
         (["-o", "o.zarr", "--tiles", 16, "--schedule", "raster"], "schedule raster needs the whole output at once"),
         (["-o", "no/o.zarr", "--tiles", 16], "does not exist; make it first"),
-        (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or continue with"),
+        (["-o", "there.zarr", "--tiles", 16], "is there already; give another name, or continue with"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--workers", "nonsense://a"],
             "no scheduler answers at nonsense://a; start one",

@@ -56,9 +56,10 @@ def test_choose(text, index):
     assert device.choose(text, LISTING) is LISTING[index]
 
 
-def test_choose_prefers_the_whole_name():
-    listing = [fake(0, "Ultra"), fake(1, "Ultra Max")]
-    assert device.choose("ultra", listing) is listing[0]
+def test_choose_prefers_the_whole_name_then_the_platform():
+    listing = [fake(0, "Ultra"), fake(1, "Ultra Max"), fake(2, "cpu-Intel(R) Xeon", "PoCL"), fake(3, "Xeon", "Intel")]
+    for text, index in (("ultra", 0), ("ultra max (acme opencl)", 1), (str(listing[2]), 2), ("intel", 3)):
+        assert device.choose(text, listing) is listing[index]
 
 
 @pytest.mark.parametrize(

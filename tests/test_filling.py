@@ -401,6 +401,12 @@ def test_the_default_band_is_replaced():
     assert not changed[band_of(image[..., None]) : -band_of(image[..., None])].any()
 
 
+@pytest.mark.parametrize("shape", [(16, 16), (4, 5), (9, 17), (16, 60)])
+def test_half_of_a_small_picture_is_kept_by_default(shape):
+    image, middle = texture(shape), tuple(slice(side // 4, side - side // 4) for side in shape)
+    assert np.array_equal(extend(image, seamless=True, finish=0.0, order=1)[middle], image[middle])
+
+
 @pytest.mark.slow
 def test_bricks_stay_whole_across_the_seam(any_device):
     """Of a wall whose width is no multiple of a brick; on a deformed lattice no joint would meet another."""
@@ -475,6 +481,13 @@ def test_bad_input_to_fill_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         fill(**arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_the_remedy_for_a_picture_with_scattered_holes_works():
+    image, hole = texture((40, 40)), np.random.default_rng(0).random((40, 40)) < 0.7
+    with pytest.raises(ValueError, match="a smaller order, such as order=2,"):
+        fill(image, hole, order=18)
+    assert (fill(image, hole, order=2)[~hole] == image[~hole]).all()
 
 
 BAD_EXTEND = {

@@ -769,7 +769,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
         ("none/many.nc", "the folder .* does not exist"),
         ("none/many.zarr", "the folder .* does not exist"),
         ("folder.nc", "is a folder"),
-        *((name, "exists already: remove it, or") for name in ("empty.zarr", "photos.zarr", "file.zarr")),
+        *((name, "exists already: give a new name") for name in ("empty.zarr", "photos.zarr", "file.zarr")),
     ):
         refused_realisations(tmp_path / name, words)
     assert os.listdir(tmp_path / "photos.zarr") == ["a.png"]
@@ -856,6 +856,6 @@ def test_no_store_is_replaced(tmp_path):
     path = tmp_path / "lab.zarr"
     write_realisations(path, some())
     before = {one: one.is_file() and one.read_bytes() for one in path.rglob("*")}
-    with pytest.raises(ValueError, match=r"lab.zarr exists already: remove it, or give a new name for the store$"):
+    with pytest.raises(ValueError, match=r"lab.zarr exists already: give a new name for the store$"):
         write_realisations(path, some())
     assert {one: one.is_file() and one.read_bytes() for one in path.rglob("*")} == before

@@ -1,6 +1,8 @@
 """Hard data comes from a table to its sites, and what is wrong with it is named with its line."""
 
 import doctest
+import gzip
+from importlib.util import find_spec
 
 import numpy as np
 import pandas
@@ -30,6 +32,15 @@ SAME = [
     "# wells of 2019, in pixels\n\nx  y  facies # the last one is a guess\n  1 2  3\n\n 4.5   -.25 60 #\n",
     '"x","y","facies"\n"1","2","3"\n4.5,-0.25,"60"\n',
     "\ufeffx,y,facies\n1,2,3\n4.5,-0.25,60\n",
+    # Excel, also of Germany, numpy.savetxt, and people
+    "x;y;facies\n1;2;3\n4,5;-0,25;6,0e1\n",
+    "sep=;\nx;y;facies\n1.0;2;3\n4.5;-0.25;60\n;;\n",
+    'x,y,facies\n1,2,3\n"4,5","-0,25",60\n,,\n',
+    "x , y , facies\n(m), m , -\n1 , 2 , 3\n4.5 , -0.25 , 60\n",
+    "# written by numpy\n# y x facies\n2 1 3\n-0.25 4.5 60\n",
+    "# y (m), x (m), facies\n2,1,3 # a, b\n-0.25,4.5,60\n",
+    "wells\n3\nx    m\ny\tm\nfacies\n1, 2, 3\n4.5, -0.25, 60\n",
+    "#,x,y,facies\n7,1,2,3\n8,4.5,-0.25,60\n",
 ]
 
 
@@ -42,7 +53,7 @@ def test_a_table_is_the_same_however_it_is_written(tmp_path, text):
     assert len(data) == 2
 
 
-@pytest.mark.parametrize("text", ["1,2,3\n4,5,6\n", "1 2 3\n4 5 6\n", "#x y facies\n1;2;3\n4;5;6\n"])
+@pytest.mark.parametrize("text", ["1,2,3\n4,5,6\n", "1 2 3\n4 5 6\n", "#three nice wells\n1;2;3\n4;5;6\n"])
 def test_a_header_is_optional(tmp_path, text):
     data = read_hard_data(table(tmp_path, text, "wells.txt"))
     assert (data.points.tolist(), data.values.tolist()) == ([[1, 2], [4, 5]], [[3], [6]])
@@ -77,7 +88,10 @@ def test_numbers_are_read_to_the_last_digit(tmp_path_factory, rows):
             "line 2 has 'sand' in column 3, .* leave the cell .* empty, or .*of categories \\(--cat",
         ),
         ("1,2,3\n1,,3\n", "line 2 has '' in column 2, which is no number: write"),
-        ("1,5;2,5;3\n", "line 1 has '1,5' in column 1, .* decimal point$"),
+        ("1,5;2,5;3.5\n", "the comma of '1,5' may be one of thousands: write .* decimal point only$"),
+        ('x,y,v\n"1,500","2,500",3\n', "the comma of '1,500' may be one of thousands"),
+        ("x,y,v\n1,5,2,5,0,25\n", "line 2 has 6 cells and those before it 3"),
+        ("# northing foo v\n1 2 3\n", "no column of northing, foo, v is called x"),
         ("depth,por,facies\n1,2,3\n", "no column of depth, por, facies is called x, .* --columns x=depth"),
         ("x,y\n1,2\n", "line 1 has 2 cells: give x, y and one value or more"),
         ("x,lon,y,v\n1,2,3,4\n", "the columns x and lon both mean x: choose one by its name, as .* --columns"),
@@ -169,6 +183,44 @@ def test_a_data_frame_is_a_table(tmp_path):
     for data in (read_hard_data(frame), read_hard_data(tmp_path / "a.csv")):
         assert data.points.tolist() == [[1, 2], [4.5, 5]] and data.values.tolist() == [[3], [60]]
     assert data.lines == (2, 3)
+
+
+@pytest.mark.filterwarnings("ignore:left out")
+def test_pandas_writes_the_same_table_in_every_format(tmp_path):
+    rng, wells = np.random.default_rng(1), [f"A#{k}, of # {k}" for k in range(50)]
+    frame = pandas.DataFrame({"well": wells, "y": rng.random(50, "f4"), "x": rng.random(50), "facies": range(50)})
+    frame["facies"] = frame["facies"].astype("Int64").where(frame.index != 7)
+    frame.to_csv(tmp_path / "a.csv", sep=";", decimal=",")
+    frame.to_csv(tmp_path / "a.csv.gz")
+    frame.to_excel(tmp_path / "a.xlsx")
+    tables = [frame, frame.set_index("x"), tmp_path / "a.csv", tmp_path / "a.csv.gz", tmp_path / "a.xlsx"]
+    if find_spec("pyarrow"):
+        frame.set_index("y").to_parquet(tmp_path / "a.parquet")
+        tables.append(tmp_path / "a.parquet")
+    for data in map(read_hard_data, tables):
+        np.testing.assert_allclose(data.points, frame[["x", "y"]], rtol=1e-7)
+        assert data.names == ("facies",) and np.isnan(data.values[7]) and len(data) == 50
+    with pandas.ExcelWriter(tmp_path / "a.xlsx") as file:
+        for sheet in ("north", "south"):
+            frame.to_excel(file, sheet_name=sheet)
+    with pytest.warns(DataWarning, match="only the first of the sheets north, south is read"):
+        read_hard_data(tmp_path / "a.xlsx")
+
+
+def test_tables_that_are_not_read_are_named(tmp_path, monkeypatch):
+    for name, words in (("a.las", "well log"), ("a.ods", "spreadsheet")):
+        with pytest.raises(ValueError, match=rf"{words}.*, which is not read: write .* \(\.csv\)$"):
+            read_hard_data(table(tmp_path, "~V", name))
+    for name, content in (("a.xlsx", b"PK"), ("a.csv.gz", gzip.compress(b"x,y,v\n1,2,3")[:-9])):
+        with pytest.raises(ValueError, match=rf"{name}.*damaged"):
+            read_hard_data(table(tmp_path, content, name))
+    with pytest.raises(ValueError, match="no more than 9 are read"):
+        read_hard_data(table(tmp_path, gzip.compress(bytes(10**5)), "a.csv.gz"), max_pixels=9)
+    with pytest.warns(DataWarning, match="line 2 begins with #, and is left out"):
+        assert len(read_hard_data(table(tmp_path, "x,y,v\n#1,2,3\n4,5,6\n"))) == 1
+    monkeypatch.setattr("simdtex.io.files.find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"is a table in \.xlsx: pip install 'simdtex\[tables\]'"):
+        read_hard_data(table(tmp_path, "", "a.xlsx"))
 
 
 @pytest.mark.parametrize("code", [*MISSING, 1e21, -1e21])

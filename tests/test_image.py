@@ -294,6 +294,10 @@ def test_openexr(tmp_path):
     stored = np.concatenate([values[..., :3] * values[..., 3:], values[..., 3:]], -1)
     exr.File(header, {"RGBA": stored}).write(str(tmp_path / "a.exr"))
     np.testing.assert_allclose(image.read(tmp_path / "a.exr").pixels, values, rtol=1e-6)
+    image.write(tmp_path / "b.exr", values)
+    np.testing.assert_array_equal(exr.File(str(tmp_path / "b.exr")).channels()["RGBA"].pixels, stored)
+    image.write(tmp_path / "c.exr", values[..., 2:])
+    np.testing.assert_allclose(image.read(tmp_path / "c.exr").pixels, values[..., 2:], rtol=1e-6)
     first = np.ascontiguousarray(values[..., 0])
     exr.File(header, {"height": first}).write(str(tmp_path / "a.exr"))
     np.testing.assert_array_equal(image.read(tmp_path / "a.exr").pixels, first)
@@ -316,6 +320,7 @@ def test_openexr(tmp_path):
         (b"II*\0\x10\0\0\0CR\2\0" + bytes(40), "is a camera's raw file: develop it"),
         (b"\0\0\0\x18ftypcrx " + bytes(40), "is a camera's raw file: develop it"),
         (bytes(128) + b"DICM" + bytes(40), "is a DICOM picture: convert it to NRRD"),
+        (b"II*\0\x54\x18\x08\0" + bytes(120) + b"DICM" + bytes(40), "is a DICOM picture: convert it to NRRD"),
         (b"NRRD0004\n", "is a volume .*: simdtex simulate reads it"),
         (b'<?xml version="1.0"?>\n<VTKFile type="ImageData">', "is a volume .*: simdtex simulate reads it"),
         (b"PK\3\4" + bytes(40), "is an archive .*: unpack it"),

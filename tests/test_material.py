@@ -65,6 +65,9 @@ NAMES = {
     "T_Rock_BC.png": "albedo",
     "T_Rock_N.png": "normal",
     "T_Rock_ORM.png": "packed",
+    "rock_OcclusionRoughMetal.png": "packed",
+    "rock_MetallicGlossMap.png": "packed",
+    "rock_DetailAlbedoMap.png": "detail",
     "rough_wood.png": None,
     "normal_wall.png": None,
     "abnormal.png": None,
@@ -120,6 +123,8 @@ def test_maps_of_a_folder(tmp_path):
         (("wood_d.png", "wood_r.png", "wood_AO.png"), 3),
         (("wood_r.png", "wood_d.png", "sky_AO.png"), 1),
         (("coast_n.png", "coast_e.png", "coast_s.png"), 0),
+        (("coast_n.png", "coast_e.png", "coast_s.png", "coast.png"), 4),
+        (("coast_n.png", "coast.png"), 0),
         (("G_COL_VAR1_3K.jpg", "G_COL_VAR2_3K.jpg", "G_DISP_3K.jpg", "G_DISP16_3K.tif", "G_NRM_3K.jpg"), 5),
         (("R_Normal_OpenGL.png", "r-normal-dx.png", "R_Base_Color.png", "height.npy"), 4),
     ],
@@ -140,6 +145,22 @@ def test_materials_of_a_folder_are_told_apart_by_their_stems(tmp_path):
     assert find_maps(tmp_path, lead).unknown == ["a.png"]
     with pytest.raises(ValueError, match=r"oak_disp.hdr is of a format that is not read: save it as TIFF"):
         find_maps(tmp_path, tmp_path / "oak_albedo.png")
+
+
+def test_all_maps_of_one_of_several_materials_are_taken_or_named(tmp_path):
+    folder_with(
+        tmp_path,
+        "oak_albedo.png",
+        "oak_OldRoughness.png",
+        "ash_albedo.png",
+        "ash_n.png",
+        "elm.png",
+        "elm_n.png",
+        "elm_s.png",
+    )
+    found = find_maps(tmp_path, tmp_path / "oak_albedo.png")
+    assert [*found.files.values()] == ["albedo"] and found.unknown == ["oak_OldRoughness.png"]
+    assert [*find_maps(tmp_path, tmp_path / "elm.png").files.values()] == ["albedo", "normal", "specular"]
 
 
 def test_sizes_are_parts_of_stems(tmp_path):

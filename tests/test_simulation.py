@@ -186,6 +186,7 @@ def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guid
     shares = np.bincount(training.ravel())
     usual, told = (simulate(training, categorical=True, **how) for how in ({}, {"proportions": shares.tolist()}))
     assert np.array_equal(usual, told) and usual.attrs == told.attrs
+    assert np.array_equal(usual, simulate(training, categorical=True, proportions=(shares * 2**20).tolist())), "counts"
     even = simulate(training, categorical=True, proportions=(1, 1, 1))
     assert not np.array_equal(usual, even)
     for how in ({"probabilities": np.full((3, *SHAPE), 1 / 3)}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):

@@ -291,6 +291,8 @@ def test_terrains_of_editors_are_the_corners():
     found = {int(one.get("tileid")): [*map(int, one.get("wangid").split(","))] for one in root.iter("wangtile")}
     text = tilesets.godot_set(*about)
     assert 'path="a.png"' in text and "tile_size = Vector2i(24, 20)" in text and "terrain_set_0/mode = 1" in text
+    quoted = tilesets.godot_set('a"\\b.png', (20, 24), ['a"', "ä"], about[-1])
+    assert r'path="a\"\\b.png"' in quoted and r'terrain_0/name = "a\""' in quoted and 'name = "ä"' in quoted
     for (row, col), _ in np.ndenumerate(torus(2)):
         a, b, c, d = corners_of(torus(2))[row, col].tolist()
         assert found[row * 4 + col] == [0, b + 1, 0, d + 1, 0, c + 1, 0, a + 1]

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 SHEET = 4096
 """The most pixels a side of a picture of copies; a larger one is reduced."""
 
-TABLES = (".csv", ".tsv", ".txt", ".dat")
-"""How the name of a table of known values ends; a file of any other name is a picture."""
-
 
 class Reading(NamedTuple):
     """How files are read.
@@ -408,10 +405,10 @@ def read_table(path: Path, files: Files, valid: tuple[float, float] | None = Non
     None if a file is no table, by its content if that is a grid or a point set, else by its name.
     """
     from simdtex.io import grids
-    from simdtex.io.hard_data import read_hard_data
+    from simdtex.io.hard_data import SUFFIXES, read_hard_data, suffix_of
 
     kind, how = grids.kind_of(path), files.how
-    if kind != "points" and (kind is not None or path.suffix.lower() not in TABLES):
+    if kind != "points" and (kind is not None or suffix_of(path) not in SUFFIXES):
         return None
     found = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
     origin, like = files.options.get("origin"), files.options.get("like")
@@ -554,6 +551,10 @@ class Folder:
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
+        self.note_unknown()
+
+    def note_unknown(self) -> None:
+        """Say which pictures of the folder are left out."""
         if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
             note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
 

@@ -52,6 +52,8 @@ def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options
     normals = bool(folders) and folders[0].found.files[folders[0].lead] in NORMALS
     colours = options.pop("colours") or max(2, len(samples))
     names = [path.stem for path in lead.paths] if len(samples) > 1 else [f"{n}" for n in range(colours)]
+    if len({*names}) < len(names):
+        names = [f"{name} {n}" for n, name in enumerate(names, 1)]
     corners = ["".join(map(str, place)) for place in np.ndindex(*[colours] * 4)]
     own = {f"{one.out.stem}{which}{one.out.suffix}" for one in maps for which in ("", *(f"-{c}" for c in corners))}
     own |= {"tiles.tsx", "tiles.tres", "tiles.glsl", "plane.tmx", "plane.png"}
@@ -76,14 +78,18 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
     if folders and len(folders) < len(lead.paths):
         raise ValueError(f"{folders[0].lead} is a map of a material and not all samples are; give one kind of sample")
     found = [lead]
+    for folder in folders:
+        folder.note_unknown()
+        for first, other in ((folders[0], folder), (folder, folders[0])):
+            if lacking := {*first.found.files.values()} - {*other.found.files.values()}:
+                roles = f"{other.lead.parent} has no {min(lacking)} map and {first.lead.parent} has one"
+                raise ValueError(f"{roles}; add it, or move that elsewhere")
     for path, role in sorted(folders[0].found.files.items()) if folders else ():
         if path == folders[0].lead:
             continue
         those = [path]
         for other in folders[1:]:
             own = [one for one, known in other.found.files.items() if known == role]
-            if not own:
-                raise ValueError(f"{other.lead.parent} has no {role} map and {path.parent} has one; add or remove it")
             those.append(own[0])
         found.append(read_material(those))
         if found[-1].sizes != lead.sizes:

@@ -266,9 +266,7 @@ def _made(store: PathLike) -> Iterator[str]:
     """Yield a path for making a store, so that it exists completely or not at all."""
     path = Path(store)
     if path.exists():
-        raise ValueError(
-            f"{path} is there already; remove it, give another name, or continue with: simdtex resume {path}"
-        )
+        raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
     if not path.parent.is_dir():
         raise ValueError(f"the folder {path.parent} does not exist; make it first")
     with atomic_folder(path) as temporary:

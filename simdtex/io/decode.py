@@ -24,6 +24,7 @@ FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF", "PPM", "JPEG2000", "AVIF
 """The only Pillow readers in use, since some others start programs, for example the one of PostScript."""
 
 _NAMED = {
+    rb".{128}DICM": "a DICOM picture: convert it to NRRD, for example with 3D Slicer",
     rb"8BPS": "a Photoshop document (PSD): export it as PNG or TIFF",
     rb"gimp xcf": "a document of GIMP (XCF): export it as PNG or TIFF",
     rb"\x00\x00\x01\x00.\x00": "an icon (ICO): export it as PNG",
@@ -33,7 +34,6 @@ _NAMED = {
     rb"#\?R": "a Radiance picture (HDR): save it as OpenEXR or TIFF",
     rb"%PDF|%!PS|[^\x00]*<svg": "a drawing (PDF, PostScript, SVG): export it as PNG",
     rb".{8}CR|.{4}ftypcrx|FUJIFILMCCD-RAW|IIR[OS]|IIU\x00|FOVb": "a camera's raw file: develop it to TIFF",
-    rb".{128}DICM": "a DICOM picture: convert it to NRRD, for example with 3D Slicer",
     rb".{344}n[+i]1": "a NIfTI volume: convert it to NRRD, for example with 3D Slicer",
     rb"NRRD|ObjectType|# vtk|\s*(<\?xml[^>]*>\s*)?<VTKFile": "a volume (NRRD, MHA, VTK): simdtex simulate reads it",
     rb"\x89HDF|CDF": "a NetCDF or HDF5 file: simdtex simulate reads it",
@@ -123,7 +123,9 @@ def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = Fals
     with quiet():
         try:
             found = _read(data, most, palette)
-        except PIL.UnidentifiedImageError:
+        except Exception as error:
+            if not isinstance(error, PIL.UnidentifiedImageError) and data[128:132] != b"DICM":
+                raise  # DICOM may have the header of a TIFF before its own, and be one, or not
             named = (words for pattern, words in _NAMED.items() if re.match(pattern, data[:1024], re.DOTALL))
             kinds = "PNG, JPEG, TIFF, BMP, WebP, GIF, TGA, JPEG 2000, AVIF, HEIC, OpenEXR, PPM or .npy"
             raise Refused(f"is {next(named, f'not an image: give a {kinds} file')}") from None

@@ -198,7 +198,7 @@ def count_of(line: str, after: str = "") -> int | None:
     words = line.split()
     if not words or not _is_count(words[0]):
         return None
-    table = len(words) > 1 and (number_of(words[1]) is not None or len(after.split()) == len(words))
+    table = len(words) > 1 and (number_of(words[1].strip(",;") or 0) is not None or len(after.split()) == len(words))
     return None if table else int(words[0])
 
 

@@ -8,10 +8,15 @@ x grows with the column, y with the row, and z with the layer. Without an origin
 from __future__ import annotations
 
 import csv
+import gzip
 import os
+import re
 import warnings
+import zipfile
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from io import BufferedReader, BytesIO
 from math import isnan, prod
 from operator import index
 from pathlib import Path
@@ -20,7 +25,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.files import BYTES, read_npy, reading
+from simdtex.io.files import BYTES, Refused, check_size, explained, needs, read_npy, reading
 from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.rasters import axis_of
@@ -40,6 +45,19 @@ ROLES = ("x", "y", "z", "value")
 
 _DIGITS = frozenset("+-.0123456789")
 
+_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(e[+-]?[0-9]+)?", re.IGNORECASE)
+_GROUPED = re.compile("[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+"""A number with a decimal comma; and one whose comma may be between thousands."""
+
+LIBRARIES = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".parquet": "pyarrow"}
+"""The libraries with which pandas reads tables."""
+
+OTHERS = {".las": "a well log or a point cloud (LAS)", ".xls": "an old spreadsheet", ".ods": "a spreadsheet"}
+"""Words for tables that are not read, by their suffixes."""
+
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xyz", *LIBRARIES, *OTHERS)
+"""How the name of a table of known values ends, before ``.gz`` if it is compressed."""
+
 _UNKNOWN = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-")
 """Cells of an unknown value, in lower case."""
 
@@ -57,7 +75,7 @@ class HardData(Brief):
     names : tuple of str
         The name of each variable.
     lines : tuple of int, or None
-        The line of each datum in the file, counted from 1; None if it is not from a text.
+        The line of each datum in the text, in the sheet or in the CSV of a DataFrame, counted from 1; None of an array.
     from_top : bool
         Whether y is the number of a row, from a column called row, which in a picture counts from the top.
     """
@@ -100,12 +118,18 @@ def read_hard_data(
     table : path or pandas.DataFrame
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
         separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
-        line. Numbers have a decimal point. A first line with fewer than two numbers is a header. An empty cell, NaN, NA
-        and the like are unknown values. A comment extends from ``#`` to the end of the line. A first column without a
-        name is the index of pandas and is left out.
+        line, or that of a first line ``sep=;``. Numbers have a decimal point, or all a decimal comma. A first line with
+        fewer than two numbers is a header; a line of units may follow. Without one, a last comment before the data that
+        names an axis is the header, as in `numpy.savetxt`. An empty cell, NaN, NA and the like are unknown values; a
+        row of empty cells is none. A comment is a line that begins with ``#``, or extends from ``#`` after a blank to
+        the end of a line whose cells are complete before. A first column without a name is the index of pandas and is
+        left out. The text may be compressed (``.gz``).
 
         Or a point set of Geo-EAS, recognised by a second line that begins with the number of columns: a title, that
-        number, the names of the columns, each in a line, and a datum in each line, with blanks between numbers.
+        number, the names of the columns, each in a line, perhaps with units after a tab or two blanks, and a datum in
+        each line, with blanks, commas or semicolons between numbers.
+
+        Or the first sheet of an Excel file (``.xlsx``), or a table of Parquet (``.parquet``), with ``simdtex[tables]``.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
@@ -131,7 +155,7 @@ def read_hard_data(
     Warns
     -----
     simdtex.options.DataWarning
-        Values are taken as unknown, or columns of text are left out.
+        Values are taken as unknown, or columns of text, sheets or rows after ``#`` are left out.
 
     Raises
     ------
@@ -144,58 +168,121 @@ def read_hard_data(
     Cost: about 10 s for a million rows of text.
     """
     if isinstance(table, (str, os.PathLike)):
-        name, binary = os.fspath(table), Path(table).suffix.lower() == ".npy"
-        with reading(table, "the hard data", max_pixels, each=BYTES if binary else 1) as most, open(name, "rb") as file:
-            if binary:
+        name, suffix = os.fspath(table), suffix_of(table)
+        each = BYTES if suffix in (".npy", *LIBRARIES) else 1
+        with reading(table, "the hard data", max_pixels, each=each) as most, open(name, "rb") as file:
+            if suffix == ".npy":
                 data = _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
             else:
-                data = _parsed(_decoded(file.read()), columns, categories)
+                data = _parsed(*_text(file, suffix, most), columns, categories)
     else:
-        cells = [[str(cell) for cell in table[column]] for column in table.columns]
-        name, data = "the table", _of_columns(cells, list(map(str, table.columns)), None, columns, categories)
+        name, data = "the table", _parsed(*_text_of(table), columns, categories)
     for variable, values in zip(data.names, data.values.T, strict=True):
         values[:] = known_numbers(f"{name}, column {variable}", values, missing, valid)
     return data
 
 
-def _decoded(data: bytes) -> str:
+def suffix_of(path: PathLike) -> str:
+    """Return the suffix of a file in lower case, or the one before ``.gz``."""
+    name = os.fspath(path).lower()
+    return Path(name.removesuffix(".gz")).suffix
+
+
+def _text(file: BufferedReader, suffix: str, most: int) -> tuple[str, bool]:
+    """Return the text of a table, and whether its first line is a header in any case."""
+    if suffix in OTHERS:
+        raise Refused(f"is {OTHERS[suffix]}, which is not read: write x, y and values into a table (.csv)")
+    if suffix not in LIBRARIES:
+        return _decoded(file.read(), most), False
+    for library in ("pandas", LIBRARIES[suffix]):
+        needs(library, "tables", f"a table in {suffix}")
+    import pandas
+
+    with explained(file.name, "the hard data", "a table"):
+        if suffix == ".parquet":
+            from pyarrow.parquet import read_metadata
+
+            about = read_metadata(file)
+            check_size(about.num_rows * about.num_columns, 0, most)
+            return _text_of(pandas.read_parquet(file))
+        with zipfile.ZipFile(file) as archive:
+            check_size(0, sum(one.file_size for one in archive.infolist()), most)
+        sheets = pandas.read_excel(file, sheet_name=None, header=None, dtype=object, na_filter=False)
+    full = [name for name, one in sheets.items() if not one.empty] or [*sheets]
+    if len(full) > 1:
+        warnings.warn(f"{file.name}: only the first of the sheets {', '.join(full)} is read", DataWarning, 2)
+    return sheets[full[0]].to_csv(index=False, header=False), False
+
+
+def _text_of(frame: Any) -> tuple[str, bool]:
+    """Return the text of a DataFrame, and that it has a header; an index without names is left out."""
+    indexed = any(name is not None for name in frame.index.names)
+    return frame.to_csv(index=indexed, quoting=csv.QUOTE_NONNUMERIC), True
+
+
+def _decoded(data: bytes, most: int) -> str:
     try:
+        if data.startswith(b"\x1f\x8b"):
+            with gzip.open(BytesIO(data)) as file:
+                data = file.read(most + 1)
+            check_size(0, len(data), most, 1)
         return data.decode("utf-8-sig")
+    except (EOFError, zlib.error):
+        raise ValueError("the compressed table is damaged: compress it again") from None
     except UnicodeDecodeError:
         raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
 
 
-def _parsed(text: str, columns: Any, categories: Any) -> HardData:
-    """Return the data in the text of a table or of a point set."""
+def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
+    """Return the data in the text of a table or of a point set; without ``header`` its first line may have numbers."""
     lines = text.splitlines()
-    width = count_of(lines[1]) if len(lines) > 1 else None
-    begin = 2 + width if width else 0
-    names = [line.strip() for line in lines[2:begin]]
-    kept = {number: line.partition("#")[0].strip(" ") for number, line in enumerate(lines[begin:], begin + 1)}
-    kept = {number: line for number, line in kept.items() if line.strip()}
+    said = re.fullmatch('"?sep=(.)"?', lines[0]) if lines else None  # Excel's
+    width = count_of(lines[1]) if len(lines) > 1 and not (said or header) else None
+    begin = 2 + width if width else bool(said)
+    names = [re.split(r"\t|\s\s", line.strip())[0] for line in lines[2:begin]]  # units may follow
+    kept = {number: line.strip(" ") for number, line in enumerate(lines[begin:], begin + 1) if line.strip()}
+    comments = {number: line.strip("# ") for number, line in kept.items() if line.startswith("#")}
+    kept = {number: line for number, line in kept.items() if number not in comments}
     if not kept:
         what = f"the point set has no line after the names of {width} columns" if width else "the table is empty"
         raise ValueError(f"{what}: give a line with x, y and a value for each datum")
     first, line = next(iter(kept.items()))
-    delimiter = None if width else next((one for one in ";\t," if one in line), None)
-    rows = {number: _cells(line, number, delimiter) for number, line in kept.items()}
+    delimiter = said[1] if said else next((one for one in ";\t," if one in line.partition(" #")[0]), None)
+    count = width or len(_cells(line, first, delimiter))
+    rows = {number: _cells(line, number, delimiter, count) for number, line in kept.items()}
     if (count := len(rows[first])) < 3:
         raise ValueError(
             f"line {first} has {count} cell{'s' * (count != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
         )
+    below = [
+        number for number, line in comments.items() if number > first and line.count(delimiter or "#") == count - 1
+    ]
+    if below:
+        warnings.warn(f"line {below[0]} begins with #, and is left out as a comment", DataWarning, stacklevel=2)
     before = width or count
     for number, row in rows.items():
         if len(row) != before:
             raise ValueError(f"line {number} has {len(row)} cells and those before it {before}: give as many in all")
-    if not width and sum(cell[:1] in _DIGITS for cell in rows[first] if cell) < 2:
+    rows = {number: row for number, row in rows.items() if any(row)}
+    if not width and (header or sum(cell[:1] in _DIGITS for cell in rows[first] if cell) < 2):
         names = rows.pop(first)
+        units = next(iter(rows), 0)
+        if rows and all(number_of(cell.replace(",", ".")) is None for cell in rows[units]):
+            del rows[units]
         if not rows:
             raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
+    elif not width and (above := [line for number, line in comments.items() if number < first]):  # numpy.savetxt
+        words = _cells(above[-1], first, delimiter), re.split(r"[\s,;]+", above[-1])
+        names = next((some for some in words if len(some) == count and any(map(axis_of, some))), [])
     return _of_columns(list(zip(*rows.values(), strict=True)), names, tuple(rows), columns, categories)
 
 
-def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
+def _cells(line: str, number: int, delimiter: str | None, count: int = 0) -> list[str]:
+    """Return the cells of a line, without a comment after ``#`` if they are then ``count``, or with 0 three or more."""
+    before, *comment = re.split(r"\s#", line, maxsplit=1)
+    if comment and (count or 3) <= len(before.split(delimiter)) <= (count or np.inf):
+        line = before
     if delimiter is None:
         return line.split()
     try:
@@ -206,7 +293,7 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
 
 
 def _of_columns(
-    cells: Sequence[Sequence[str]], names: list[str], lines: tuple[int, ...] | None, columns: Any, categories: Any
+    cells: Sequence[Sequence[str]], names: list[str], lines: tuple[int, ...], columns: Any, categories: Any
 ) -> HardData:
     """Return the data of columns of texts; ``names`` are those of a header, ``lines`` the numbers of the rows."""
     listed = dict(enumerate(names or map(str, range(1, len(cells) + 1))))
@@ -215,6 +302,7 @@ def _of_columns(
     points, values = _roles(listed, bool(names), columns or {})
     codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
     codes |= dict.fromkeys(_UNKNOWN, np.nan)
+    cells = _with_points(cells, (*points, *values))
     found = {k: [number_of(cell) for cell in cells[k]] for k in points}
     found |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
     if not categories and not (columns and "value" in columns):  # without names of wells
@@ -236,6 +324,16 @@ def _of_columns(
                 f"{data.where(row)} has {cells[k][row][:40]!r} in column {k + 1}, which is no number: {remedy}"
             )
     return data
+
+
+def _with_points(cells: Sequence[Sequence[str]], used: Iterable[int]) -> Sequence[Sequence[str]]:
+    """Return columns with decimal points, where those ``used`` have decimal commas."""
+    numbers = [cell for k in used for cell in cells[k]]
+    if not (commas := [cell for cell in numbers if "," in cell and _COMMA.fullmatch(cell)]):
+        return cells
+    if all(map(_GROUPED.fullmatch, commas)) or any("." in cell and number_of(cell) is not None for cell in numbers):
+        raise ValueError(f"the comma of {commas[0]!r} may be one of thousands: write numbers with a decimal point only")
+    return [[cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in column] for column in cells]
 
 
 def _plain(count: int) -> tuple[str, ...]:

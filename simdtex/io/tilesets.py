@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from json import dumps
 from typing import Any
 from xml.etree import ElementTree as XML
 
@@ -84,7 +85,7 @@ def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: N
     """Return a TileSet of Godot 4, with a terrain set that matches corners; the parameters are those of `tiled_set`."""
     size = f"Vector2i({tile[1]}, {tile[0]})"
     lines = ['[gd_resource type="TileSet" load_steps=3 format=3]', ""]
-    lines += [f'[ext_resource type="Texture2D" path="{picture}" id="1"]', ""]
+    lines += [f'[ext_resource type="Texture2D" path={dumps(picture, ensure_ascii=False)} id="1"]', ""]
     lines += ['[sub_resource type="TileSetAtlasSource" id="1"]', 'texture = ExtResource("1")']
     lines += [f"texture_region_size = {size}"]
     for row in range(len(grid)):
@@ -95,7 +96,7 @@ def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: N
     lines += ["", "[resource]", f"tile_size = {size}", "terrain_set_0/mode = 1"]
     for number, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
         red, green, blue = (round(part / 255, 3) for part in bytes.fromhex(colour[1:]))
-        lines += [f'terrain_set_0/terrain_{number}/name = "{name}"']
+        lines += [f"terrain_set_0/terrain_{number}/name = {dumps(name, ensure_ascii=False)}"]
         lines += [f"terrain_set_0/terrain_{number}/color = Color({red}, {green}, {blue}, 1)"]
     return "\n".join([*lines, 'sources/0 = SubResource("1")', ""])
 

@@ -434,7 +434,7 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
         raise ValueError(f"{target} is a grid, which holds no source map: end its name in .zarr, .nc or .npz")
     require("simulate", *_NEEDED[suffix])
     if suffix == ".zarr" and target.exists():  # a store may hold what others have added
-        raise ValueError(f"{target} exists already: remove it, or give a new name for the store")
+        raise ValueError(f"{target} exists already: give a new name for the store")
     check_target(target)
     return suffix
 

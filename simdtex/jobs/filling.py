@@ -176,7 +176,9 @@ def extend(call: Extend) -> Work:
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
     if not (seamless or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
-    width = call.band = band_of(pixels) if call.band is None else call.band
+    if call.band is None:  # at least half of what wraps around is kept
+        call.band = min(band_of(pixels), max(1, min([rows] * tall + [cols] * wide or [rows, cols]) // 4))
+    width = call.band
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
@@ -184,7 +186,9 @@ def extend(call: Extend) -> Work:
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
     if 2 * across >= cols or 2 * along >= rows:
-        raise ValueError(f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one")
+        raise ValueError(
+            f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one, or a larger picture"
+        )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
@@ -419,7 +423,7 @@ def _may_be_lit(call: Fill, options: Options, known: NDArray[Any]) -> bool:
     The trend is of the whole picture, does not wrap around, and changes pixels.
     """
     whole, tones = call.reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
-    return whole and tones and options.finish != 0 and bool(np.abs(known, dtype=np.float64).max() <= EXACT)
+    return whole and tones and options.finish != 0 and max(float(known.max()), -float(known.min())) <= EXACT
 
 
 def _fewest_levels(pictures: Pictures) -> int:

@@ -23,7 +23,7 @@ ROUNDS, CUT = 5, 7.0
 """Rounds of least squares, and the residual, in medians of all residuals, from which a pixel has no weight."""
 
 MOST = 2**18
-"""The most pixels that a fit uses: of a larger picture every n-th row and column."""
+"""The most pixels that a fit uses, and the judgement of it: of a larger picture every n-th row and column."""
 
 ROUND = 2.0**20
 """Coefficients are rounded to 1 / ROUND of the channel's range: libraries differ in their last bits by less."""
@@ -81,9 +81,11 @@ class Trend(NamedTuple):
 
     def explains(self, picture: NDArray[Any], use: Mask) -> bool:
         """Return whether most of a picture (rows, cols, C) where ``use`` is this trend, as in a sky or a blank page."""
-        lines: Any = map(np.arange, self.shape)
-        left, whole = picture - self.at(*lines), picture
-        before, after = (np.abs(one[use] - np.median(one[use], 0)) for one in (whole, left))
+        every = _thinned(use)
+        lines: Any = (np.arange(side)[part] for side, part in zip(self.shape, every, strict=True))
+        whole, there = picture[every], use[every]
+        left = whole - self.at(*lines)
+        before, after = (np.abs(one[there] - np.median(one[there], 0)) for one in (whole, left))
         return bool(np.median(after, 0).sum() < LEFT * np.median(before, 0).sum())
 
     def cast(self, values: NDArray[np.float64]) -> NDArray[Any]:
@@ -99,10 +101,8 @@ def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
     """
     shape = (picture.shape[0], picture.shape[1])
     moderate("a picture whose light is to be even", picture)
-    every = (slice(None, None, max(1, ceil(sqrt(shape[0] * shape[1] / MOST)))),) * 2
     inside = np.ones(shape, bool) if use is None or not use.any() else use
-    if not inside[every].any():
-        every = (slice(None),) * 2
+    every = _thinned(inside)
     y, x = (_centred(np.arange(side)[part], side) for side, part in zip(shape, every, strict=True))
     known = picture[inside]
     ends = np.stack([known.min(0), known.max(0)])
@@ -171,6 +171,12 @@ def sample_sentences(statistics: dict[str, Any]) -> str:
     """Return the sentences on a run's sample, on its lattice and its light, from the statistics; "" without any."""
     found = [lattice_sentence(statistics.get("lattice")), light_sentence(statistics.get("light"))]
     return " ".join(filter(None, found))
+
+
+def _thinned(use: Mask) -> tuple[slice, slice]:
+    """Return the rows and columns of a picture for a fit, and all if ``use`` is False there."""
+    every = (slice(None, None, max(1, ceil(sqrt(use.size / MOST)))),) * 2
+    return every if use[every].any() else (slice(None), slice(None))
 
 
 def _centred(at: NDArray[np.integer], side: int) -> NDArray[np.float64]:

@@ -331,7 +331,8 @@ class Sample:
             if self.pictures.known:
                 found &= self._sure(apart, row + margin, col + margin)
             if not found.any():
-                raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
+                remedy = "give more of it, a smaller order, such as order=2, or fewer levels"
+                raise NothingUsable(f"nothing of the sample may be used at some level; {remedy}")
             allowed = found.ravel()
         everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
         reach = apart @ np.array([self.cols, 1], np.int32)

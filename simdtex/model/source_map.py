@@ -357,8 +357,9 @@ ROLES = {
     "opacity": "opacity alpha alphamasked transparency",
     "translucency": "translucency transmission sss",
     "fuzz": "fuzz sheen",
-    "packed": "orm arm rma mra ordp maskmap occlusionroughnessmetallic metallicroughness metallicsmoothness "
-    "roughao aorough",
+    "packed": "orm arm rma mra ordp maskmap occlusionroughnessmetallic occlusionroughmetal metallicroughness "
+    "metallicsmoothness metallicgloss metallicglossiness specgloss specularglossiness roughao aorough",
+    "detail": "detailalbedo detailnormal detailmask",
 }
 """The roles of maps, and the words at the end of a name that give the role."""
 
@@ -436,16 +437,19 @@ def find_maps(folder: str | os.PathLike[str], lead: Path | None = None) -> Maps:
     names = {path: _split(path) for path in found if path.suffix.lower() in (*READABLE, *UNREADABLE)}
     files = {}
     for path, (stem, word) in names.items():
-        beside = {other for one, other in names.values() if one == stem and other}
-        if map_role(path) or (word and (beside >= {"d", "n"} or not beside <= LETTERS.keys())):
-            files[path] = _WORDS[word]
+        beside = {other for one, other in names.values() if one == stem}
+        minecraft = {"", "n", "s"} <= beside <= {"", *LETTERS}  # LabPBR, whose albedo has no word
+        if map_role(path) or minecraft or (word and (beside >= {"d", "n"} or not beside <= {"", *LETTERS})):
+            files[path] = _WORDS.get(word, "albedo")
     unknown = [path.name for path in names if path not in files and path.suffix.lower() in READABLE]
     if len({(names[path][0], role) for path, role in files.items()}) > len(set(files.values())):
         if lead is None:
             one = {names[path][0]: str(path) for path in sorted(files, key=lambda path: files[path] == "albedo")}
             some = " or ".join(sorted(one.values())[:4])
             raise ValueError(f"{folder} holds {len(one)} materials: instead of it give a map of one, such as {some}")
-        files = {path: role for path, role in files.items() if names[path][0] == _split(lead)[0]}
+        stem, whole = _split(lead)[0], {names[path][0] for path, role in files.items() if role == "albedo"}
+        unknown += [p.name for p in files if names[p][0] not in {stem, *whole} and names[p][0].startswith(stem)]
+        files = {path: role for path, role in files.items() if names[path][0] == stem}
     if unread := [path for path in files if path.suffix.lower() in UNREADABLE]:
         raise ValueError(f"{unread[0]} is of a format that is not read: save it as TIFF or as 16-bit PNG")
     return Maps(files, unknown)

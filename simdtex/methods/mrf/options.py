@@ -335,14 +335,14 @@ class Options:
     )
     shares: tuple[float, ...] | None = data(
         None,
-        Numbers(),
+        Numbers(2.0**53),
         "Use several samples in these proportions, one number for each, by the penalty on use",
         none="every pixel of all samples counts equally",
         shown=("synth", "fill", "simulate"),
     )
     proportions: tuple[float, ...] | None = data(
         None,
-        Numbers(),
+        Numbers(2.0**53),
         "Give the categories, in ascending order, these shares of the output",
         none="the mean of the probabilities; of one variable without these and a guide the training image's shares",
         shown=("simulate",),
