@@ -267,6 +267,10 @@ def test_all_maps_of_a_material_have_one_arrangement(folder):
     names = [f"gravel_{role}-grass_{role}" for role in ("albedo", "height")]
     albedo, height = (image.read(f"terrain/{name}.png").pixels for name in names)
     assert_same_bits(albedo[..., 0], 255 - height)
+    (folder / "grass" / "grass_ao.png").symlink_to("grass_height.png")
+    done = run("gravel", "grass", "-o", "other", *SMALL)
+    assert done.exit_code == 2 and "gravel has no ao map" in done.output
+    (folder / "grass" / "grass_ao.png").unlink()
     (folder / "grass" / "grass_height.png").unlink()
     done = run("gravel", "grass", "-o", "other", *SMALL)
     assert done.exit_code == 2 and "grass has no height map" in done.output and not (folder / "other").exists()
