@@ -107,13 +107,11 @@ def read_hard_data(
         fewer than two numbers is a header, which units may follow; without one, a comment before the data that names an
         axis is, as of `numpy.savetxt`. An empty cell, NaN, NA and the like are unknown values. A comment begins with
         ``#``, in the line or after all its cells. A first column without a name is the index of pandas and is left out.
-        The text may be compressed (``.gz``).
+        It may be compressed (``.gz``), the first sheet of ``.xlsx``, or ``.parquet``, with ``simdtex[tables]``.
 
         Or a point set of Geo-EAS, recognised by a second line that begins with the number of columns: a title, that
         number, the names of the columns, each in a line, perhaps with units after a tab or two blanks, and a datum in
         each line, with blanks, commas or semicolons between numbers.
-
-        Or the first sheet of an Excel file (``.xlsx``), or a table of Parquet (``.parquet``), with ``simdtex[tables]``.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
