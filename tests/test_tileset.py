@@ -256,6 +256,12 @@ def test_the_files_of_a_set(folder):
     assert (folder / "out" / "mine.txt").read_text() == "mine"
 
 
+def test_terrains_of_samples_of_one_name_are_told_apart(folder):
+    done = run("gravel.png", shutil.copy("grass.png", "grass/gravel.png"), "-o", "out", *SMALL)
+    assert done.exit_code == 0, done.output
+    assert re.findall(r'wangcolor name="([^"]*)"', Path("out/tiles.tsx").read_text()) == ["gravel 1", "gravel 2"]
+
+
 def test_all_maps_of_a_material_have_one_arrangement(folder):
     done = run("gravel", "-o", "out", *SMALL, "--finish", 0)
     assert done.exit_code == 0, done.output
@@ -267,6 +273,10 @@ def test_all_maps_of_a_material_have_one_arrangement(folder):
     names = [f"gravel_{role}-grass_{role}" for role in ("albedo", "height")]
     albedo, height = (image.read(f"terrain/{name}.png").pixels for name in names)
     assert_same_bits(albedo[..., 0], 255 - height)
+    (folder / "grass" / "grass_ao.png").symlink_to("grass_height.png")
+    done = run("gravel", "grass", "-o", "other", *SMALL)
+    assert done.exit_code == 2 and "gravel has no ao map" in done.output
+    (folder / "grass" / "grass_ao.png").unlink()
     (folder / "grass" / "grass_height.png").unlink()
     done = run("gravel", "grass", "-o", "other", *SMALL)
     assert done.exit_code == 2 and "grass has no height map" in done.output and not (folder / "other").exists()

@@ -405,10 +405,10 @@ def read_table(path: Path, files: Files, valid: tuple[float, float] | None = Non
     None if a file is no table, by its content if that is a grid or a point set, else by its name.
     """
     from simdtex.io import grids
-    from simdtex.io.hard_data import SUFFIXES, read_hard_data, suffix_of
+    from simdtex.io.hard_data import SUFFIXES, read_hard_data
 
     kind, how = grids.kind_of(path), files.how
-    if kind != "points" and (kind is not None or suffix_of(path) not in SUFFIXES):
+    if kind != "points" and (kind is not None or path.suffix.lower() not in SUFFIXES):
         return None
     found = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
     origin, like = files.options.get("origin"), files.options.get("like")
@@ -551,12 +551,6 @@ class Folder:
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
-        self.note_unknown()
-
-    def note_unknown(self) -> None:
-        """Say which pictures of the folder are left out."""
-        if unknown := [name for name in self.found.unknown if self.lead.with_name(name) not in self.found.files]:
-            note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
 
     def write(self, metadata: Metadata | None, made: NDArray[Any], run: Any) -> None:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
@@ -679,4 +673,6 @@ def read_lead(
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files:
         check_input(Named(output, "folder"), Named(path, "read"))
+    if unknown := [name for name in found.unknown if folder / name not in found.files]:
+        note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
     return Folder(found, albedos[0], output), read_material(albedos[:1], how)

@@ -79,18 +79,15 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
         raise ValueError(f"{folders[0].lead} is a map of a material and not all samples are; give one kind of sample")
     found = [lead]
     for folder in folders:
-        folder.note_unknown()
-        for first, other in ((folders[0], folder), (folder, folders[0])):
-            if lacking := {*first.found.files.values()} - {*other.found.files.values()}:
-                roles = f"{other.lead.parent} has no {min(lacking)} map and {first.lead.parent} has one"
-                raise ValueError(f"{roles}; add it, or move that elsewhere")
+        for has, lacks in ((folders[0], folder), (folder, folders[0])):
+            if role := min({*has.found.files.values()} - {*lacks.found.files.values()}, default=""):
+                raise ValueError(f"{lacks.lead.parent} has no {role} map and {has.lead.parent} has one; add or move it")
     for path, role in sorted(folders[0].found.files.items()) if folders else ():
         if path == folders[0].lead:
             continue
         those = [path]
         for other in folders[1:]:
-            own = [one for one, known in other.found.files.items() if known == role]
-            those.append(own[0])
+            those.append(next(one for one, known in other.found.files.items() if known == role))
         found.append(read_material(those))
         if found[-1].sizes != lead.sizes:
             raise ValueError(f"{path} has another size than {lead.paths[0].name}; scale it, or move it elsewhere")

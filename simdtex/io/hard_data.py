@@ -13,7 +13,6 @@ import os
 import re
 import warnings
 import zipfile
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BufferedReader, BytesIO
@@ -52,11 +51,8 @@ _GROUPED = re.compile("[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 LIBRARIES = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".parquet": "pyarrow"}
 """The libraries with which pandas reads tables."""
 
-OTHERS = {".las": "a well log or a point cloud (LAS)", ".xls": "an old spreadsheet", ".ods": "a spreadsheet"}
-"""Words for tables that are not read, by their suffixes."""
-
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xyz", *LIBRARIES, *OTHERS)
-"""How the name of a table of known values ends, before ``.gz`` if it is compressed."""
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xyz", ".gz", *LIBRARIES, ".las", ".xls", ".ods")
+"""How the name of a table of known values ends; the last are not read."""
 
 _UNKNOWN = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-")
 """Cells of an unknown value, in lower case."""
@@ -119,17 +115,14 @@ def read_hard_data(
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
         separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
         line, or that of a first line ``sep=;``. Numbers have a decimal point, or all a decimal comma. A first line with
-        fewer than two numbers is a header; a line of units may follow. Without one, a last comment before the data that
-        names an axis is the header, as in `numpy.savetxt`. An empty cell, NaN, NA and the like are unknown values; a
-        row of empty cells is none. A comment is a line that begins with ``#``, or extends from ``#`` after a blank to
-        the end of a line whose cells are complete before. A first column without a name is the index of pandas and is
-        left out. The text may be compressed (``.gz``).
+        fewer than two numbers is a header, which units may follow; without one, a comment before the data that names an
+        axis is, as of `numpy.savetxt`. An empty cell, NaN, NA and the like are unknown values. A comment begins with
+        ``#``, in the line or after all its cells. A first column without a name is the index of pandas and is left out.
+        It may be compressed (``.gz``), the first sheet of ``.xlsx``, or ``.parquet``, with ``simdtex[tables]``.
 
         Or a point set of Geo-EAS, recognised by a second line that begins with the number of columns: a title, that
         number, the names of the columns, each in a line, perhaps with units after a tab or two blanks, and a datum in
         each line, with blanks, commas or semicolons between numbers.
-
-        Or the first sheet of an Excel file (``.xlsx``), or a table of Parquet (``.parquet``), with ``simdtex[tables]``.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
@@ -168,7 +161,7 @@ def read_hard_data(
     Cost: about 10 s for a million rows of text.
     """
     if isinstance(table, (str, os.PathLike)):
-        name, suffix = os.fspath(table), suffix_of(table)
+        name, suffix = os.fspath(table), Path(table).suffix.lower()
         each = BYTES if suffix in (".npy", *LIBRARIES) else 1
         with reading(table, "the hard data", max_pixels, each=each) as most, open(name, "rb") as file:
             if suffix == ".npy":
@@ -182,18 +175,20 @@ def read_hard_data(
     return data
 
 
-def suffix_of(path: PathLike) -> str:
-    """Return the suffix of a file in lower case, or the one before ``.gz``."""
-    name = os.fspath(path).lower()
-    return Path(name.removesuffix(".gz")).suffix
-
-
 def _text(file: BufferedReader, suffix: str, most: int) -> tuple[str, bool]:
     """Return the text of a table, and whether its first line is a header in any case."""
-    if suffix in OTHERS:
-        raise Refused(f"is {OTHERS[suffix]}, which is not read: write x, y and values into a table (.csv)")
+    if suffix in SUFFIXES[-3:]:
+        raise Refused(f"ends in {suffix}, which is not read: write x, y and values into a table (.csv)")
     if suffix not in LIBRARIES:
-        return _decoded(file.read(), most), False
+        data = file.read()
+        if data.startswith(b"\x1f\x8b"):
+            with explained(file.name, "the hard data", "a compressed table"), gzip.open(BytesIO(data)) as unpacked:
+                data = unpacked.read(most + 1)
+            check_size(0, len(data), most, 1)
+        try:
+            return data.decode("utf-8-sig"), False
+        except UnicodeDecodeError:
+            raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
     for library in ("pandas", LIBRARIES[suffix]):
         needs(library, "tables", f"a table in {suffix}")
     import pandas
@@ -208,29 +203,15 @@ def _text(file: BufferedReader, suffix: str, most: int) -> tuple[str, bool]:
         with zipfile.ZipFile(file) as archive:
             check_size(0, sum(one.file_size for one in archive.infolist()), most)
         sheets = pandas.read_excel(file, sheet_name=None, header=None, dtype=object, na_filter=False)
-    full = [name for name, one in sheets.items() if not one.empty] or [*sheets]
-    if len(full) > 1:
-        warnings.warn(f"{file.name}: only the first of the sheets {', '.join(full)} is read", DataWarning, 2)
-    return sheets[full[0]].to_csv(index=False, header=False), False
+    (name, sheet), *more = ((name, one) for name, one in sheets.items() if len(sheets) < 2 or not one.empty)
+    if more:
+        warnings.warn(f"{file.name}: only the first of its sheets, {name}, is read", DataWarning, stacklevel=2)
+    return sheet.to_csv(index=False, header=False), False
 
 
 def _text_of(frame: Any) -> tuple[str, bool]:
     """Return the text of a DataFrame, and that it has a header; an index without names is left out."""
-    indexed = any(name is not None for name in frame.index.names)
-    return frame.to_csv(index=indexed, quoting=csv.QUOTE_NONNUMERIC), True
-
-
-def _decoded(data: bytes, most: int) -> str:
-    try:
-        if data.startswith(b"\x1f\x8b"):
-            with gzip.open(BytesIO(data)) as file:
-                data = file.read(most + 1)
-            check_size(0, len(data), most, 1)
-        return data.decode("utf-8-sig")
-    except (EOFError, zlib.error):
-        raise ValueError("the compressed table is damaged: compress it again") from None
-    except UnicodeDecodeError:
-        raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
+    return frame.to_csv(index=any(name is not None for name in frame.index.names), quoting=csv.QUOTE_NONNUMERIC), True
 
 
 def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
@@ -240,9 +221,8 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
     width = count_of(lines[1]) if len(lines) > 1 and not (said or header) else None
     begin = 2 + width if width else bool(said)
     names = [re.split(r"\t|\s\s", line.strip())[0] for line in lines[2:begin]]  # units may follow
-    kept = {number: line.strip(" ") for number, line in enumerate(lines[begin:], begin + 1) if line.strip()}
-    comments = {number: line.strip("# ") for number, line in kept.items() if line.startswith("#")}
-    kept = {number: line for number, line in kept.items() if number not in comments}
+    kept = {number: line.strip(" ") for number, line in enumerate(lines[begin:], begin + 1) if line.strip(' \t,;"')}
+    comments = {number: kept.pop(number).strip("# ") for number in [*kept] if kept[number].startswith("#")}
     if not kept:
         what = f"the point set has no line after the names of {width} columns" if width else "the table is empty"
         raise ValueError(f"{what}: give a line with x, y and a value for each datum")
@@ -250,21 +230,17 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
     delimiter = said[1] if said else next((one for one in ";\t," if one in line.partition(" #")[0]), None)
     count = width or len(_cells(line, first, delimiter))
     rows = {number: _cells(line, number, delimiter, count) for number, line in kept.items()}
-    if (count := len(rows[first])) < 3:
+    if (found := len(rows[first])) < 3:
         raise ValueError(
-            f"line {first} has {count} cell{'s' * (count != 1)}: give x, y and one value or more, "
+            f"line {first} has {found} cell{'s' * (found != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
         )
-    below = [
-        number for number, line in comments.items() if number > first and line.count(delimiter or "#") == count - 1
-    ]
-    if below:
-        warnings.warn(f"line {below[0]} begins with #, and is left out as a comment", DataWarning, stacklevel=2)
-    before = width or count
+    for number, line in comments.items():
+        if number > first and line.count(delimiter or "#") == count - 1:
+            warnings.warn(f"line {number} begins with #, and is left out as a comment", DataWarning, stacklevel=2)
     for number, row in rows.items():
-        if len(row) != before:
-            raise ValueError(f"line {number} has {len(row)} cells and those before it {before}: give as many in all")
-    rows = {number: row for number, row in rows.items() if any(row)}
+        if len(row) != count:
+            raise ValueError(f"line {number} has {len(row)} cells and those before it {count}: give as many in all")
     if not width and (header or sum(cell[:1] in _DIGITS for cell in rows[first] if cell) < 2):
         names = rows.pop(first)
         units = next(iter(rows), 0)
@@ -302,7 +278,11 @@ def _of_columns(
     points, values = _roles(listed, bool(names), columns or {})
     codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
     codes |= dict.fromkeys(_UNKNOWN, np.nan)
-    cells = _with_points(cells, (*points, *values))
+    used = [cell for k in (*points, *values) for cell in cells[k]]
+    if commas := [cell for cell in used if "," in cell and _COMMA.fullmatch(cell)]:
+        if all(map(_GROUPED.fullmatch, commas)) or any("." in cell and number_of(cell) is not None for cell in used):
+            raise ValueError(f"the comma of {commas[0]!r} may be one of thousands: write numbers with a decimal point")
+        cells = [[one.replace(",", ".") if _COMMA.fullmatch(one) else one for one in column] for column in cells]
     found = {k: [number_of(cell) for cell in cells[k]] for k in points}
     found |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
     if not categories and not (columns and "value" in columns):  # without names of wells
@@ -324,16 +304,6 @@ def _of_columns(
                 f"{data.where(row)} has {cells[k][row][:40]!r} in column {k + 1}, which is no number: {remedy}"
             )
     return data
-
-
-def _with_points(cells: Sequence[Sequence[str]], used: Iterable[int]) -> Sequence[Sequence[str]]:
-    """Return columns with decimal points, where those ``used`` have decimal commas."""
-    numbers = [cell for k in used for cell in cells[k]]
-    if not (commas := [cell for cell in numbers if "," in cell and _COMMA.fullmatch(cell)]):
-        return cells
-    if all(map(_GROUPED.fullmatch, commas)) or any("." in cell and number_of(cell) is not None for cell in numbers):
-        raise ValueError(f"the comma of {commas[0]!r} may be one of thousands: write numbers with a decimal point only")
-    return [[cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in column] for column in cells]
 
 
 def _plain(count: int) -> tuple[str, ...]:

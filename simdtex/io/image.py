@@ -418,9 +418,8 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
         ``.png`` (8 or 16 bits), ``.tif`` ``.tiff`` (every type), ``.jpg`` ``.jpeg`` (quality 95), ``.webp``
         (lossless), ``.bmp``, ``.exr`` (float16 and float32), or ``.npy``.
     array : array_like, (rows, cols) or (rows, cols, channels)
-        The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG and of
-        an OpenEXR are grey and colour with alpha; OpenEXR holds colours multiplied by alpha, which `read` divides, so
-        that they are rounded, and 0 where alpha is 0. WebP turns grey into equal RGB.
+        The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG or
+        OpenEXR are grey and colour with alpha, by which OpenEXR has colours multiplied. WebP turns grey into equal RGB.
     metadata : Metadata, optional
         The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
         and the EXIF data (TIFF its texts); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
@@ -480,9 +479,8 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         planes = np.moveaxis(np.atleast_3d(pixels), -1, 0)
         if channels in (2, 4):  # OpenEXR holds colours that are multiplied by alpha
             planes = np.concatenate([planes[:-1] * planes[-1], planes[-1:]])
-        names = ("Y", "YA", "RGB", "RGBA")[channels - 1]
-        named = {name: np.ascontiguousarray(plane) for name, plane in zip(names, planes, strict=True)}
-        OpenEXR.File(header, named).write(written)
+        named = zip(("Y", "YA", "RGB", "RGBA")[channels - 1], map(np.ascontiguousarray, planes), strict=True)
+        OpenEXR.File(header, dict(named)).write(written)
         path.write_bytes(written.getvalue())
     elif suffix in (".tif", ".tiff"):
         write_tiff(path, [pixels], metadata)

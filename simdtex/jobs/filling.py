@@ -176,9 +176,8 @@ def extend(call: Extend) -> Work:
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
     if not (seamless or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
-    if call.band is None:  # at least half of what wraps around is kept
-        call.band = min(band_of(pixels), max(1, min([rows] * tall + [cols] * wide or [rows, cols]) // 4))
-    width = call.band
+    least = min([rows] * tall + [cols] * wide or [rows, cols])  # half of it at least is kept
+    width = call.band = min(band_of(pixels), max(1, least // 4)) if call.band is None else call.band
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
@@ -186,9 +185,7 @@ def extend(call: Extend) -> Work:
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
     if 2 * across >= cols or 2 * along >= rows:
-        raise ValueError(
-            f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one, or a larger picture"
-        )
+        raise ValueError(f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one")
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in call.options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")

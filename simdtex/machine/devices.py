@@ -457,9 +457,9 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
     text : str, int, DeviceInfo or None
         Part of a device's name, platform or version (case does not matter), an index of the listing, or "reference" for
         the NumPy twin. None means the value of the environment variable SIMDTEX_DEVICE or, if that is unset or empty,
-        the first usable device of the listing. If several devices match, the result is the one whose whole name, alone
-        or with its platform as messages give it, is the text, else the only usable one of them, or of those whose
-        platform matches. A usable `DeviceInfo` is returned unchanged.
+        the first usable device of the listing. If several devices match, the result is the one whose whole name,
+        as printed, is the text, else the only usable one, or the only one by its platform. A usable `DeviceInfo` is
+        returned unchanged.
 
     Returns
     -------
@@ -505,10 +505,10 @@ def choose(
         raise DeviceError(_nothing_usable(found))
     matches = [check(info) for info in _matching(text, listing)]
     usable = [info for info in matches if info.usable]
-    of_platform = [info for info in usable if text.strip().lower() in info.platform.lower()]
-    for those in (usable, of_platform):  # PoCL's devices have the name of the processor, as "Intel"
-        if len(those) == 1:
-            return those[0]
+    if len(usable) > 1:  # PoCL's devices have the name of the processor, as "Intel"
+        usable = [info for info in usable if text.strip().lower() in info.platform.lower()] or usable
+    if len(usable) == 1:
+        return usable[0]
     if usable:
         raise DeviceError(f'"{text}" matches several devices; give the index of one of: {_indexed(usable)}.')
     if not matches:

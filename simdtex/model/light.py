@@ -84,8 +84,7 @@ class Trend(NamedTuple):
         every = _thinned(use)
         lines: Any = (np.arange(side)[part] for side, part in zip(self.shape, every, strict=True))
         whole, there = picture[every], use[every]
-        left = whole - self.at(*lines)
-        before, after = (np.abs(one[there] - np.median(one[there], 0)) for one in (whole, left))
+        before, after = (np.abs(one[there] - np.median(one[there], 0)) for one in (whole, whole - self.at(*lines)))
         return bool(np.median(after, 0).sum() < LEFT * np.median(before, 0).sum())
 
     def cast(self, values: NDArray[np.float64]) -> NDArray[Any]:

@@ -331,8 +331,9 @@ class Sample:
             if self.pictures.known:
                 found &= self._sure(apart, row + margin, col + margin)
             if not found.any():
-                remedy = "give more of it, a smaller order, such as order=2, or fewer levels"
-                raise NothingUsable(f"nothing of the sample may be used at some level; {remedy}")
+                raise NothingUsable(
+                    "nothing of the sample is usable at a level; give more of it, order=1 or 2, or fewer levels"
+                )
             allowed = found.ravel()
         everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
         reach = apart @ np.array([self.cols, 1], np.int32)
