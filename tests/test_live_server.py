@@ -65,7 +65,7 @@ class Client:
         host = host or f"127.0.0.1:{port}"
         origin = f"http://{host}" if origin is ... else origin
         tcp = socket.create_connection(("127.0.0.1", port))
-        how = {"sock": tcp, "origin": origin, "max_size": None, "compression": None}
+        how = {"sock": tcp, "origin": origin, "max_size": None, "compression": None, "ping_interval": None}
         self.socket = OPEN.enter_context(connect(f"ws://{host}/{token}/socket{query}", **how))
         self.say(kind="hello")
         self.hello = self.wait("hello")[0]
@@ -121,7 +121,18 @@ def test_there_is_nothing_else(port, name):
 
 
 OWN = ["127.0.0.1", "127.0.0.1:80", "localhost", "LOCALHOST:80", "[::1]", "[::1]:80"]
-OTHER = ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "192.168.1.5", "[fe80::1]:80", ""]
+OTHER = [
+    "[::1].evil.example",
+    "[::1]x:80",
+    "[127.0.0.1]",
+    "[evil.example]",
+    "::1",
+    "a@127.0.0.1",
+    "localhost.",
+    "x/127.0.0.1",
+]
+OTHER += ["127.0.0.1:", "127.0.0.1:80:90", "127.0.0.1:x", "127.0.0.1]", "2130706433", "evil.example", "evil.example:80"]
+OTHER += ["127.0.0.1.evil.example", "192.168.1.5", "[fe80::1]:80", ""]
 CASES = [*((host, "127.0.0.1", host in OWN) for host in OWN + OTHER), ("Wall.local:80", "wall.local", True)]
 CASES += [(host, "0.0.0.0", host in [*OWN, "192.168.1.5", "[fe80::1]:80"]) for host in OWN + OTHER]
 
@@ -344,30 +355,38 @@ def test_a_file_that_stops_half_way_ends_the_connection_and_others_go_on(monkeyp
         assert second.wait("picture")[0]["name"] == "b.png"
 
 
-def test_one_large_message_at_a_time_is_held(monkeypatch):
-    """However many files come at once, only one is in the memory."""
-    held, most, lock = [0], [0], threading.Lock()
-    read = sessions._read
+def test_a_reading_that_lasts_too_long_is_ended_and_waits_for_no_other_page(monkeypatch, port):
+    first, second, read = Client(port), Client(port), sessions.read_apart
+    both = threading.Barrier(2)  # which none passes before the other is read too
 
-    def reading(message, buffers):
-        with lock:
-            held[0] += 1
-            most[0] = max(most[0], held[0])
-        time.sleep(0.05)
-        with lock:
-            held[0] -= 1
-        return read(message, buffers)
+    def reading(name, data):
+        both.wait(60)
+        monkeypatch.setattr(sessions, "READ_WAIT", 0.0 if name == "a.png" else 60.0)
+        both.wait(60)
+        return read(name, data)
 
-    monkeypatch.setattr(sessions, "_read", reading)
-    with running() as (port, _):
-        clients = [Client(port) for _ in range(3)]
-        for client in clients:
-            for number in range(3):
-                client.say(png(texture()), kind="open", name=f"{number}.png")
-        for client in clients:
-            while client.wait("picture")[0]["name"] != "2.png":
-                pass
-        assert most == [1]
+    monkeypatch.setattr(sessions, "read_apart", reading)
+    for page in (first, second):
+        page.say(png(texture()), kind="open", name="b.png")
+    assert first.wait("picture")[0]["name"] == second.wait("picture")[0]["name"] == "b.png"
+    for page in (first, second):
+        page.say(png(texture()), kind="open", name="a.png")
+    assert "a.png cannot be read within 0 s" in first.wait("error")[0]["text"] and second.wait("error")
+
+
+def test_a_server_ends_while_a_file_is_read_and_a_page_does_not_read(monkeypatch):
+    entered, never = threading.Event(), threading.Event()
+    monkeypatch.setattr(sessions, "read_apart", lambda *_: (entered.set(), never.wait()))
+    monkeypatch.setattr(serving, "ENDING", 0.2)
+    with running() as (port, pages):
+        page, deaf = Client(port), Client(port)
+        page.say(png(texture()), kind="open", name="a.png")
+        entered.wait()
+        send, large = pages._sessions[deaf.key].send, bytes(2**27)
+        sending = threading.Thread(target=send, args=({"kind": "file"}, [large]), daemon=True)
+        sending.start()
+    sending.join()
+    never.set()
 
 
 @pytest.mark.parametrize("sizes", [[0], [-1], ["x"], [2**27 + 1], [4, 4]])

@@ -229,7 +229,7 @@ def catch_signals(context: click.Context) -> Iterator[None]:
             context.obj.stop()
             os.write(2, b"\nsimdtex: stopping after the current step; a second signal stops at once\n")
             return
-        if number == signal.SIGINT and postponed(frame):
+        if postponed(frame, number):
             return
         last, raised = raised, time.monotonic()
         if number == signal.SIGINT or raised - last > 1:  # some programs send SIGTERM twice at once
@@ -250,8 +250,8 @@ def catch_signals(context: click.Context) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def postponed(frame: FrameType | None) -> bool:
-    """Return whether an exception would do harm in a frame, and if so have SIGINT come again a little later.
+def postponed(frame: FrameType | None, number: int = signal.SIGINT) -> bool:
+    """Return whether an exception would do harm in a frame, and if so have the signal come again a little later.
 
     An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
     but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
@@ -259,8 +259,8 @@ def postponed(frame: FrameType | None) -> bool:
     """
     while frame:
         name, path = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
-        if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib"):
-            again = threading.Timer(0.02, interrupt_main)
+        if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+            again = threading.Timer(0.02, interrupt_main, (number,))
             again.daemon = True
             again.start()
             return True

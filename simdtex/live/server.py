@@ -16,7 +16,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -93,7 +93,6 @@ class Pages:
         self._sessions: dict[str, Session] = {}
         self._lost: dict[str, float] = {}  # time of the loss, the oldest first
         self._closed = threading.Event()
-        self.large = threading.Lock()  # held while a large message is received and handled
 
     def join(self, key: str | None, send: Send) -> Session | None:
         """Return the session of a page, its earlier one or a new one; None if there are too many."""
@@ -103,7 +102,7 @@ class Pages:
                 self._sessions[key].send = send
                 return self._sessions[key]
             self._expire()
-            if len(self._sessions) >= MAX_PAGES:
+            if self._closed.is_set() or len(self._sessions) >= MAX_PAGES:
                 return None
             session = Session(send, self._machine, self._picture)
             self._sessions[session.key] = session
@@ -133,9 +132,11 @@ class Pages:
     def close(self) -> None:
         """End all sessions."""
         self._closed.set()
-        for wait in (0.0, ENDING):
-            for session in self._sessions.values():
-                session.close(wait)
+        sessions, end = list(self._sessions.values()), time.monotonic() + ENDING
+        for session in sessions:
+            session.close()
+        for session in sessions:
+            session.close(max(0.0, end - time.monotonic()))
 
 
 def serve(
@@ -201,7 +202,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         compression=None,
         max_size=MAX_MESSAGE,
         max_queue=2,
-        ping_timeout=FILE_WAIT,  # pongs are not read while a message waits for another page's file
+        ping_timeout=FILE_WAIT,  # pongs are not read while a message waits for an earlier one
         open_timeout=ENDING,
         close_timeout=ENDING,
     )
@@ -210,8 +211,14 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
     try:
         yield listening.getsockname()[1]
     finally:
-        server.shutdown()
         pages.close()
+        ending = threading.Thread(target=server.shutdown, daemon=True)
+        ending.start()
+        ending.join(ENDING)
+        for connection in server.connections:  # a page that does not read cannot be told
+            with suppress(OSError):
+                connection.socket.shutdown(socket.SHUT_RDWR)
+        ending.join(ENDING)
 
 
 def _response(connection: ServerConnection, status: int, text: str, kind: str = "text/plain") -> Response:
@@ -226,7 +233,8 @@ def is_own_name(host: str, address: str) -> bool:
 
     For a server that listens on all addresses, any numeric address is valid, since only names can be redirected.
     """
-    name = host.partition("]")[0].lstrip("[") if host.startswith("[") else host.partition(":")[0].lower()
+    found = re.fullmatch(r"(?:\[([0-9a-f:.]*:[0-9a-f:.]*)\]|([^][:@/]+))(:[0-9]+)?", host.lower())
+    name = (found[1] or found[2]) if found else ""
     if name in (*LOOPBACK, address.lower()):
         return True
     with suppress(ValueError):
@@ -251,7 +259,7 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
         return
     try:
         for text in connection:
-            _carry(text, connection, session, pages)
+            _carry(text, connection, session)
     except ConnectionClosed:
         pass
     except TimeoutError:
@@ -262,14 +270,12 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
         pages.leave(session)
 
 
-def _carry(text: Data, connection: ServerConnection, session: Session, pages: Pages) -> None:
-    """Give a session a message and its file; a large one is handled before that of any other page is received."""
+def _carry(text: Data, connection: ServerConnection, session: Session) -> None:
+    """Give a session a message and its file; a large one is handled before the page's next one is received."""
     message = json.loads(text)
     sizes = message.pop("buffers", [])
-    large = bool(sizes) or len(text) > SMALL
-    with pages.large if large else nullcontext():
-        files = [_file(size, connection) for size in sizes[:1]]
-        session.follow(session.receive(message, files), every=large)
+    files = [_file(size, connection) for size in sizes[:1]]
+    session.follow(session.receive(message, files), every=bool(sizes) or len(text) > SMALL)
 
 
 def _file(size: Any, connection: ServerConnection) -> bytes:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import queue
 import secrets
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,13 +19,15 @@ from copy import deepcopy
 from functools import cache, partial
 from importlib.metadata import version
 from math import inf
+from multiprocessing import TimeoutError as Late
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing, pack
-from simdtex.io.image import EXAMPLES, TISSUE, example, read_bytes
+from simdtex.io.image import EXAMPLES, TISSUE, Image, example, read_bytes
 from simdtex.jobs.synthesis import synthesize
 from simdtex.live import frames
 from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
@@ -47,6 +50,9 @@ MAX_BYTES = 2**27
 
 MAX_PIXELS = 2**25
 """The most pixels of a picture from the page."""
+
+READ_WAIT = 60.0
+"""The most seconds to read a picture from the page."""
 
 MAX_STATE = 2**27
 """The most bytes of the state of a run at the end of a level, which is kept."""
@@ -173,7 +179,9 @@ class Session:
 
     def follow(self, handled: threading.Event, *, every: bool) -> None:
         """Wait until a message is handled; unless ``every``, only until fewer than `MAX_QUEUE` messages wait."""
-        while self._thread.is_alive() and not handled.is_set() and (every or self._messages.qsize() >= MAX_QUEUE):
+        while self._thread.is_alive() and not (self._closed or handled.is_set()):
+            if not every and self._messages.qsize() < MAX_QUEUE:
+                break
             handled.wait(0.01)
 
     def wait(self, timeout: float | None = None) -> Result:
@@ -601,5 +609,14 @@ def _read(message: Message, buffers: Sequence[Any]) -> Picture:
     name = name.replace("\\", "/").rpartition("/")[2][:100] or "picture"
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
-    found = read_bytes(name, data, max_pixels=MAX_PIXELS)
+    found = read_apart(name, data)
     return Picture(name, found.pixels, found.channel_axis, found.metadata)
+
+
+def read_apart(name: str, data: bytes) -> Image:
+    """Return the picture in the bytes of a file, read in a process of its own, which is ended after `READ_WAIT`."""
+    with get_context("spawn").Pool(1, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        try:
+            return pool.apply_async(read_bytes, (name, data), {"max_pixels": MAX_PIXELS}).get(READ_WAIT)
+        except Late:
+            raise ValueError(f"{name} cannot be read within {READ_WAIT:.0f} s: save it again as PNG") from None

@@ -137,7 +137,7 @@ def address_space() -> int:
 
 
 def _prepare_caches() -> None:
-    """Set XDG_CACHE_HOME to a temporary folder if the user's cache folder is not writable, else read the report there.
+    """Set XDG_CACHE_HOME to a temporary folder if one of the user's caches is not writable, else read the report there.
 
     PoCL does not start, and pyopencl raises, without a writable cache; and a damaged cache may crash every process.
     """
@@ -148,14 +148,18 @@ def _prepare_caches() -> None:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         report = folder / "simdtex" / "crashes.txt"
         report.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-            if file.write(bytes(2**16)) < 2**16:
-                raise OSError("the disk is full")
+        own = Path(os.environ.get("POCL_CACHE_DIR") or folder / "pocl" / "kcache")
+        inner = [own, folder / "pocl", *(folder / name for name in ("pyopencl", "pytools"))]
+        for each in [folder, report.parent, *filter(Path.is_dir, inner)]:
+            with tempfile.TemporaryFile(dir=each, buffering=0) as file:
+                if file.write(bytes(2**16)) < 2**16:
+                    raise OSError("the disk is full")
         text = report.read_text(errors="replace") if report.exists() else ""
     except (OSError, RuntimeError):  # the latter if there is no home folder
         temporary = tempfile.mkdtemp(prefix="simdtex-cache-")
         atexit.register(shutil.rmtree, temporary, ignore_errors=True)
         os.environ["XDG_CACHE_HOME"] = temporary
+        os.environ.pop("POCL_CACHE_DIR", None)
         return
     _report, _reported, apart = report, len(text), " in failure\n" in text
     if text and not text.endswith(_SAID):
@@ -259,6 +263,8 @@ def _program(context: cl.Context, source: str, options: tuple[str, ...]) -> cl.P
     with _lock, warnings.catch_warnings():
         warnings.simplefilter("ignore", pyopencl.CompilerWarning)
         try:
+            with suppress(pyopencl.Error):  # of a signal, at which LLVM removes the files that it is writing
+                return built()
             return built()
         except Exception as error:
             before, why = (_reported, pyopencl._PYOPENCL_NO_CACHE), one_line(error)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import prod
@@ -80,33 +81,45 @@ class Pool:
     """
 
     def __init__(self, queue: Any, largest: int) -> None:
-        self._queue, self._largest, self._made, self._free = queue, largest, 0, dict[int, list[Any]]()
+        self._queue, self._largest, self._made, self._free = queue, largest, 0, dict[int, list[Taken]]()
+        self._used: set[Taken] = set()
 
     @property
     def active_bytes(self) -> int:
         """Bytes of the buffers that arrays have."""
         return self._made - sum(size * len(free) for size, free in self._free.items())
 
-    def take(self, size: int) -> Taken:
-        """Return a buffer of at least ``size`` bytes, a quarter more at most."""
+    def take(self, size: int) -> Use:
+        """Return the use of a buffer of at least ``size`` bytes, a quarter more at most."""
         unit = 1 << max(6, size.bit_length() - 3)
         size = max(1, -(-size // unit)) * unit
         if self._largest > 0:
             size = min(size, self._largest)
         free = self._free.setdefault(size, [])
         try:
-            return Taken(free.pop(), free)
+            before = free.pop()
         except IndexError:
-            pass
+            return self._use(self._allocated(size), free)
+        self._used.discard(before)
+        return self._use(before.buffer, free)
+
+    def _use(self, buffer: Any, free: list[Taken]) -> Use:
+        use = Use(buffer)
+        self._used.add(Taken(use, free))
+        return use
+
+    def _allocated(self, size: int) -> Any:
+        """Return a new buffer, in place of all free ones if there is no memory."""
         try:
             buffer = self._new(size)
         except cl.MemoryError:
             self._made = self.active_bytes
             for unused in self._free.values():
+                self._used.difference_update(unused)
                 unused.clear()
             buffer = self._new(size)
         self._made += size
-        return Taken(buffer, free)
+        return buffer
 
     def _new(self, size: int) -> Any:
         """Return a buffer to which a byte was copied, since some runtimes only then find that there is no memory."""
@@ -115,17 +128,31 @@ class Pool:
         return buffer
 
 
-class Taken:
-    """A buffer of a `Pool`, which gets it back in the end."""
+class Use:
+    """The use of a buffer of a `Pool` by arrays, which ends with the last of them."""
 
-    __slots__ = ("buffer", "free")
+    __slots__ = ("__weakref__", "buffer")
 
-    def __init__(self, buffer: Any, free: list[Any]) -> None:
-        self.buffer, self.free = buffer, free
+    def __init__(self, buffer: Any) -> None:
+        self.buffer = buffer
 
-    def __del__(self) -> None:
-        """Give the buffer back."""
-        self.free.append(self.buffer)
+
+class Taken(weakref.ref[Use]):
+    """A used buffer, which is appended to the free ones when its use ends.
+
+    It is its own callback's argument, so that only C code runs then: a signal raises nothing that would be lost.
+    """
+
+    __slots__ = ("buffer",)
+
+    def __new__(cls, use: Use, free: list[Taken]) -> Taken:
+        """Return a reference that ``free`` gets in the end."""
+        found = super().__new__(cls, use, free.append)
+        found.buffer = use.buffer
+        return found
+
+    def __init__(self, use: Use, free: list[Taken]) -> None:
+        super().__init__(use, free.append)
 
 
 class DeviceArray:
