@@ -161,13 +161,14 @@ def georeferenced(made: Any, crs: str) -> Any:
     with suppress(ImportError):  # the extra rasters
         from rasterio.crs import CRS
 
-        unit = CRS.from_wkt(crs).units_factor[0]
-        own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
-        found = found.assign_coords(
-            {axis: found[axis].assign_attrs(own | found[axis].attrs) for axis in "xy" if axis in found.coords}
-        )
+        system = CRS.from_wkt(crs)
+        unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
+        for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
+            if axis in found.coords:
+                named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
+                found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
     for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.encoding["grid_mapping"] = "spatial_ref"
+        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
     return found
 
 
@@ -262,7 +263,8 @@ def classify(
         names = {int(label): str(label) for label in np.unique(labels[labels > 0])}
     else:
         names = dict(enumerate(data["textures"], 1))
-    image.check_writable(output, np.uint8, 1)
+    image.check_writable(output, np.uint8, 1, labels=True)
+    place = whole.metadata and whole.metadata.geo and whole.metadata.geo.place()
     if confidence:
         image.check_writable(confidence, suffixes=FITS)
     if true is not None and (strange := np.setdiff1d(true, [0, *names, UNLABELLED])).size:
@@ -270,9 +272,9 @@ def classify(
             f"{truth} has the label {strange[0]}; give labels of the classes, 0 for unknown textures, and {UNLABELLED} "
             "for pixels without a known label"
         )
-    writers: list[Any] = [lambda made, run: write_labels(output, made)]
+    writers: list[Any] = [lambda made, run: write_labels(output, made, place)]
     if confidence:
-        writers.append(lambda made, run: image.write(confidence, run.fit))
+        writers.append(lambda made, run: image.write(confidence, run.fit, image.Metadata(geo=place, plain=True)))
 
     def report(folder: Path, made: Any, run: Any) -> None:
         from simdtex.report.synthesis import write_classification

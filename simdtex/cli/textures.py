@@ -20,6 +20,7 @@ from simdtex.cli.command import ENTER, RESUME, RUNS, command, note
 from simdtex.cli.inputs import (
     Also,
     Folder,
+    Material,
     Reading,
     arranged,
     check_profiles,
@@ -223,7 +224,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         left_out = ("tiles", "workers", "also", "source_map", "preview")
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    like = material.metadata and material.metadata._replace(exif=None, geo=None)  # a new picture was taken nowhere
+    like = material.metadata and material.metadata.elsewhere()
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
@@ -374,7 +375,7 @@ def fill(
 
     how = Reading(palette=bool(options["categorical"]))
     target, whole = read_lead([picture], output, options, how)
-    pixels, hole = _hole(whole.pixels[0], mask, invert)
+    pixels, hole = _hole(whole, mask, invert)
     whole = whole._replace(pixels=[pixels])
     texture = read_material(samples, how) if samples else None
     if texture:
@@ -392,17 +393,17 @@ def fill(
     )
 
 
-def _hole(pixels: NDArray[Any], mask: Path | None, invert: bool | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def _hole(whole: Material, mask: Path | None, invert: bool | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Return the picture, and its hole: where the mask is white or, without one, it is not opaque; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
-    pixels, gone = np.ma.getdata(pixels), planes(np.ma.getmaskarray(pixels)).any(-1)
+    pixels, gone = np.ma.getdata(whole.pixels[0]), planes(np.ma.getmaskarray(whole.pixels[0])).any(-1)
     if mask:
         hole = read_mask(mask, pixels.shape) != bool(invert)
     elif invert:
         raise ValueError("--invert requires --mask; leave it out")
     else:
-        pixels, hole = split_alpha(pixels, opaque=True)
+        pixels, hole = split_alpha(pixels, opaque=True, plain=bool(whole.metadata and whole.metadata.plain))
     return pixels, hole | gone | unknown_in(planes(pixels))
 
 
