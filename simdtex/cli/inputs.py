@@ -110,16 +110,12 @@ class Also(NamedTuple):
 
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
-    def write(self, made: Any, run: Any) -> None:
-        """Write the map, arranged as the output of a run."""
+    def write(self, lead: Metadata | None, made: Any, run: Any) -> None:
+        """Write the map, arranged as the output of a run, which has the metadata ``lead``."""
         from simdtex.io import image
 
-        image.write(self.out, self.carried(run.source), self.maps.metadata)
-
-    def beside(self, lead: Metadata | None) -> Also:
-        """Return the map with the place of an output that has the metadata ``lead``."""
-        metadata = self.maps.metadata and self.maps.metadata.beside(lead)
-        return self._replace(maps=self.maps._replace(metadata=metadata))
+        metadata = self.maps.metadata and self.maps.metadata.at(lead)
+        image.write(self.out, self.carried(run.source), metadata)
 
 
 def planes(pixels: NDArray[Any]) -> NDArray[Any]:
@@ -157,12 +153,7 @@ def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = Non
     if path.suffix.lower() in LOSSY:
         suffix = suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
         note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
-    if (
-        metadata
-        and metadata.geo
-        and metadata.geo != metadata.geo.values()
-        and path.suffix.lower() not in (".tif", ".tiff")
-    ):
+    if metadata and metadata.geo and path.suffix.lower() not in (".tif", ".tiff"):
         note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
@@ -538,7 +529,7 @@ class Folder:
         with atomic_folder(self.output) as temporary:
             image.write(temporary / lead.out.name, made, metadata)
             for one in others:
-                one._replace(out=temporary / one.out.name).beside(metadata).write(made, run)
+                one._replace(out=temporary / one.out.name).write(metadata, made, run)
 
     def __str__(self) -> str:
         return f"{self.output} ({len(self.maps)} maps arranged by {self.lead.name})"
@@ -567,7 +558,7 @@ def arranged(
         raise ValueError(f"{foreign}; {'leave --also out' if also else 'give one picture'}")
     if source_map:
         check_source_map(source_map, samples, everywhere=not foreign)
-    others, pixels = [one.beside(metadata) for one in read_also(also, samples)], samples.pixels[0]
+    others, pixels = read_also(also, samples), samples.pixels[0]
     if isinstance(output, Folder):
         output.read(samples)
         writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
@@ -576,7 +567,7 @@ def arranged(
         if kept:
             note_lossy(output, pixels, metadata)
         writers = [lambda made, run: image.write(output, made, metadata)]
-    writers += [one.write for one in others]
+    writers += [partial(one.write, metadata) for one in others]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     if options.pop("preview", False):

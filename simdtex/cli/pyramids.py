@@ -38,7 +38,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
 
     material = read_material(samples)
     chosen = read_inputs("mix", options, material)
-    pixels, metadata = material.pixels, material.metadata and material.metadata.elsewhere()
+    pixels, metadata = material.pixels, material.metadata and material.metadata.at()._replace(exif=None)
     shape = output_shape(size, pixels[0])
     chosen["channel_axis"] = -1 if any(one.ndim > 2 for one in pixels) else None
     image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)), metadata=metadata)

@@ -224,7 +224,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         left_out = ("tiles", "workers", "also", "source_map", "preview")
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    like = material.metadata and material.metadata.elsewhere()
+    like = material.metadata and material.metadata.at()._replace(exif=None)
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 

@@ -92,7 +92,7 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
     for one in found:
         plain = bool(one.metadata and one.metadata.plain)
         suffix = suitable_suffix(one.pixels[0].dtype, channels(one.pixels[0]), plain=plain)
-        one = one._replace(metadata=one.metadata and one.metadata.elsewhere())
+        one = one._replace(metadata=one.metadata and one.metadata.at())
         maps.append(Also(one, Path("-".join(path.stem for path in one.paths) + suffix)))
     return maps
 

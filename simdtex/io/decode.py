@@ -95,14 +95,10 @@ class Metadata(NamedTuple):
     white: int | None = None
     plain: bool = False
 
-    def elsewhere(self) -> Metadata:
-        """Return the metadata of a new picture with such values, which was taken nowhere."""
-        return self._replace(exif=None, geo=self.geo and self.geo.values())
-
-    def beside(self, lead: Metadata | None) -> Metadata:
-        """Return the metadata of a map of an output, which has the place of the output's ``lead``."""
-        if self.geo and lead and lead.geo:
-            return self._replace(geo=lead.geo._replace(nodata=self.geo.nodata, about=self.geo.about))
+    def at(self, other: Metadata | None = None) -> Metadata:
+        """Return the metadata of a picture with such values at the place of another, or at none."""
+        if self.geo and other and other.geo:
+            return self._replace(geo=other.geo._replace(nodata=self.geo.nodata, about=self.geo.about))
         return self._replace(geo=self.geo and self.geo.values())
 
 
