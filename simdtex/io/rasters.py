@@ -267,47 +267,41 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         known = {**guessed.coordinates, **guessed.axes}
         axes = {name: axis for axis, keys in means.items() for key in keys for name in known.get(key, ())}
         found: dict[str, Any] = {}
-        counted: dict[str, str] = {}
+        notes: dict[str, str] = {}
         for name, one in data.data_vars.items():
             dims = [str(dim) for dim in one.dims]
             if all(dim.startswith("phony_dim") for dim in dims) and len(dims) in (2, 3):
-                named: dict[str, str | None] = dict(zip(dims, "zyx"[-len(dims) :], strict=True))
+                named = dict(zip(dims, "zyx"[-len(dims) :], strict=True))
             else:
-                named = {dim: axes.get(dim) or axis_of(dim) or _counted(dim) for dim in dims}
-            axis_dims = {dim: axis for dim, axis in named.items() if axis}
-            if not {"x", "y"} <= {*axis_dims.values()} or len({*axis_dims.values()}) < len(axis_dims):
+                every = {dim: axes.get(dim) or axis_of(dim) or _counted(dim) for dim in dims}
+                named = {dim: axis for dim, axis in every.items() if axis}
+            if not {"x", "y"} <= {*named.values()} or len({*named.values()}) < len(named):
                 continue
-            counted |= {dim: axis for dim, axis in axis_dims.items() if _counted(dim)}
+            notes |= {dim: f"{dim} counts cells of {axis}" for dim, axis in named.items() if _counted(dim)}
             # a coordinate of several axes, such as the longitude of each cell, is none of the grid
             one = one.drop_vars([key for key, own in one.coords.items() if own.ndim and own.dims != (key,)])
-            found |= _steps(str(name), one.rename({dim: axis for dim, axis in axis_dims.items() if axis != dim}))
-        if not found:
-            raise Refused("has no variable with the axes y and x, or z, y and x: rename its dimensions")
-        found = {name: _ascending(one) for name, one in found.items()}
-        places, uneven = {}, {}
-        for name, one in found.items():
+            one = _ascending(one.rename({dim: axis for dim, axis in named.items() if axis != dim}))
             try:
-                places[name] = [axis_place(one, axis) for axis in "xyz"]
+                place = [axis_place(one, axis) for axis in "xyz"]
             except ValueError as error:
-                uneven[name] = error
-        if not places:
-            raise next(iter(uneven.values()))
-        lead, place = next(iter(places.items()))
-        found = {
-            name: found[name] for name, own in places.items() if own == place and found[name].sizes == found[lead].sizes
-        }
+                notes[str(name)] = f"{name} is left out, since {error}"
+                continue
+            if not found:
+                first, of_first, sizes = one, place, {axis: one.sizes.get(axis) for axis in "xyz"}
+            if (place, {axis: one.sizes.get(axis) for axis in "xyz"}) == (of_first, sizes):
+                found |= _steps(str(name), one)
+        if not found:
+            why = ", ".join(notes.values()) or "it has no variable with the axes y and x, or z, y and x"
+            raise Refused(f"is not read as a grid: {why}; rename its dimensions, or interpolate it")
         for one in found.values():
             check_array(one.shape, one.dtype.itemsize, most // len(found))
         arrays = {name: _valid(one.load()) for name, one in found.items()}
-        first = arrays[lead]
         mapping = data.get(str({**first.attrs, **first.encoding}.get("grid_mapping", "")).partition(":")[0])
         crs = "" if mapping is None else _wkt(mapping.attrs)
-    for name, error in uneven.items():
-        warnings.warn(f"{name} is left out: {error}", DataWarning, stacklevel=2)
-    if counted:
-        text = ", ".join(f"{dim} is {axis}" for dim, axis in counted.items())
-        warnings.warn(f"dimensions that count cells are taken as axes: {text}", DataWarning, stacklevel=2)
-    origin, cell = zip(*place, strict=True)
+    if notes:
+        warnings.warn(f"{os.fspath(path)}: {', '.join(notes.values())}", DataWarning, stacklevel=2)
+    first = next(iter(arrays.values()))
+    origin, cell = zip(*of_first, strict=True)
     told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
     return values, origin, cell, crs, told
@@ -325,7 +319,7 @@ def _wkt(about: Mapping[Any, Any]) -> str:
     try:
         from pyproj import CRS
 
-        return str(CRS.from_cf(about).to_wkt())
+        return str(CRS.from_cf(dict(about)).to_wkt())
     except Exception as error:  # without pyproj, too
         text = f"the reference system of the grid mapping is not known ({error}): install simdtex[rasters] to read it"
         warnings.warn(text, DataWarning, stacklevel=3)
