@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
-from simdtex.cli.inputs import output_shape, read_material, read_picture
+from simdtex.cli.inputs import check_output, output_shape, read_material, read_picture
 from simdtex.cli.job import Task, command_line, expected, job, watching
 from simdtex.cli.options import (
     DEVICE,

@@ -390,9 +390,7 @@ def check_writable(
         if suffix in LOSSY and (labels or metadata.palette):
             raise ValueError(f"{target}: JPEG changes labels and categories: end its name in {other} instead")
         if metadata.plain and channels in _ALPHA and suffix not in _PLAIN:
-            raise ValueError(
-                f"{target}: {suffix} takes the last of {channels} bands for alpha: end its name in {other}"
-            )
+            raise ValueError(f"{target}: {suffix} shows band {channels} as alpha: end its name in {other} instead")
 
 
 def check_holds(

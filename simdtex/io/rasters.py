@@ -291,8 +291,9 @@ def read_netcdf(path: PathLike, most: int) -> Library:
             if (place, {axis: one.sizes.get(axis) for axis in "xyz"}) == (of_first, sizes):
                 found |= _steps(str(name), one)
         if not found:
-            why = ", ".join(notes.values()) or "it has no variable with the axes y and x, or z, y and x"
-            raise Refused(f"is not read as a grid: {why}; rename its dimensions, or interpolate it")
+            if notes:
+                raise Refused(f"has no even grid ({', '.join(notes.values())}): interpolate it first")
+            raise Refused("has no variable with the axes y and x, or z, y and x: rename its dimensions")
         for one in found.values():
             check_array(one.shape, one.dtype.itemsize, most // len(found))
         arrays = {name: _valid(one.load()) for name, one in found.items()}
