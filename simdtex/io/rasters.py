@@ -54,6 +54,9 @@ _COUNTED = {"x": "n?i|xi_.+|west_east.*|n_?lon", "y": "n?j|eta_.+|south_north.*|
 _OF_BANDS = ("descriptions", "scales", "offsets", "units", "colorinterp")
 """What rasterio says of each band, in the order in which it is written."""
 
+_NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""The transform of a raster without one."""
+
 _CF = ("long_name", "standard_name", "units", "positive")
 """Attributes of a coordinate or a variable in the CF conventions that realisations keep."""
 
@@ -97,15 +100,18 @@ class Georeference(NamedTuple):
         if polynomials:
             polynomials.samp_off, polynomials.line_off = polynomials.samp_off + left, polynomials.line_off + top
         place = (a, b, c - a * left - b * top, d, e, f - d * left - e * top)
+        place = place if self.transform != _NOWHERE else _NOWHERE
         return self._replace(transform=place, points=points, polynomials=polynomials)
 
     def place(self) -> Georeference:
         """Return the georeference of other values at the same place."""
         return self._replace(nodata=None, about={})
 
-    def values(self) -> Georeference:
-        """Return what is said of the values, for a raster at no place."""
-        return Georeference("", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0), self.nodata, about=self.about)
+    def values(self) -> Georeference | None:
+        """Return what is said of the values, for a raster at no place; None if they are plain numbers without names."""
+        about = {name: self.about[name] for name in _OF_BANDS}
+        told = [*about["descriptions"], *about["units"], *about["offsets"], *(one != 1 for one in about["scales"])]
+        return Georeference("", _NOWHERE, about=about) if any(told) else None
 
     @property
     def alpha(self) -> bool:
@@ -165,8 +171,10 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         geo = Georeference(
             crs.to_wkt() if crs else "", tuple(raster.transform)[:6], raster.nodata, points, raster.rpcs, about
         )
-        apart = geo.alpha and raster.count in (2, 4)
-        pixels = raster.read(raster.indexes[: -1 if geo.alpha and not apart else None], masked=not apart)
+        pixels = raster.read(masked=not geo.alpha)
+        if geo.alpha and raster.count not in (2, 4):
+            gone = np.broadcast_to(pixels[-1] == 0, pixels[:-1].shape)
+            pixels = np.ma.MaskedArray(pixels[:-1], gone)
     pixels = np.moveaxis(pixels, 0, -1)
     if not np.ma.is_masked(pixels):
         pixels = np.ma.getdata(pixels)
@@ -332,10 +340,12 @@ def _valid(array: Any) -> Any:
     low, high = np.ravel(array.attrs.get("valid_range", (-np.inf, np.inf)))
     limits = np.ravel([array.attrs.get("valid_min", low), array.attrs.get("valid_max", high)])
     told = next((array.attrs[name] for name in ("valid_range", "valid_min", "valid_max") if name in array.attrs), 0.0)
-    scale, offset = (array.encoding.get(name, usual) for name, usual in (("scale_factor", 1), ("add_offset", 0)))
-    if (scale, offset) != (1, 0) and np.asarray(told).dtype == array.encoding["dtype"]:
-        half = np.array([-0.5, 0.5])  # of a packed value, since both are rounded
-        limits = np.sort((limits + half) * scale + offset)
+    packed, kind = array.encoding, np.asarray(told).dtype
+    if kind.kind == "i" and packed.get("_Unsigned") == "true":
+        limits = np.where(limits < 0, limits + 256.0**kind.itemsize, limits)
+    if packed.keys() & {"scale_factor", "add_offset"} and kind == packed["dtype"]:
+        limits = limits + (-0.5, 0.5)  # of a packed value, since both are rounded
+        limits = np.sort(limits * packed.get("scale_factor", 1) + packed.get("add_offset", 0))
     outside = (array.values < limits[0]) | (array.values > limits[1])
     return array.where(~outside) if outside.any() else array
 
