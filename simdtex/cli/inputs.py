@@ -110,11 +110,12 @@ class Also(NamedTuple):
 
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
-    def write(self, made: Any, run: Any) -> None:
-        """Write the map, arranged as the output of a run."""
+    def write(self, lead: Metadata | None, made: Any, run: Any) -> None:
+        """Write the map, arranged as the output of a run, which has the metadata ``lead``."""
         from simdtex.io import image
 
-        image.write(self.out, self.carried(run.source), self.maps.metadata)
+        metadata = self.maps.metadata and self.maps.metadata.at(lead)
+        image.write(self.out, self.carried(run.source), metadata)
 
 
 def planes(pixels: NDArray[Any]) -> NDArray[Any]:
@@ -132,13 +133,14 @@ def size_text(pixels: NDArray[Any]) -> str:
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def without_alpha(pixels: NDArray[Any], count: int) -> np.ma.MaskedArray[Any, Any]:
+def without_alpha(one: Read, count: int) -> np.ma.MaskedArray[Any, Any]:
     """Return a picture without the alpha that pictures of so many channels lack, masked where it is transparent."""
     from simdtex.io.image import split_alpha
 
+    pixels, plain = one.pixels, one.grid is not None or bool(one.metadata and one.metadata.plain)
     found: NDArray[Any] = np.ma.getdata(pixels)
     gone: NDArray[np.bool_] = np.asarray(planes(np.ma.getmaskarray(pixels)).any(-1))
-    if channels(found) == count + 1:
+    if channels(found) == count + 1 and not plain:
         found, clear = split_alpha(found)
         gone = gone | clear
     return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
@@ -149,7 +151,7 @@ def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = Non
     from simdtex.io.image import LOSSY, suitable_suffix
 
     if path.suffix.lower() in LOSSY:
-        suffix = suitable_suffix(pixels.dtype, channels(pixels))
+        suffix = suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
         note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
     if metadata and metadata.geo and path.suffix.lower() not in (".tif", ".tiff"):
         note(f"{path} holds no georeference; end its name in .tif to keep it")
@@ -216,7 +218,7 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
     if how.deep:
         return Read(values if len(values) > 1 else values[0], None, grid)
-    return Read(values[0, ::-1], Metadata(geo=grid.georeference, ascending=True), grid)
+    return Read(values[0, ::-1], Metadata(geo=grid.georeference, ascending=True, plain=True), grid)
 
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
@@ -239,10 +241,18 @@ def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
         raise ValueError(f"{option} names {counts}; give one for each sample")
 
 
+def check_output(path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False) -> None:
+    """Raise unless a picture can be written like ``pixels``, which are labels if there are few of them."""
+    from simdtex.io import image
+    from simdtex.model.pictures import few
+
+    lossy = path.suffix.lower() in image.LOSSY
+    labels = lossy and bool(categorical or few([planes(np.ma.getdata(pixels))]))
+    image.check_writable(path, pixels.dtype, channels(pixels), metadata=metadata, labels=labels)
+
+
 def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
     """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
-    from simdtex.io import image
-
     found = []
     for paths, out in pairs:
         check_each("--also", paths, samples)
@@ -253,7 +263,7 @@ def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, fi
                 sizes = f"{path} is {size_text(pixels)} and {of} {size_text(sample)}"
                 raise ValueError(f"{sizes}; give --also a map of the sample's size")
         if files:
-            image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
+            check_output(out, maps.pixels[0], maps.metadata)
         found.append(Also(maps, out))
     return found
 
@@ -336,7 +346,7 @@ def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[
             raise ValueError(f"{files.flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
         for file in paths:
-            pixels = without_alpha(read_pixels(file, files.how).pixels, channels(picture.array))
+            pixels = without_alpha(read_pixels(file, files.how), channels(picture.array))
             check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
             found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
     return found
@@ -433,12 +443,12 @@ def read_known(path: Path, files: Files) -> Any:
         return table
     how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     how = how._replace(palette=how.palette and samples.channel_axis is None)
-    values, metadata, grid = read_pixels(path, how)
-    check_profiles([samples.paths[0], path], [samples.metadata, metadata])
-    if grid is not None and how.deep:
-        return in_place(values, grid)
-    files.options["geo"] = metadata and metadata.geo and metadata.geo._replace(nodata=None)  # all of it is known then
-    found = without_alpha(values, channels(values if grid else samples.pixels[0]))  # a grid has no alpha
+    one = read_pixels(path, how)
+    check_profiles([samples.paths[0], path], [samples.metadata, one.metadata])
+    if one.grid is not None and how.deep:
+        return in_place(one.pixels, one.grid)
+    files.options["geo"] = one.metadata and one.metadata.geo and one.metadata.geo.place()
+    found = without_alpha(one, channels(samples.pixels[0]))
     return found.reshape(found.shape[:2]) if channels(found) == 1 else found
 
 
@@ -482,14 +492,14 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
     check_each(files.flag, paths, samples)
     how = Reading(files.how.deep, palette=True, channels=True, ascending=files.how.ascending)
     found = [read_pixels(path, how) for path in (*paths, out)]
-    pictures, is_grid = tuple(one.pixels for one in found), found[-1].grid is not None
+    pictures = tuple(one.pixels for one in found)
     if volumes := [path for path, one in zip((*paths, out), pictures, strict=True) if one.ndim > 3]:
         raise ValueError(f"{volumes[0]} is a volume; give a guide of one layer")
     palettes = [one.metadata and one.metadata.palette for one in found]
     if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
         pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
     *own, wanted = pictures
-    shown = without_alpha(wanted, channels(wanted if is_grid else own[0]))  # a grid has no alpha
+    shown = without_alpha(found[-1]._replace(pixels=wanted), channels(own[0]))
     wanted, free = shown.data, planes(np.ma.getmaskarray(shown)).any(-1) | unknown_in(planes(shown.data))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
@@ -545,7 +555,8 @@ class Folder:
             if maps.sizes != lead.sizes:
                 sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
                 raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
-            suffix = suitable_suffix(maps.pixels[0].dtype, channels(maps.pixels[0]), path.suffix)
+            own, plain = maps.pixels[0], bool(maps.metadata and maps.metadata.plain)
+            suffix = suitable_suffix(own.dtype, channels(own), path.suffix, plain=plain)
             self.maps.append(Also(maps, self.output / f"{path.stem}{suffix}"))
         names = [one.out.name for one in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
@@ -564,7 +575,7 @@ class Folder:
         with atomic_folder(self.output) as temporary:
             image.write(temporary / lead.out.name, made, metadata)
             for one in others:
-                image.write(temporary / one.out.name, one.carried(run.source), one.maps.metadata)
+                one._replace(out=temporary / one.out.name).write(metadata, made, run)
 
     def __str__(self) -> str:
         return f"{self.output} ({len(self.maps)} maps arranged by {self.lead.name})"
@@ -598,11 +609,11 @@ def arranged(
         output.read(samples)
         writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
     else:
-        image.check_writable(output, pixels.dtype, channels(pixels))
+        check_output(output, pixels, metadata, options.get("categorical"))
         if kept:
             note_lossy(output, pixels, metadata)
         writers = [lambda made, run: image.write(output, made, metadata)]
-    writers += [one.write for one in others]
+    writers += [partial(one.write, metadata) for one in others]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     if options.pop("preview", False):

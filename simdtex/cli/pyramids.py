@@ -38,10 +38,10 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
 
     material = read_material(samples)
     chosen = read_inputs("mix", options, material)
-    pixels, metadata = material.pixels, material.metadata and material.metadata._replace(exif=None)
+    pixels, metadata = material.pixels, material.metadata and material.metadata.at()._replace(exif=None)
     shape = output_shape(size, pixels[0])
     chosen["channel_axis"] = -1 if any(one.ndim > 2 for one in pixels) else None
-    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)))
+    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)), metadata=metadata)
     return Task(
         partial(mix, pixels, shape, **given(options | chosen)),
         f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",

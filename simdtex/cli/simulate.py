@@ -251,7 +251,8 @@ def classify(
         names = {int(label): str(label) for label in np.unique(labels[labels > 0])}
     else:
         names = dict(enumerate(data["textures"], 1))
-    image.check_writable(output, np.uint8, 1)
+    image.check_writable(output, np.uint8, 1, labels=True)
+    place = whole.metadata and whole.metadata.geo and whole.metadata.geo.place()
     if confidence:
         image.check_writable(confidence, suffixes=FITS)
     if true is not None and (strange := np.setdiff1d(true, [0, *names, UNLABELLED])).size:
@@ -259,9 +260,9 @@ def classify(
             f"{truth} has the label {strange[0]}; give labels of the classes, 0 for unknown textures, and {UNLABELLED} "
             "for pixels without a known label"
         )
-    writers: list[Any] = [lambda made, run: write_labels(output, made)]
+    writers: list[Any] = [lambda made, run: write_labels(output, made, place)]
     if confidence:
-        writers.append(lambda made, run: image.write(confidence, run.fit))
+        writers.append(lambda made, run: image.write(confidence, run.fit, image.Metadata(geo=place, plain=True)))
 
     def report(folder: Path, made: Any, run: Any) -> None:
         from simdtex.report.synthesis import write_classification

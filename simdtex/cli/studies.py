@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
-from simdtex.cli.inputs import channels, output_shape, read_material, read_picture
+from simdtex.cli.inputs import check_output, output_shape, read_material, read_picture
 from simdtex.cli.job import Task, command_line, expected, job, watching
 from simdtex.cli.options import (
     DEVICE,
@@ -183,8 +183,8 @@ def maspar(sample: Path, output: Path, size: str | None, film: str, **options: A
     names = [get(name.strip()).name for name in film.split(",")]
     material = read_material([sample])
     shape: Any = output_shape(size, material.pixels[0])
-    image.check_writable(output, material.pixels[0].dtype, channels(material.pixels[0]))
-    like = material.metadata and material.metadata._replace(exif=None, geo=None)
+    like = material.metadata and material.metadata.at()._replace(exif=None)
+    check_output(output, material.pixels[0], like)
 
     def make(checkpoint: None, **call: Any) -> Any:
         return synthesize(material.array, shape, channel_axis=material.channel_axis, **given(options), **call)

@@ -228,8 +228,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         left_out = ("tiles", "workers", "also", "source_map", "preview")
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    # a new picture was taken nowhere
-    like = (material.metadata or NOTHING)._replace(exif=None, geo=options.pop("geo", None))
+    place = options.pop("geo", None)  # a new picture was taken nowhere else
+    like = (material.metadata or NOTHING).at(place and NOTHING._replace(geo=place))._replace(exif=None)
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
 
@@ -408,7 +408,7 @@ def _hole(whole: Material, mask: Path | None, invert: bool | None) -> tuple[NDAr
     elif invert:
         raise ValueError("--invert requires --mask; leave it out")
     else:
-        pixels, hole = split_alpha(pixels, opaque=True)
+        pixels, hole = split_alpha(pixels, opaque=True, plain=bool(whole.metadata and whole.metadata.plain))
     return pixels, hole | gone | unknown_in(planes(pixels))
 
 

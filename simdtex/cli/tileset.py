@@ -93,7 +93,9 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
             raise ValueError(f"{path} has another size than {lead.paths[0].name}; scale it, or move it elsewhere")
     maps = []
     for one in found:
-        suffix = suitable_suffix(one.pixels[0].dtype, channels(one.pixels[0]))
+        plain = bool(one.metadata and one.metadata.plain)
+        suffix = suitable_suffix(one.pixels[0].dtype, channels(one.pixels[0]), plain=plain)
+        one = one._replace(metadata=one.metadata and one.metadata.at())
         maps.append(Also(one, Path("-".join(path.stem for path in one.paths) + suffix)))
     return maps
 

@@ -84,6 +84,8 @@ class Metadata(NamedTuple):
         The value of white if it is not full scale: the maximum in the header of a PGM or PPM.
     ascending : bool
         Whether the picture is of a grid, so that an ``.npy`` of it begins with the smallest y.
+    plain : bool
+        Whether the file says that none of its channels is alpha, also if there are two or four of them.
     """
 
     profile: bytes | None = None
@@ -94,6 +96,14 @@ class Metadata(NamedTuple):
     palette: bytes | None = None
     white: int | None = None
     ascending: bool = False
+    plain: bool = False
+
+    def at(self, other: Metadata | None = None) -> Metadata:
+        """Return the metadata of a picture with such values at the place of another, or at none."""
+        if other and other.geo:
+            own = self.geo or other.geo.place()
+            return self._replace(geo=other.geo._replace(nodata=own.nodata, about=own.about))
+        return self._replace(geo=self.geo and self.geo.values())
 
 
 NOTHING = Metadata()
@@ -139,8 +149,12 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
         return _read_pnm(data, header, most)
     tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
     if data[:5].lower() == b"ncols" or (tiff and rasters.is_raster(io.BytesIO(data))):
-        pixels, geo, names = rasters.read_raster(data, most)
-        return _Found(pixels, names[-1] == "alpha", metadata=Metadata(geo=geo))
+        pixels, geo = rasters.read_raster(data, most)
+        metadata = Metadata(geo=geo, plain=not geo.alpha)
+        if pixels.dtype == np.uint8 and (colours := geo.about.get("colours")):
+            table = np.array([colours.get(k, (0, 0, 0))[:3] for k in range(256)], np.uint8)
+            metadata = metadata._replace(palette=table.tobytes())
+        return _Found(pixels, geo.alpha and pixels.ndim == 3 and pixels.shape[2] in (2, 4), metadata=metadata)
     if tiff:
         return _read_tiff(data, most, palette)
     if data.startswith(b"\x76\x2f\x31\x01"):
@@ -347,6 +361,7 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
         pixels = pixels.transpose([page.axes.index(axis) for axis in "YXS" if axis in page.axes])
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
+        metadata = metadata._replace(plain=extra not in (1, 2))
     return _Found(_shown(page, pixels), extra in (1, 2), orientation, metadata)
 
 

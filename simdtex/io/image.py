@@ -112,7 +112,7 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
 
 
-def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray[np.bool_]]:
+def split_alpha(pixels: ArrayLike, opaque: bool = False, plain: bool = False) -> tuple[Array, NDArray[np.bool_]]:
     """Return a picture without its alpha channel, if any, and the mask of its transparent pixels.
 
     Parameters
@@ -121,6 +121,8 @@ def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray
         The last of two or four channels is alpha; a picture with another number of channels has none.
     opaque : bool
         Whether all that is not fully opaque is transparent.
+    plain : bool
+        Whether no channel is alpha, as the metadata of the file say.
 
     Returns
     -------
@@ -143,7 +145,7 @@ def split_alpha(pixels: ArrayLike, opaque: bool = False) -> tuple[Array, NDArray
     ((1, 2, 3), [[False, True]])
     """
     values = pixels_of("the picture", pixels)
-    if values.ndim == 2 or values.shape[2] not in (2, 4):
+    if plain or values.ndim == 2 or values.shape[2] not in (2, 4):
         return values, np.zeros(values.shape[:2], dtype=bool)
     least = _half(values.dtype) * (2 if opaque else 1)
     return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= least)
@@ -182,7 +184,7 @@ def read_mask(
             f"{os.fspath(path)}: the mask is {pixels.shape[1]} x {pixels.shape[0]} pixels (width x height) and must be "
             f"{cols} x {rows}: bring it to that size"
         )
-    colours, transparent = split_alpha(pixels)
+    colours, transparent = split_alpha(pixels, plain=found.metadata.plain)
     bright = colours > (0.5 if colours.max() <= 1 else white / 2 if white else _half(pixels.dtype))
     return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
@@ -363,6 +365,9 @@ _FORMATS = {
 LOSSY = (".jpg", ".jpeg")
 """The suffixes of a format that changes pixels."""
 
+_ALPHA, _PLAIN = (2, 4), (".tif", ".tiff", ".npy")
+"""Numbers of channels of which the last is alpha, and the suffixes of formats that can say that it is not."""
+
 
 def check_writable(
     path: PathLike,
@@ -370,11 +375,15 @@ def check_writable(
     channels: int | None = None,
     *,
     suffixes: Collection[str] | None = None,
+    metadata: Metadata | None = None,
+    labels: bool = False,
 ) -> None:
     """Raise ValueError before a long run unless its result can be written, without creating a file.
 
     The file must be writable and its suffix name a format that holds pixels of this type and number of channels; None
     is not checked. For other files than pictures, `suffixes` are the allowed ones, and only these are checked.
+    With the ``metadata`` of pixels, a format that would take their last channel for alpha is refused. A format that
+    changes pixels is refused if they are ``labels``, or indices of a palette.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -386,7 +395,13 @@ def check_writable(
     if suffix == ".exr" and suffixes is None:
         require("pictures", "OpenEXR")
     if suffixes is None:
-        check_holds(target, _FORMATS, dtype, channels, suitable_suffix(dtype, channels))
+        metadata = metadata or NOTHING
+        other = suitable_suffix(dtype, channels, plain=metadata.plain)
+        check_holds(target, _FORMATS, dtype, channels, other)
+        if suffix in LOSSY and (labels or metadata.palette):
+            raise ValueError(f"{target}: JPEG changes labels and categories: end its name in {other} instead")
+        if metadata.plain and channels in _ALPHA and suffix not in _PLAIN:
+            raise ValueError(f"{target}: {suffix} shows band {channels} as alpha: end its name in {other} instead")
 
 
 def check_holds(
@@ -402,9 +417,12 @@ def check_holds(
     raise ValueError(f"{target}: {suffix or 'PNG slices'} cannot hold {what}: end its name in {other} instead")
 
 
-def suitable_suffix(dtype: DTypeLike | None, channels: int | None, own: str = ".png") -> str:
-    """Return the suffix of a format that holds such pixels without loss: its own, else PNG, TIFF, or NumPy's own."""
-    lossless = _FORMATS.keys() - LOSSY
+def suitable_suffix(dtype: DTypeLike | None, channels: int | None, own: str = ".png", *, plain: bool = False) -> str:
+    """Return the suffix of a format that holds such pixels without loss: its own, else PNG, TIFF, or NumPy's own.
+
+    ``plain`` says that no channel is alpha.
+    """
+    lossless = {*_PLAIN} if plain and channels in _ALPHA else _FORMATS.keys() - LOSSY
     suffixes = (one for one in (own, ".png", ".tif", ".npy") if one.lower() in lossless)
     return next(suffix for suffix in suffixes if _FORMATS[suffix.lower()].holds(dtype, channels))
 
@@ -423,8 +441,8 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     metadata : Metadata, optional
         The metadata from `read`. PNG, TIFF, JPEG and WebP keep the colour profile, if it fits the number of channels,
         and the EXIF data (TIFF its texts); and all but WebP and ``.npy`` the pixels per inch. Of indices, PNG and BMP
-        keep the palette, JPEG and WebP show the colours, and TIFF and ``.npy`` hold the numbers. Of a grid, an
-        ``.npy`` begins with the smallest y.
+        keep the palette, WebP shows the colours, TIFF and ``.npy`` hold the numbers, and JPEG is refused. A GeoTIFF
+        keeps what the file said of its place and its bands. Of a grid, an ``.npy`` begins with the smallest y.
 
     Raises
     ------
@@ -435,7 +453,7 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     """
     pixels = pixels_of("the picture", array)
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
-    check_writable(path, pixels.dtype, channels)
+    check_writable(path, pixels.dtype, channels, metadata=metadata)
     suffix = Path(path).suffix.lower()
     if suffix == ".npy":
         pixels = pixels[::-1] if metadata and metadata.ascending else pixels
@@ -518,6 +536,7 @@ def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = 
 
     channels = 1 if pages[0].ndim == 2 else pages[0].shape[2]
     colours = 3 if channels in (3, 4) else 1
+    alpha = channels in _ALPHA and not metadata.plain
     big = len(pages) * pages[0].nbytes > 2**32 - 2**25
     with tifffile.TiffWriter(path, bigtiff=big, byteorder="<") as file:
         for page in pages:
@@ -525,8 +544,8 @@ def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = 
                 page,
                 photometric="rgb" if colours == 3 else "minisblack",
                 planarconfig="contig" if channels > 1 else None,
-                # a second or fourth channel is alpha, more than four are plain numbers
-                extrasamples=(["unassalpha"] if channels in (2, 4) else [0] * (channels - colours)) or None,
+                # a second or fourth channel is alpha unless the file says otherwise, more than four are plain numbers
+                extrasamples=(["unassalpha"] if alpha else [0] * (channels - colours)) or None,
                 compression="zlib",
                 metadata=None,
                 iccprofile=metadata.profile,

@@ -12,8 +12,10 @@ import struct
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from copy import deepcopy
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -46,12 +48,21 @@ NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 MOST_PAGES = 2**16
 """The most pages of a TIFF, with smaller copies of each."""
 
-_TAGS = (33550, 33922, 34264, 34735, 42113)
-"""TIFF tags of georeference and no-data."""
+_TAGS = (33550, 33922, 34264, 34735, 42112, 42113, 50844)
+"""TIFF tags of georeference, of what GDAL says of bands, of no-data, and of rational polynomials."""
 
 
 _NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
 """Names of an axis that do not have its letter."""
+
+_COUNTED = {"x": "n?i|xi_.+|west_east.*|n_?lon", "y": "n?j|eta_.+|south_north.*|n_?lat", "z": "n?k|s_.+|bottom_top.*"}
+"""Names of dimensions that count cells: of ocean models, ROMS and WRF."""
+
+_OF_BANDS = ("descriptions", "scales", "offsets", "units", "colorinterp")
+"""What rasterio says of each band, in the order in which it is written."""
+
+_NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""The transform of a raster without one."""
 
 _CF = ("long_name", "standard_name", "units", "positive")
 """Attributes of a coordinate or a variable in the CF conventions that realisations keep."""
@@ -71,11 +82,21 @@ class Georeference(NamedTuple):
         a, b, c, d, e, f: the corner of the pixel in column i, row j, is at x = a i + b j + c, y = d i + e j + f.
     nodata : float, optional
         The number that marks an unknown value in the file.
+    points : sequence of rasterio.control.GroundControlPoint
+        Ground control points, in the reference system ``crs``; a raster that has them has no transform.
+    polynomials : rasterio.rpc.RPC, optional
+        The rational polynomials of a sensor.
+    about : mapping
+        What the file says of its bands and of itself, as `write_raster` writes it: `_OF_BANDS`, ``tags``, of the file
+        first, and ``colours``, the colour table of the first band.
     """
 
     crs: str
     transform: tuple[float, float, float, float, float, float]
     nodata: float | None = None
+    points: Sequence[Any] = ()
+    polynomials: Any = None
+    about: Mapping[str, Any] = MappingProxyType({})
 
     @classmethod
     def of_cells(cls, origin: Sequence[float], cell: Sequence[float], rows: int, crs: str) -> Georeference:
@@ -86,7 +107,29 @@ class Georeference(NamedTuple):
     def moved(self, left: int, top: int) -> Georeference:
         """Return the georeference of a raster with this many more columns at the left and rows at the top."""
         a, b, c, d, e, f = self.transform
-        return self._replace(transform=(a, b, c - a * left - b * top, d, e, f - d * left - e * top))
+        points, polynomials = deepcopy((self.points, self.polynomials))
+        for point in points:
+            point.col, point.row = point.col + left, point.row + top
+        if polynomials:
+            polynomials.samp_off, polynomials.line_off = polynomials.samp_off + left, polynomials.line_off + top
+        place = (a, b, c - a * left - b * top, d, e, f - d * left - e * top)
+        place = place if self.transform != _NOWHERE else _NOWHERE
+        return self._replace(transform=place, points=points, polynomials=polynomials)
+
+    def place(self) -> Georeference:
+        """Return the georeference of other values at the same place."""
+        return self._replace(nodata=None, about={})
+
+    def values(self) -> Georeference | None:
+        """Return what is said of the values, for a raster at no place; None if they are plain numbers without names."""
+        about = {name: self.about[name] for name in _OF_BANDS}
+        told = [*about["descriptions"], *about["units"], *about["offsets"], *(one != 1 for one in about["scales"])]
+        return Georeference("", _NOWHERE, about=about) if any(told) else None
+
+    @property
+    def alpha(self) -> bool:
+        """Whether the file says that the last band is alpha."""
+        return bool(self.about["colorinterp"]) and self.about["colorinterp"][-1].name == "alpha"
 
 
 def axis_of(name: str) -> str | None:
@@ -137,16 +180,15 @@ def is_raster(file: BinaryIO) -> bool:
         return False
 
 
-def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeference, list[str]]:
-    """Return the pixels of a raster of at most ``most`` pixels, its georeference, and the names of its bands.
+def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeference]:
+    """Return the pixels of a raster of at most ``most`` pixels, as they are stored, and its georeference.
 
     Pixels are (rows, cols) or (rows, cols, bands) in the file's type. Unknown ones are NaN in floats, and masked in
-    integers; a band of alpha is a band. The first row is the northern one, and the first column the western one, unless
-    the raster is rotated.
+    integers. Alpha beside one or three bands is a band, else a mask. The first row is the northern one, and the first
+    column the western one, unless the raster is rotated or has rational polynomials.
     """
-    needs("rasterio", "rasters", "a raster with georeference or no-data")
+    needs("rasterio", "rasters", "a raster with georeference, no-data or descriptions of bands")
     import rasterio
-    from rasterio.enums import ColorInterp
     from rasterio.io import DatasetReader, MemoryFile
 
     with warnings.catch_warnings(), rasterio.Env(), ExitStack() as closing:
@@ -161,38 +203,53 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
                 raise Refused("is a list of maps of ILWIS: give one of its maps")
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
-        pixels = raster.read(masked=ColorInterp.alpha not in raster.colorinterp)
-        crs = raster.crs.to_wkt() if raster.crs else ""
-        geo = Georeference(crs, tuple(raster.transform)[:6], raster.nodata)
-        names = [name or f"band {k + 1}" for k, name in enumerate(raster.descriptions)]
-        scaled = set(raster.scales) != {1.0} or set(raster.offsets) != {0.0}
-    if scaled:
-        warnings.warn("scale and offset of the raster are not applied to its numbers", DataWarning, stacklevel=2)
+        points, crs = raster.gcps if raster.gcps[0] else ((), raster.crs)
+        about = {name: getattr(raster, name) for name in _OF_BANDS}
+        about["tags"] = [raster.tags(k) for k in (0, *raster.indexes)]
+        if about["colorinterp"][0].name == "palette":
+            about["colours"] = raster.colormap(1)
+        geo = Georeference(
+            crs.to_wkt() if crs else "", tuple(raster.transform)[:6], raster.nodata, points, raster.rpcs, about
+        )
+        pixels = raster.read(masked=not geo.alpha)
+        if geo.alpha and raster.count not in (2, 4):
+            gone = np.broadcast_to(pixels[-1] == 0, pixels[:-1].shape)
+            pixels = np.ma.MaskedArray(pixels[:-1], gone)
     pixels = np.moveaxis(pixels, 0, -1)
     if not np.ma.is_masked(pixels):
         pixels = np.ma.getdata(pixels)
     elif pixels.dtype.kind == "f":
         pixels = pixels.filled(np.nan)
     a, b, c, d, e, f = geo.transform
-    if not (b or d) and geo.transform != NOWHERE:
+    if not (b or d or geo.polynomials) and geo.transform != NOWHERE:
         rows, cols = pixels.shape[:2]
         pixels = pixels[:: -1 if e > 0 else 1, :: -1 if a < 0 else 1]
         geo = geo._replace(transform=(abs(a), b, min(c, c + a * cols), d, -abs(e), max(f, f + e * rows)))
-    return (pixels[..., 0] if len(names) == 1 else pixels), geo, names
+    return (pixels[..., 0] if pixels.shape[-1] == 1 else pixels), geo
 
 
 def read_cells(path: PathLike, most: int) -> Library:
-    """Return a raster as a grid: its bands as variables, rows in ascending order of y, unknown values NaN."""
-    pixels, geo, names = read_raster(path, most)
+    """Return a raster as a grid: its bands as variables, rows in ascending order of y, unknown values NaN.
+
+    Values are in physical units: the scale and the offset of a band are applied.
+    """
+    pixels, geo = read_raster(path, most)
+    names = [name or f"band {k}" for k, name in enumerate(geo.about["descriptions"], 1)]
     a, b, c, d, e, f = geo.transform
+    if geo.points:
+        raise Refused("has ground control points and no rows of a grid: warp it to north up first, as by gdalwarp")
     if b or d:
         raise Refused("has rows that are not parallel to the x axis: warp it to north up first, as by gdalwarp")
     planes: Any = pixels.reshape(*pixels.shape[:2], -1)
     if np.ma.isMaskedArray(planes):
         planes = np.ma.filled(planes.astype(np.float64), np.nan)
-    values = {name: planes[None, ::-1, :, k] for k, name in enumerate(names)}
+    scales, offsets = (np.array(geo.about[name][: planes.shape[-1]]) for name in ("scales", "offsets"))
+    if (scales != 1).any() or offsets.any():
+        planes = planes * scales + offsets
+    values = {name: planes[None, ::-1, :, k] for k, name in enumerate(names[: planes.shape[-1]])}
+    units = zip(names, geo.about["units"], strict=True)
     first = (0.0,) * 3 if geo.transform == NOWHERE else (c + a / 2, f + e * len(planes) - e / 2, 0.0)
-    return values, first, (a, abs(e), 1.0), geo.crs, {}
+    return values, first, (a, abs(e), 1.0), geo.crs, {n: {"units": u} for n, u in units if u}
 
 
 def write_cells(
@@ -205,26 +262,35 @@ def write_cells(
     nodata = float("nan") if bands.dtype.kind == "f" else None
     if np.ma.is_masked(bands) and nodata is None:
         bands, nodata = bands.astype(np.result_type(bands.dtype, np.int16)), -9999.0
-    geo = Georeference.of_cells(origin, cell, bands.shape[1], crs)._replace(nodata=nodata)
-    write_raster(path, bands if nodata is None else bands.filled(nodata), geo, list(layers))
+    geo = Georeference.of_cells(origin, cell, bands.shape[1], crs)
+    geo = geo._replace(nodata=nodata, about={"descriptions": list(layers)})
+    write_raster(path, bands if nodata is None else bands.filled(nodata), geo)
 
 
-def write_raster(path: Path, bands: Array, geo: Georeference, names: Sequence[str] = ()) -> None:
-    """Write bands (bands, rows, cols) as a GeoTIFF, over an existing file."""
+def write_raster(path: Path, bands: Array, geo: Georeference) -> None:
+    """Write bands (bands, rows, cols) as a GeoTIFF, over an existing file, with what is said of as many of them."""
     require("rasters", "rasterio")
     import rasterio
     from rasterio.io import MemoryFile
 
     bands = bands.astype({"float16": np.float32, "bool": np.uint8}.get(bands.dtype.name, bands.dtype))
-    about = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype.name}
-    if not names and len(bands) in (3, 4) and bands.dtype.kind == "u":
-        about |= {"photometric": "RGB", "alpha": "YES" if len(bands) == 4 else "NO"}
-    about |= {"crs": geo.crs or None, "transform": rasterio.Affine(*geo.transform), "nodata": geo.nodata}
-    with MemoryFile() as memory:  # GDAL does not report every full disk
-        with memory.open(driver="GTiff", compress="deflate", **about) as raster:
+    how = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype.name}
+    shown = [one.name for one in geo.about.get("colorinterp", ())][: len(bands)]
+    if shown[:3] == ["red", "green", "blue"] and bands.dtype.kind == "u":
+        how |= {"photometric": "RGB", "alpha": "YES" if shown[3:] == ["alpha"] else "NO"}
+    how |= {"gcps": geo.points} if geo.points else {"transform": rasterio.Affine(*geo.transform)}
+    how |= {"crs": geo.crs or None, "nodata": geo.nodata, "rpcs": geo.polynomials}
+    with warnings.catch_warnings(), MemoryFile() as memory:  # GDAL does not report every full disk
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        with memory.open(driver="GTiff", compress="deflate", BIGTIFF="IF_SAFER", **how) as raster:
+            for name in _OF_BANDS:
+                if name in geo.about:
+                    setattr(raster, name, geo.about[name][: len(bands)])
+            for k, tags in enumerate(geo.about.get("tags", ())[: len(bands) + 1]):
+                raster.update_tags(k, **{name: text for name, text in tags.items() if "STATISTICS_" not in name})
+            if "colours" in geo.about:
+                raster.write_colormap(1, geo.about["colours"])
             raster.write(np.ascontiguousarray(bands))
-            for k, name in enumerate(names, 1):
-                raster.set_band_description(k, name)
         path.write_bytes(memory.read())
 
 
@@ -252,29 +318,79 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         known = {**guessed.coordinates, **guessed.axes}
         axes = {name: axis for axis, keys in means.items() for key in keys for name in known.get(key, ())}
         found: dict[str, Any] = {}
+        notes: dict[str, str] = {}
         for name, one in data.data_vars.items():
             dims = [str(dim) for dim in one.dims]
             if all(dim.startswith("phony_dim") for dim in dims) and len(dims) in (2, 3):
-                one = one.rename(dict(zip(dims, "zyx"[-len(dims) :], strict=True)))
+                named = dict(zip(dims, "zyx"[-len(dims) :], strict=True))
             else:
-                named = {dim: axes.get(dim) or axis_of(dim) for dim in dims}
-                one = one.rename({dim: axis for dim, axis in named.items() if axis and axis != dim})
-            if {"x", "y"} <= set(one.dims):
+                every = {dim: axes.get(dim) or axis_of(dim) or _counted(dim) for dim in dims}
+                named = {dim: axis for dim, axis in every.items() if axis}
+            if not {"x", "y"} <= {*named.values()} or len({*named.values()}) < len(named):
+                continue
+            notes |= {dim: f"{dim} counts cells of {axis}" for dim, axis in named.items() if _counted(dim)}
+            # a coordinate of several axes, such as the longitude of each cell, is none of the grid
+            one = one.drop_vars([key for key, own in one.coords.items() if own.ndim and own.dims != (key,)])
+            one = _ascending(one.rename({dim: axis for dim, axis in named.items() if axis != dim}))
+            try:
+                place = [axis_place(one, axis) for axis in "xyz"]
+            except ValueError as error:
+                notes[str(name)] = f"{name} is left out, since {error}"
+                continue
+            if not found:
+                first, of_first, sizes = one, place, {axis: one.sizes.get(axis) for axis in "xyz"}
+            if (place, {axis: one.sizes.get(axis) for axis in "xyz"}) == (of_first, sizes):
                 found |= _steps(str(name), one)
         if not found:
+            if notes:
+                raise Refused(f"has no even grid ({', '.join(notes.values())}): interpolate it first")
             raise Refused("has no variable with the axes y and x, or z, y and x: rename its dimensions")
-        first = next(iter(found.values()))
-        found = {name: one for name, one in found.items() if one.sizes == first.sizes}
         for one in found.values():
             check_array(one.shape, one.dtype.itemsize, most // len(found))
-        arrays = {name: _ascending(one).load() for name, one in found.items()}
-        mapping = data.get(str(first.encoding.get("grid_mapping", "")))
-        about: Mapping[Any, Any] = {} if mapping is None else mapping.attrs
+        arrays = {name: _valid(one.load()) for name, one in found.items()}
+        mapping = data.get(str({**first.attrs, **first.encoding}.get("grid_mapping", "")).partition(":")[0])
+        crs = "" if mapping is None else _wkt(mapping.attrs)
+    if notes:
+        warnings.warn(f"{os.fspath(path)}: {', '.join(notes.values())}", DataWarning, stacklevel=2)
     first = next(iter(arrays.values()))
-    origin, cell = zip(*(axis_place(first, axis) for axis in "xyz"), strict=True)
+    origin, cell = zip(*of_first, strict=True)
     told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
     values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
-    return values, origin, cell, str(about.get("crs_wkt", about.get("spatial_ref", ""))), told
+    return values, origin, cell, crs, told
+
+
+def _counted(name: str) -> str | None:
+    """Return the axis along which a dimension counts cells by its name, or None."""
+    return next((axis for axis, own in _COUNTED.items() if re.fullmatch(own, name.lower())), None)
+
+
+def _wkt(about: Mapping[Any, Any]) -> str:
+    """Return the reference system of the attributes of a grid mapping as WKT, empty if they do not say it."""
+    if told := about.get("crs_wkt", about.get("spatial_ref")):
+        return str(told)
+    try:
+        from pyproj import CRS
+
+        return str(CRS.from_cf(dict(about)).to_wkt())
+    except Exception as error:  # without pyproj, too
+        text = f"the reference system of the grid mapping is not known ({error}): install simdtex[rasters] to read it"
+        warnings.warn(text, DataWarning, stacklevel=3)
+        return ""
+
+
+def _valid(array: Any) -> Any:
+    """Return an array with NaN for values outside of its valid range, which may be that of its packed values."""
+    low, high = np.ravel(array.attrs.get("valid_range", (-np.inf, np.inf)))
+    limits = np.ravel([array.attrs.get("valid_min", low), array.attrs.get("valid_max", high)])
+    told = next((array.attrs[name] for name in ("valid_range", "valid_min", "valid_max") if name in array.attrs), 0.0)
+    packed, kind = array.encoding, np.asarray(told).dtype
+    if kind.kind == "i" and packed.get("_Unsigned") == "true":
+        limits = np.where(limits < 0, limits + 256.0**kind.itemsize, limits)
+    if packed.keys() & {"scale_factor", "add_offset"} and kind == packed["dtype"]:
+        limits = limits + (-0.5, 0.5)  # of a packed value, since both are rounded
+        limits = np.sort(limits * packed.get("scale_factor", 1) + packed.get("add_offset", 0))
+    outside = (array.values < limits[0]) | (array.values > limits[1])
+    return array.where(~outside) if outside.any() else array
 
 
 def _check_own(path: PathLike) -> None:
@@ -301,8 +417,9 @@ def cf_attributes(array: Any) -> dict[str, str]:
 
 
 def axis_attributes(array: Any) -> dict[str, dict[str, str]]:
-    """Return the names and units of the coordinates of an array of xarray, by axis: x, y and z."""
-    return {axis: cf_attributes(array.coords[dim]) for dim in array.coords if (axis := axis_of(str(dim)))}
+    """Return the names and units of the coordinates of the axes of an array of xarray, by axis: x, y and z."""
+    own = sorted((dim for dim, one in array.coords.items() if one.dims in ((), (dim,))), key=array.dims.__contains__)
+    return {axis: cf_attributes(array.coords[dim]) for dim in own if (axis := axis_of(str(dim)))}
 
 
 def _steps(name: str, array: Any) -> dict[str, Any]:
@@ -330,6 +447,8 @@ def axis_place(array: Any, axis: str) -> tuple[float, float]:
     between = (values[-1] - values[0]) / (len(values) - 1) if len(values) > 1 else 1.0
     size = float(array.attrs.get(f"cell_{axis}", between))
     off = np.abs(values - (values[0] + size * np.arange(len(values))))
-    if not (size > 0 and (off <= size / 1000).all()):  # NaN too
+    single = (values == values.astype(np.float32)).all()  # rounded to that type, if not whole numbers
+    rounding = min(size / 2, np.abs(values).max() * float(np.finfo(np.float32).eps)) if single else 0.0
+    if not (size > 0 and (off <= max(size / 1000, rounding)).all()):  # NaN too
         raise ValueError(f"the coordinate {axis} is not evenly spaced in ascending order, as those of a grid are")
     return float(values[0]), size

@@ -335,13 +335,14 @@ def georeferenced(made: Any, place: Place | None) -> Any:
     with suppress(ImportError):  # the extra rasters
         from rasterio.crs import CRS
 
-        unit = CRS.from_wkt(place.crs).units_factor[0]
-        own = {"units": {"metre": "m", "degree": "degrees"}.get(unit, unit)}
-        found = found.assign_coords(
-            {axis: found[axis].assign_attrs(own | found[axis].attrs) for axis in "xy" if axis in found.coords}
-        )
+        system = CRS.from_wkt(place.crs)
+        unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
+        for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
+            if axis in found.coords:
+                named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
+                found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
     for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.encoding["grid_mapping"] = "spatial_ref"
+        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
     return found
 
 

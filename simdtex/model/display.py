@@ -15,6 +15,7 @@ import PIL.Image
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import Metadata, pillow_bytes, read, split_alpha, to_display, write
+from simdtex.io.rasters import Georeference
 
 Picture = NDArray[np.uint8]
 
@@ -109,9 +110,9 @@ def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:
 PathLike = str | os.PathLike[str]
 
 
-def write_labels(path: PathLike, labels: NDArray[np.uint8]) -> None:
+def write_labels(path: PathLike, labels: NDArray[np.uint8], place: Georeference | None = None) -> None:
     """Write labels (rows, cols) as the values of a picture; PNG and BMP have them as indices of `label_colours`."""
-    write(path, labels, Metadata(palette=label_colours(256).tobytes()))
+    write(path, labels, Metadata(palette=label_colours(256).tobytes(), geo=place))
 
 
 def read_labels(path: PathLike, transparent: int = 0) -> NDArray[Any]:
@@ -119,7 +120,8 @@ def read_labels(path: PathLike, transparent: int = 0) -> NDArray[Any]:
 
     Where the picture is transparent, the label is ``transparent``. Raises ValueError if the file is no such picture.
     """
-    pixels, gone = split_alpha(read(path, palette=True).pixels)
+    found = read(path, palette=True)
+    pixels, gone = split_alpha(found.pixels, plain=found.metadata.plain)
     if pixels.dtype.kind not in "iu" or (pixels.ndim == 3 and pixels.shape[2] > 1):
         raise ValueError(f"{os.fspath(path)} is no picture of labels; save it grey or with a palette, 0, 1, 2...")
     labels = pixels.reshape(pixels.shape[:2])
