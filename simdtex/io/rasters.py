@@ -61,9 +61,6 @@ _COUNTED = {"x": "n?i|xi_.+|west_east.*|n_?lon", "y": "n?j|eta_.+|south_north.*|
 _OF_BANDS = ("descriptions", "scales", "offsets", "units", "colorinterp")
 """What rasterio says of each band, in the order in which it is written."""
 
-_NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-"""The transform of a raster without one."""
-
 _CF = ("long_name", "standard_name", "units", "positive")
 """Attributes of a coordinate or a variable in the CF conventions that realisations keep."""
 
@@ -113,7 +110,7 @@ class Georeference(NamedTuple):
         if polynomials:
             polynomials.samp_off, polynomials.line_off = polynomials.samp_off + left, polynomials.line_off + top
         place = (a, b, c - a * left - b * top, d, e, f - d * left - e * top)
-        place = place if self.transform != _NOWHERE else _NOWHERE
+        place = place if self.transform != NOWHERE else NOWHERE
         return self._replace(transform=place, points=points, polynomials=polynomials)
 
     def place(self) -> Georeference:
@@ -122,9 +119,9 @@ class Georeference(NamedTuple):
 
     def values(self) -> Georeference | None:
         """Return what is said of the values, for a raster at no place; None if they are plain numbers without names."""
-        about = {name: self.about[name] for name in _OF_BANDS}
+        about = {name: self.about.get(name, ()) for name in _OF_BANDS}
         told = [*about["descriptions"], *about["units"], *about["offsets"], *(one != 1 for one in about["scales"])]
-        return Georeference("", _NOWHERE, about=about) if any(told) else None
+        return Georeference("", NOWHERE, about=about) if any(told) else None
 
     @property
     def alpha(self) -> bool:
