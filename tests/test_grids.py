@@ -944,7 +944,7 @@ LAMBERT = {"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 
     "dims, coordinates, attributes, encoding, cell, known, told",
     [
         (("y", "x"), {"y": 1e3 * np.arange(4), "x": 2e3 * np.arange(5)} | EACH, {}, {}, (2e3, 1e3), 20, None),
-        (("lat", "lon"), {"lat": 60 + np.arange(4) / 240, "lon": 170 + np.arange(5) / 240}, {}, {}, None, 20, None),
+        (("lat", "lon"), {"lat": 60 + np.arange(4) / 2400, "lon": 170 + np.arange(5) / 2400}, {}, {}, None, 20, None),
         (("south_north", "west_east"), {}, {}, {}, (1, 1), 20, "counts cells"),
         (("eta_rho", "xi_rho"), {}, {}, {}, (1, 1), 20, "counts cells"),
         (("j", "i"), {}, {"valid_range": np.array([5.0, 17.0])}, {}, (1, 1), 13, "counts cells"),
@@ -961,7 +961,7 @@ def test_netcdf_as_models_write_it(tmp_path, dims, coordinates, attributes, enco
     with pytest.warns(DataWarning, match=told or "odd is left out, since the coordinate x is not evenly spaced"):
         grid = read_grid(tmp_path / "a.nc")
     assert grid.values["v"].shape == (1, 4, 5) and np.isfinite(grid.values["v"]).sum() == known
-    assert grid.cell[:2] == (cell or pytest.approx((1 / 240, 1 / 240), rel=1e-2))
+    assert grid.cell[:2] == (cell or pytest.approx((1 / 2400, 1 / 2400), rel=5e-2))
     assert ("Lambert" in grid.crs) == ("crs" in coordinates) and "units" not in grid.about.get("y", {})
 
 
