@@ -20,6 +20,9 @@ import xarray
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from rasterio.control import GroundControlPoint
+from rasterio.enums import ColorInterp
+from rasterio.rpc import RPC
 from rasterio.transform import from_origin
 
 from simdtex import simulate
@@ -859,3 +862,117 @@ def test_no_store_is_replaced(tmp_path):
     with pytest.raises(ValueError, match=r"lab.zarr exists already: give a new name for the store$"):
         write_realisations(path, some())
     assert {one: one.is_file() and one.read_bytes() for one in path.rglob("*")} == before
+
+
+POINTS = [GroundControlPoint(row, col, 10 + col / 1e3, 50 - row / 1e3) for row in (0, 9) for col in (0, 9)]
+POLYNOMIALS = RPC(0, 1, 50, 0.1, [1.0] * 20, [0.5] * 20, 6, 6, 10, 0.1, [1.0] * 20, [0.5] * 20, 8, 8)
+SAID = {
+    "bands": ({}, {"scales": (0.1, 2.0), "offsets": (5.0, 0.0), "descriptions": ("a", "b"), "units": ("K", "m")}),
+    "near infrared": ({"count": 4}, {"colorinterp": [ColorInterp[c] for c in ("red", "green", "blue", "undefined")]}),
+    "points": ({"gcps": POINTS, "transform": None}, {}),
+    "polynomials": ({"rpcs": POLYNOMIALS, "transform": None, "crs": None}, {}),
+}
+
+
+def said_of(path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        with rasterio.open(path) as raster:
+            names = ("count", "crs", "transform", "nodata", "scales", "offsets", "descriptions", "units", "colorinterp")
+            points = [(point.row, point.col, point.x, point.y) for point in raster.gcps[0]]
+            tags = [raster.tags(k) for k in (0, *raster.indexes)]
+            rpcs = raster.rpcs and raster.rpcs.to_gdal()
+            return {name: getattr(raster, name) for name in names} | {"points": points, "tags": tags, "rpcs": rpcs}
+
+
+@pytest.mark.parametrize("kind", SAID)
+def test_what_a_raster_says_of_itself_is_kept(tmp_path, kind):
+    how, said = SAID[kind]
+    values = np.random.default_rng(1).integers(1, 4000, (how.get("count", 2), ROWS, COLS)).astype(np.uint16)
+    values[:, 4:6, 4:6] = 0
+    path, filled, wide = (tmp_path / f"{name}.tif" for name in ("a", "b", "c"))
+    about = {"count": len(values), "height": ROWS, "width": COLS, "dtype": "uint16", "nodata": 0}
+    where = {name: one for name, one in ({"crs": CRS, "transform": WHERE} | how).items() if one is not None}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+        with rasterio.open(path, "w", driver="GTiff", **about | where) as raster:
+            for name, one in said.items():
+                setattr(raster, name, one)
+            raster.update_tags(sensor="S2")
+            raster.update_tags(1, wavelength="490", STATISTICS_MEAN="7")
+            raster.write(values)
+    wanted = said_of(path)
+    del wanted["tags"][1]["STATISTICS_MEAN"]  # of other values
+    for words in (("fill", path, "-o", filled), ("extend", filled, "-o", wide, "--left", "3", "--top", "2")):
+        made = run(*words, "--seed", "1")
+        assert made.exit_code == 0, made.output
+    assert said_of(filled) == wanted and (image.read(filled).pixels > 0).all()
+    moved, a = said_of(wide), wanted["transform"]
+    assert moved["transform"] == (a if a.is_identity else a * a.translation(-3, -2))
+    assert moved["points"] == [(row + 2, col + 3, x, y) for row, col, x, y in wanted["points"]]
+    if kind == "polynomials":
+        assert (moved["rpcs"]["LINE_OFF"], moved["rpcs"]["SAMP_OFF"]) == ("8.0", "11.0")
+    made = run("classify", filled, "--texture", f"a={filled}", "--texture", f"b={wide}", "-o", tmp_path / "labels.tif")
+    assert made.exit_code == 0, made.output
+    labels = said_of(tmp_path / "labels.tif")
+    assert all(labels[name] == wanted[name] for name in ("crs", "transform", "points"))
+    refused = run("fill", path, "-o", tmp_path / "b.png")
+    assert (refused.exit_code == 2) and "alpha: end its name in .tif" in refused.output
+    if kind == "bands":
+        grid = read_grid(path)
+        known = np.where(values > 0, values, np.nan)[:, None, ::-1]
+        assert np.array_equal(grid.values["a"], known[0] * 0.1 + 5, equal_nan=True)
+        assert np.array_equal(grid.values["b"], known[1] * 2, equal_nan=True)
+
+
+FIELD = np.arange(20.0).reshape(4, 5)
+NORTH, EAST = {"units": "degrees_north"}, {"units": "degrees_east"}
+EACH = {"lat": (("y", "x"), FIELD, NORTH), "lon": (("y", "x"), FIELD, EAST)}
+PACKED = {"dtype": "int16", "_FillValue": -99, "scale_factor": 0.5, "add_offset": 10.0}
+LAMBERT = {"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 25.0}
+
+
+@pytest.mark.parametrize(
+    "dims, coordinates, attributes, encoding, cell, known, told",
+    [
+        (("y", "x"), {"y": 1e3 * np.arange(4), "x": 2e3 * np.arange(5)} | EACH, {}, {}, (2e3, 1e3), 20, None),
+        (("lat", "lon"), {"lat": 60 + np.arange(4) / 2400, "lon": 170 + np.arange(5) / 2400}, {}, {}, None, 20, None),
+        (("south_north", "west_east"), {}, {}, {}, (1, 1), 20, "counts cells"),
+        (("eta_rho", "xi_rho"), {}, {}, {}, (1, 1), 20, "counts cells"),
+        (("j", "i"), {}, {"valid_range": np.array([5.0, 17.0])}, {}, (1, 1), 13, "counts cells"),
+        (("y", "x"), {}, {"valid_range": np.array([-20, 0], "i2")}, PACKED, (1, 1), 11, None),
+        (("y", "x"), {}, {"valid_max": np.float32(4)}, PACKED, (1, 1), 5, None),
+        (("y", "x"), {"crs": ((), 0, LAMBERT)}, {"grid_mapping": "crs"}, {}, (1, 1), 20, None),
+    ],
+)
+def test_netcdf_as_models_write_it(tmp_path, dims, coordinates, attributes, encoding, cell, known, told):
+    single = {name: one.astype(np.float32) if isinstance(one, np.ndarray) else one for name, one in coordinates.items()}
+    data = xarray.Dataset({"odd": (("northing", "easting"), FIELD), "v": (dims, FIELD, attributes)})
+    single["easting"] = np.arange(5.0) ** 2
+    data.assign_coords(single).to_netcdf(tmp_path / "a.nc", engine="h5netcdf", encoding={"v": encoding})
+    with pytest.warns(DataWarning, match=told or "odd is left out, since the coordinate x is not evenly spaced"):
+        grid = read_grid(tmp_path / "a.nc")
+    assert grid.values["v"].shape == (1, 4, 5) and np.isfinite(grid.values["v"]).sum() == known
+    assert grid.cell[:2] == (cell or pytest.approx((1 / 2400, 1 / 2400), rel=5e-2))
+    assert ("Lambert" in grid.crs) == ("crs" in coordinates) and "units" not in grid.about.get("y", {})
+
+
+@pytest.mark.parametrize("name", ["many.nc", "many.zarr"])
+def test_realisations_on_the_ground_are_one_variable_that_gdal_places(tmp_path, name):
+    path = saved_rasters(tmp_path / "dem.tif", np.abs(terrain()))
+    assert run("simulate", path, "-o", tmp_path / name, "--seed", "1").exit_code == 0
+    with xarray.open_dataarray(tmp_path / name) as many:
+        assert "UTM zone 33N" in many.spatial_ref.crs_wkt
+        assert [many[axis].attrs["standard_name"] for axis in "xy"] == [f"projection_{a}_coordinate" for a in "xy"]
+    if name == "many.nc":
+        with rasterio.open(f'NETCDF:"{tmp_path / name}":simulation') as raster:
+            assert raster.crs == CRS and raster.transform.almost_equals(WHERE)
+
+
+@pytest.mark.parametrize("words", [("synth", "--size", "8x8"), ("tile", "--band", "2"), ("extend", "--left", "2")])
+def test_labels_are_not_written_as_jpeg(tmp_path, words):
+    labels = np.random.default_rng(0).integers(0, 3, (16, 16)).astype(np.uint8)
+    image.write(tmp_path / "a.png", labels, image.Metadata(palette=bytes(range(9))))
+    for more in ((), ("--categorical",)):
+        made = run(words[0], tmp_path / "a.png", "-o", tmp_path / "b.jpg", *words[1:], *more)
+        assert made.exit_code == 2 and "JPEG changes labels and categories: end its name in .png" in made.output

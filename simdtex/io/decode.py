@@ -150,11 +150,12 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
     tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
     if data[:5].lower() == b"ncols" or (tiff and rasters.is_raster(io.BytesIO(data))):
         pixels, geo = rasters.read_raster(data, most)
-        metadata = Metadata(geo=geo, plain=not geo.alpha)
+        alpha = geo.alpha and pixels.ndim == 3 and pixels.shape[2] == len(geo.about["colorinterp"])
+        metadata = Metadata(geo=geo, plain=not alpha)
         if pixels.dtype == np.uint8 and (colours := geo.about.get("colours")):
             table = np.array([colours.get(k, (0, 0, 0))[:3] for k in range(256)], np.uint8)
             metadata = metadata._replace(palette=table.tobytes())
-        return _Found(pixels, geo.alpha and pixels.ndim == 3 and pixels.shape[2] in (2, 4), metadata=metadata)
+        return _Found(pixels, alpha, metadata=metadata)
     if tiff:
         return _read_tiff(data, most, palette)
     if data.startswith(b"\x76\x2f\x31\x01"):

@@ -384,7 +384,7 @@ def _valid(array: Any) -> Any:
     if kind.kind == "i" and packed.get("_Unsigned") == "true":
         limits = np.where(limits < 0, limits + 256.0**kind.itemsize, limits)
     if packed.keys() & {"scale_factor", "add_offset"} and kind == packed["dtype"]:
-        limits = limits + (-0.5, 0.5)  # of a packed value, since both are rounded
+        limits = np.add(limits, (-0.5, 0.5))  # of a packed value, since both are rounded
         limits = np.sort(limits * packed.get("scale_factor", 1) + packed.get("add_offset", 0))
     outside = (array.values < limits[0]) | (array.values > limits[1])
     return array.where(~outside) if outside.any() else array
