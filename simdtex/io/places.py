@@ -7,12 +7,15 @@ southern edge. The grids that belong to the output give its place; a training im
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
+from simdtex.io import rasters
 from simdtex.io.grids import Frame, frame
 from simdtex.io.rasters import axis_attributes, axis_of, axis_place
+from simdtex.options import DataWarning
 
 SAME = 0.01
 """The most by which cells of one place differ in their position, in cells."""
@@ -51,14 +54,7 @@ def ascending(array: Any) -> Any:
     if not hasattr(array, "coords"):
         return array
     named = {dim: axis for dim in array.dims if (axis := axis_of(str(dim)))}
-    if sorted(named.values())[:2] != ["x", "y"]:
-        return array
-    others = {dim: axis for dim, axis in named.items() if dim != axis}
-    array = array.drop_vars([axis for axis in others.values() if axis in array.coords]).rename(others)
-    down = [axis for axis in named.values() if axis in array.coords and array[axis][0] > array[axis][-1]]
-    in_order = iter(sorted(named.values(), reverse=True))
-    order = [next(in_order) if dim in named.values() else dim for dim in array.dims]
-    return array.isel(dict.fromkeys(down, slice(None, None, -1))).transpose(*order)
+    return rasters.ascending(array, named) if sorted(named.values())[:2] == ["x", "y"] else array
 
 
 def place_of(name: str, array: Any) -> Place | None:
@@ -79,17 +75,20 @@ def located(output: Mapping[str, Any], training: Any, origin: Any, cell: Any) ->
     else the training image. Arrays are as `ascending` returns them. Raises ValueError if two places differ.
     """
     options, free = frame(origin, cell), origin is None and cell is None
-    ends = {
-        name: one[-1] if isinstance(one, tuple) else one for name, one in output.items()
-    }  # of a guide, the output's
-    found = [place for name, one in ends.items() if (place := place_of(name, one))]
+    last = {name: one[-1] if isinstance(one, tuple) else one for name, one in output.items()}  # of the pair of a guide
+    found = [place for name, one in last.items() if (place := place_of(name, one))]
     told = [place for place in found if place.told]
-    image = place_of("the training image", training[0] if isinstance(training, (list, tuple)) else training)
-    first = told[0] if told else image if image and image.told and not found else None
+    image = training[0] if isinstance(training, (list, tuple)) else training
+    own = None
+    try:
+        own = None if found else place_of("the training image", image)
+    except ValueError as error:
+        warnings.warn(f"the training image gives no place, since {error}", DataWarning, stacklevel=2)
+    first = told[0] if told else own if own and own.told else None
     if first is None:
         return None if free else Place("the output", options)
-    own = zip(first.frame, (origin, cell), strict=True)
-    wanted = frame(*(one[: None if free else len(options.origin)] if given is None else given for one, given in own))
+    axes, both = None if free else len(options.origin), zip(first.frame, (origin, cell), strict=True)
+    wanted = frame(*(one[:axes] if given is None else given for one, given in both))
     given = Place("that of origin and cell", wanted, about=first.about)
     for other in (*told[1:], given) if told else ():
         _check_same(first, other)

@@ -326,9 +326,7 @@ def read_netcdf(path: PathLike, most: int) -> Library:
             if not {"x", "y"} <= {*named.values()} or len({*named.values()}) < len(named):
                 continue
             notes |= {dim: f"{dim} counts cells of {axis}" for dim, axis in named.items() if _counted(dim)}
-            # a coordinate of several axes, such as the longitude of each cell, is none of the grid
-            one = one.drop_vars([key for key, own in one.coords.items() if own.ndim and own.dims != (key,)])
-            one = _ascending(one.rename({dim: axis for dim, axis in named.items() if axis != dim}))
+            one = ascending(one, named)
             try:
                 place = [axis_place(one, axis) for axis in "xyz"]
             except ValueError as error:
@@ -430,10 +428,17 @@ def _steps(name: str, array: Any) -> dict[str, Any]:
     }
 
 
-def _ascending(array: Any) -> Any:
-    """Return an array (z, y, x) in ascending order of its coordinates."""
-    down = [dim for dim in array.dims if dim in array.coords and array[dim].size > 1 and array[dim][0] > array[dim][-1]]
-    return array.isel({dim: slice(None, None, -1) for dim in down}).transpose(..., "y", "x")
+def ascending(array: Any, named: Mapping[Any, str]) -> Any:
+    """Return an array of xarray with the axes that its dimensions mean, z, y and x, in ascending order of coordinates.
+
+    A coordinate of several axes, such as the longitude of each cell, is none of a grid, and is dropped.
+    """
+    array = array.drop_vars([key for key, own in array.coords.items() if own.ndim and own.dims != (key,)])
+    array = array.rename({dim: axis for dim, axis in named.items() if axis != dim})
+    down = [axis for axis in named.values() if axis in array.coords and array[axis][0] > array[axis][-1]]
+    in_order = iter(sorted(named.values(), reverse=True))
+    order = [next(in_order) if dim in named.values() else dim for dim in array.dims]
+    return array.isel(dict.fromkeys(down, slice(None, None, -1))).transpose(*order)
 
 
 def axis_place(array: Any, axis: str) -> tuple[float, float]:
