@@ -1,5 +1,7 @@
 """The option ``light``: what the trend of a sample is, what is made without it, and where the light comes back."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl
@@ -177,3 +179,14 @@ def test_the_page_asks_for_it_and_starts_anew():
         assert_same_bits(page.latest.image, even)
     finally:
         page.session.close(10)
+
+
+def test_a_large_picture_is_judged_by_a_part_of_its_pixels():
+    picture = np.random.default_rng(1).integers(0, 256, (2048, 2048, 1), np.uint8)
+    use = np.ones(picture.shape[:2], bool)
+    found = trend(picture, use)
+    tracemalloc.start()
+    assert not found.explains(picture, use)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * picture.size, "no copy in float64"

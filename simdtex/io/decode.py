@@ -37,7 +37,7 @@ _NAMED = {
     rb".{344}n[+i]1": "a NIfTI volume: convert it to NRRD, for example with 3D Slicer",
     rb"NRRD|ObjectType|# vtk|\s*(<\?xml[^>]*>\s*)?<VTKFile": "a volume (NRRD, MHA, VTK): simdtex simulate reads it",
     rb"\x89HDF|CDF": "a NetCDF or HDF5 file: simdtex simulate reads it",
-    rb"PK\x03\x04": "an archive (ZIP, .npz): unpack it; simdtex simulate reads volumes in .npz",
+    rb"PK\x03\x04": "an archive (ZIP, .npz, .xlsx): unpack it; simdtex simulate reads .npz and, as known, .xlsx",
 }
 """Patterns of the first bytes of other formats, and what the message says of them."""
 
