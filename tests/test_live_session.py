@@ -36,6 +36,12 @@ from simdtex.options import table
 # -- The sessions of the live page: command lines that repeat a result, restarts, pauses, frames, and error messages.
 
 
+@pytest.fixture(autouse=True)
+def reading(monkeypatch):
+    """Files are read in this process, since a process for each takes long; those of the server are read apart."""
+    monkeypatch.setattr(sessions, "read_apart", lambda *file: read_bytes(*file, max_pixels=sessions.MAX_PIXELS))
+
+
 @pytest.fixture
 def page():
     fake = Fake()

@@ -446,6 +446,25 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
     assert os.environ["XDG_CACHE_HOME"] != str(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["pocl", "pocl/kcache", "pyopencl", "pytools", "own"])
+def test_each_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path, name):
+    """Writing fails for whoever runs the test, also for root."""
+    (tmp_path / name).mkdir(parents=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path / "own") if name == "own" else "")
+    monkeypatch.setattr(devices, "_report", None)
+    real, tried = devices.tempfile.TemporaryFile, []
+
+    def made(dir, **how):
+        tried.append(dir)
+        return real(dir="/proc/nowhere" if dir == tmp_path / name else dir, **how)
+
+    monkeypatch.setattr(devices.tempfile, "TemporaryFile", made)
+    devices._prepare_caches()
+    assert tmp_path / name in tried and os.environ["XDG_CACHE_HOME"] != str(tmp_path)
+    assert "POCL_CACHE_DIR" not in os.environ
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
 @pytest.mark.parametrize("damaged", ["info", "*.so", "*.bc", "binary", "*.sqlite"])

@@ -236,10 +236,13 @@ def test_a_header_names_a_file_in_its_folder_alone(tmp_path, name):
     np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], BLOCK)
     (path.parent / "link.raw").symlink_to(tmp_path / "secret.raw")
     os.mkfifo(path.parent / "pipe.raw")
-    for data in (f"{tmp_path}/secret.raw", "../secret.raw", "sub/block.raw", "link.raw", "LIST", "block%d.raw 1 4 1"):
+    for data in (f"{tmp_path}/secret.raw", "../secret.raw", "sub/block.raw", "LIST", "block%d.raw 1 4 1"):
         HEADERS[name](path, data)
         with pytest.raises(ValueError, match=r"names the data file .*: put the data into one file in the folder"):
             volume.read(path)
+    HEADERS[name](path, "link.raw")
+    with pytest.raises(ValueError, match=r"refers to .*secret\.raw in another folder: save all values in one file"):
+        volume.read(path)
     for data, words in (("pipe.raw", "not a regular file"), ("none.raw", "does not exist"), ("sub", "is a folder")):
         HEADERS[name](path, data)
         with pytest.raises(ValueError, match=words):

@@ -193,10 +193,10 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         in_memory = isinstance(source, bytes)
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
         raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
-        if not in_memory:
-            own = [Path(where).with_suffix(".mp#")] * (raster.driver == "ILWIS")
-            check_beside(where, [*raster.files, *own])
-            if own and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(where).read_bytes()):
+        if not isinstance(source, bytes):
+            own = [Path(source).with_suffix(".mp#")] * (raster.driver == "ILWIS")
+            check_beside(source, [*raster.files, *own])
+            if own and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(source).read_bytes()):
                 raise Refused("is a list of maps of ILWIS: give one of its maps")
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
@@ -395,12 +395,10 @@ def _check_own(path: PathLike) -> None:
     with h5py.File(path) as file:
 
         def found(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
-            one = file[name] if isinstance(link, h5py.HardLink) else None
-            other = not isinstance(link, (h5py.HardLink, h5py.SoftLink))
-            if isinstance(one, h5py.Dataset):
-                parts = one.virtual_sources() if one.is_virtual else ()
-                other = bool(one.external) or any(part.file_name != "." for part in parts)
-            return name if other else None
+            one: Any = file[name] if isinstance(link, h5py.HardLink) else link
+            parts = one.virtual_sources() if getattr(one, "is_virtual", False) else ()
+            other = isinstance(one, h5py.ExternalLink) or any(part.file_name != "." for part in parts)
+            return name if other or getattr(one, "external", None) else None
 
         if (name := file.visititems_links(found)) is not None:
             raise Refused(f"takes {name[:100]} from another file: save all values in one file")

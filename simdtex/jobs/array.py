@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import check_shape, execute
-from simdtex.jobs.inputs import check_inputs
+from simdtex.jobs.inputs import check_inputs, kept
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
 from simdtex.maspar import EXECUTED
@@ -133,7 +133,7 @@ def synthesize(
     one_of("memory", memory, tuple(MEMORY))
     one_of("mapping", mapping, MAPPINGS)
     pes, size = parse_array(array, mapping), check_shape(shape)
-    inputs = check_inputs(sample, size, channel_axis)
+    inputs = check_inputs(kept(sample), size, channel_axis)
     if not inputs.pictures.clean:
         raise ValueError("the array takes one sample without unknown pixels; use simdtex.synthesize for others")
     chosen: Any = resolve(mrf.Options, "synth", {"preset": "paper"} | options)

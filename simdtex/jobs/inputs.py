@@ -7,6 +7,8 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial, wraps
 from inspect import Parameter, Signature, cleandoc
@@ -45,6 +47,9 @@ OUTPUT = """\
 output : simdtex.run.Output
     Only with ``full_output=True``.
 """
+
+SHARED = ("rng", "device", "callback", "checkpoint")
+"""The inputs of a job that are not copied."""
 
 ABSENT = SimpleNamespace(channel_axis=None, rng=None, full_output=False, checkpoint=None, mask=None, known_source=None)
 """The values of inputs that a job does not have."""
@@ -106,6 +111,8 @@ def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any
         def prepare(*args: Any, **given: Any) -> tuple[Any, Work]:
             bound = written.bind(*args, **given)
             bound.apply_defaults()
+            if bound.arguments.get("callback") is not None:
+                bound.arguments |= {name: kept(one) for name, one in bound.arguments.items() if name not in SHARED}
             call = SimpleNamespace(**{**vars(ABSENT), **bound.arguments})
             for name, one in own.items():
                 value = getattr(call, name)
@@ -132,6 +139,13 @@ def public(job: str, without: str = "") -> Callable[[Callable[[Any], Work]], Any
         return lists(option_parameters(job, *methods, without=without))(function)
 
     return decorate
+
+
+def kept(value: Any) -> Any:
+    """Return a copy of an argument, whose arrays a callback may change; itself if it is of a type without copies."""
+    with suppress(Exception):
+        return deepcopy(value)
+    return value
 
 
 def _described(doc: str, own: dict[str, Input], methods: list[Any]) -> str:

@@ -132,11 +132,9 @@ class Pages:
     def close(self) -> None:
         """End all sessions."""
         self._closed.set()
-        sessions, end = list(self._sessions.values()), time.monotonic() + ENDING
-        for session in sessions:
-            session.close()
-        for session in sessions:
-            session.close(max(0.0, end - time.monotonic()))
+        for wait in (0.0, ENDING / MAX_PAGES):
+            for session in self._sessions.values():
+                session.close(wait)
 
 
 def serve(

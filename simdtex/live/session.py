@@ -179,9 +179,7 @@ class Session:
 
     def follow(self, handled: threading.Event, *, every: bool) -> None:
         """Wait until a message is handled; unless ``every``, only until fewer than `MAX_QUEUE` messages wait."""
-        while self._thread.is_alive() and not (self._closed or handled.is_set()):
-            if not every and self._messages.qsize() < MAX_QUEUE:
-                break
+        while not (self._closed or handled.is_set()) and (every or self._messages.qsize() >= MAX_QUEUE):
             handled.wait(0.01)
 
     def wait(self, timeout: float | None = None) -> Result:

@@ -99,17 +99,10 @@ class Pool:
         try:
             before = free.pop()
         except IndexError:
-            return self._use(self._allocated(size), free)
-        self._used.discard(before)
-        return self._use(before.buffer, free)
-
-    def _use(self, buffer: Any, free: list[Taken]) -> Use:
-        use = Use(buffer)
-        self._used.add(Taken(use, free))
-        return use
-
-    def _allocated(self, size: int) -> Any:
-        """Return a new buffer, in place of all free ones if there is no memory."""
+            pass
+        else:
+            self._used.discard(before)
+            return self._use(before.buffer, free)
         try:
             buffer = self._new(size)
         except cl.MemoryError:
@@ -119,7 +112,14 @@ class Pool:
                 unused.clear()
             buffer = self._new(size)
         self._made += size
-        return buffer
+        return self._use(buffer, free)
+
+    def _use(self, buffer: Any, free: list[Taken]) -> Use:
+        use = Use()
+        taken = Taken(use, free.append)
+        taken.buffer = use.buffer = buffer
+        self._used.add(taken)
+        return use
 
     def _new(self, size: int) -> Any:
         """Return a buffer to which a byte was copied, since some runtimes only then find that there is no memory."""
@@ -129,30 +129,17 @@ class Pool:
 
 
 class Use:
-    """The use of a buffer of a `Pool` by arrays, which ends with the last of them."""
+    """The use of a buffer of a `Pool`, which ends with the last array that has it."""
 
     __slots__ = ("__weakref__", "buffer")
-
-    def __init__(self, buffer: Any) -> None:
-        self.buffer = buffer
+    buffer: Any
 
 
 class Taken(weakref.ref[Use]):
-    """A used buffer, which is appended to the free ones when its use ends.
-
-    It is its own callback's argument, so that only C code runs then: a signal raises nothing that would be lost.
-    """
+    """A buffer in use, which is appended to the free ones at the end: by C alone, where no signal can raise."""
 
     __slots__ = ("buffer",)
-
-    def __new__(cls, use: Use, free: list[Taken]) -> Taken:
-        """Return a reference that ``free`` gets in the end."""
-        found = super().__new__(cls, use, free.append)
-        found.buffer = use.buffer
-        return found
-
-    def __init__(self, use: Use, free: list[Taken]) -> None:
-        super().__init__(use, free.append)
+    buffer: Any
 
 
 class DeviceArray:

@@ -1,0 +1,173 @@
+"""Files that name other files or themselves, callbacks that change inputs, signals at any moment."""
+
+import os
+import random
+import signal
+import struct
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from copy import deepcopy
+
+import h5py
+import numpy as np
+import PIL.Image
+import pytest
+import rasterio
+import rasterio.shutil
+from runs import RUNS, SEED, digest, outcome
+
+from simdtex.io import grids, image, rasters, volume
+
+PRIVATE = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
+
+
+def virtual(file, name):
+    layout = h5py.VirtualLayout((32, 40), "u1")
+    layout[:] = h5py.VirtualSource(name, "own", (32, 40))
+    file.create_virtual_dataset("v", layout)
+    file["own"] = PRIVATE
+
+
+HDF5 = {
+    "storage": lambda f: f.create_group("a").create_dataset("v", (32, 40), "u1", external=[("../p.bin", 0, 1280)]),
+    "link": lambda f: f.update({"v": h5py.ExternalLink("../p.h5", "/v")}),
+    "linked group": lambda f: f.update({"g": h5py.ExternalLink("../p.h5", "/"), "v": h5py.SoftLink("/g/v")}),
+    "virtual": lambda f: virtual(f, "../p.h5"),
+}
+VRT = """<VRTDataset rasterXSize="40" rasterYSize="32">
+<Metadata><MDI key="INTERNAL_MASK_FLAGS_1">2</MDI></Metadata>
+<VRTRasterBand dataType="Byte" band="1" subClass="VRTRawRasterBand">
+<SourceFilename relativetoVRT="1">../p.bin</SourceFilename><LineOffset>40</LineOffset></VRTRasterBand></VRTDataset>"""
+
+
+def raster(path, driver):
+    about = {"height": 32, "width": 40, "count": 1, "dtype": "uint8", "transform": rasterio.Affine(1, 0, 5, 0, -1, 40)}
+    with rasterio.open(f"{path}.tif", "w", driver="GTiff", **about) as made:
+        made.write(PRIVATE, 1)
+    rasterio.shutil.copy(f"{path}.tif", path, driver=driver)
+    return path
+
+
+@pytest.fixture
+def shared(tmp_path):
+    """A folder for a file, beside private ones."""
+    (tmp_path / "p.bin").write_bytes(PRIVATE.tobytes())
+    with h5py.File(tmp_path / "p.h5", "w") as file:
+        file["v"] = PRIVATE
+    (tmp_path / "shared").mkdir()
+    return tmp_path / "shared"
+
+
+@pytest.mark.parametrize("kind", HDF5)
+def test_hdf5_takes_nothing_from_another_file(shared, kind):
+    with h5py.File(shared / "a.h5", "w") as file:
+        HDF5[kind](file)
+    with pytest.raises(ValueError, match=r"a\.h5 takes \S+ from another file: save all values in one file"):
+        grids.read_grid(shared / "a.h5")
+    with h5py.File(shared / "a.h5", "w") as file:
+        virtual(file, ".")
+        file["g/loop"] = file["/"]
+    np.testing.assert_array_equal(grids.read_grid(shared / "a.h5").values["v"][0], PRIVATE)
+
+
+@pytest.mark.parametrize(("driver", "name", "beside"), [("EHdr", "a.bil", ".hdr"), ("ILWIS", "a.mpr", ".mp#")])
+def test_a_raster_takes_nothing_from_another_folder(shared, driver, name, beside):
+    path = raster(shared / name, driver)
+    np.testing.assert_array_equal(rasters.read_raster(path, 10**6)[0], PRIVATE)
+    own = path.with_suffix(beside)
+    os.replace(own, shared.parent / own.name)
+    own.symlink_to(shared.parent / own.name)
+    with pytest.raises(ValueError, match=r"refers to .* in another folder: save all values in one file"):
+        grids.read_grid(path)
+
+
+def test_neither_a_mask_nor_a_list_of_maps_takes_a_raster_elsewhere(shared):
+    path = raster(shared / "a.asc", "AAIGrid")
+    (shared / "a.asc.msk").write_text(VRT)
+    with pytest.raises(ValueError, match=r"refers to .*p\.bin in another folder"):
+        grids.read_grid(path)
+    raster(shared.parent / "p.mpr", "ILWIS")
+    header = "[Ilwis]\nType=MapList\n[MapList]\nMaps=1\nSize=32 40\nGeoRef=none\nMap0="
+    (shared / "b.mpr").write_text(f"{header}{shared.parent / 'p.mpr'}\n")
+    with pytest.raises(ValueError, match="is a list of maps of ILWIS"):
+        grids.read_grid(shared / "b.mpr")
+
+
+def tiff(after, more=()):
+    """A TIFF with a directory for each number, that of the next one; None is the end."""
+    tags = [(256, 4, 1, 8), (257, 4, 1, 8), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1), (273, 4, 1, 8)]
+    tags = sorted([*tags, (277, 3, 1, 1), (278, 4, 1, 8), (279, 4, 1, 64), *more])
+    body, begin = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags), 72
+    places = [begin + n * (len(body) + 4) for n in range(len(after))] + [0]
+    directories = b"".join(body + struct.pack("<I", places[-1 if n is None else n]) for n in after)
+    return b"II*\0" + struct.pack("<I", begin) + bytes(range(64)) + directories
+
+
+CIRCLES = {
+    "itself": tiff([0]),
+    "the one before": tiff([1, 0]),
+    "one in a long row": tiff([*range(1, 300), 100]),
+    "very many": tiff([*range(1, 2**16 + 1), None]),
+    "many copies": tiff([None], [(330, 4, 2**17, 8)]),
+}
+
+
+@pytest.mark.parametrize("kind", CIRCLES)
+def test_directories_of_a_tiff_are_counted(tmp_path, kind):
+    path = tmp_path / "a.tif"
+    path.write_bytes(CIRCLES[kind])
+    assert grids.kind_of(path) is None and not volume.is_volume(path)
+    for read in (image.read, volume.read):
+        with pytest.raises(ValueError, match="has more than 65536 pages, or a page twice"):
+            read(path)
+    path.write_bytes(tiff([1, 2, None]))
+    assert image.read(path).pixels.shape == (8, 8) and volume.is_volume(path)
+
+
+def overwrite(value):
+    if isinstance(value, np.ndarray):
+        np.ma.getdata(value)[...] = value.flat[0]
+    for one in value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ():
+        overwrite(one)
+
+
+@pytest.mark.parametrize("name", sorted({run.function: name for name, run in RUNS.items()}.values()))
+def test_a_callback_that_overwrites_all_inputs_changes_nothing(name, monkeypatch):
+    run, called = RUNS[name], []
+    given = deepcopy(run.inputs())
+
+    def callback(progress):
+        called.append(overwrite(given))
+
+    monkeypatch.setitem(RUNS, name, run._replace(inputs=lambda: given))
+    made = digest(outcome(name, callback=callback)[0])
+    monkeypatch.setitem(RUNS, name, run)
+    assert called and made == digest(outcome(name)[0])
+
+
+@pytest.mark.slow
+def test_a_signal_at_any_moment_ends_with_one_sentence_and_no_output(tmp_path):
+    """At 200 moments of a command; before Python runs the program, the signal itself ends it."""
+    PIL.Image.fromarray(PRIVATE).save(tmp_path / "a.png")
+    words = [sys.executable, "-m", "simdtex", "synth", "a.png", "-o", "o.png", "--size", "32", "--seed", "1", "--quiet"]
+    how = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    began = time.perf_counter()
+    subprocess.run(words, check=True, **how)
+    lasts, rng, wrong = time.perf_counter() - began, random.Random(SEED), []
+    (tmp_path / "o.png").unlink()
+    for number in [signal.SIGINT, signal.SIGTERM] * 100:
+        process = subprocess.Popen(words, **how)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(lasts * rng.random())
+        process.send_signal(number)
+        said = process.communicate(timeout=120)[1].replace("1 error generated.\n", "")  # of LLVM, which it stopped too
+        made = {one.name for one in tmp_path.iterdir()} - {"a.png"}
+        sentence = "written so far: o.png" if made else "nothing was written"
+        ended = process.returncode == 128 + number and said in (f"simdtex: stopped; {sentence}\n", "simdtex: stopped\n")
+        early = process.returncode in (-number, 1) and (not said or "KeyboardInterrupt" in said) and not made
+        if not (ended or early or (process.returncode == 0 and not said and made == {"o.png"})):
+            wrong.append((number, process.returncode, said, made))
+        (tmp_path / "o.png").unlink(missing_ok=True)
+    assert not wrong
