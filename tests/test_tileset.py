@@ -15,7 +15,6 @@ from skimage import data
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image, tilesets
-from simdtex.jobs import tileset
 from simdtex.jobs.tileset import Tiles
 from simdtex.model.corners import CYCLE, TORUS, corners_of, numbers, plane, torus
 from simdtex.options import DataWarning
@@ -82,8 +81,8 @@ def test_a_border_is_the_same_in_all_tiles_that_have_it(tiles):
 
 
 def test_the_three_runs_share_no_random_number(monkeypatch):
-    plans, plan = [], tileset.mrf.plan
-    monkeypatch.setattr(tileset.mrf, "plan", lambda *given, **more: plans.append(plan(*given, **more)) or plans[-1])
+    plans, plan = [], Tiles.plan
+    monkeypatch.setattr(Tiles, "plan", lambda *given: plans.append(plan(*given)) or plans[-1])
     simdtex.tileset(texture((14, 15)), 16, order=1, levels=2, rng=1, device=REFERENCE)
     grids = [one.grid(0) for one in plans]
     keys = np.concatenate([grid.places(np.arange(grid.size)) for grid in grids])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,10 @@ class Input:
     def sizes(self) -> list[Input]:
         """All inputs, the finest first."""
         return [self, *(self.coarser.sizes if self.coarser else ())]
+
+    def keyed(self, first: int, cols: int) -> Self:
+        """Return the input of an output that is part of a larger one, of ``cols`` columns, from a pixel on."""
+        return replace(self, key=(first, cols), coarser=self.coarser and self.coarser.keyed(first, cols))
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the sample."""
