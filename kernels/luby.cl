@@ -9,8 +9,7 @@
 #define IN 1
 #define OUT 2
 
-// Before the first round. active (rows, cols); priority, state (rows, cols)  out; `begin` as in the lattice. One work-item
-// per site.
+// Before the first round. active (rows, cols); priority, state (rows, cols)  out; `begin`: lattice.h. One item per site.
 __kernel void luby_priority(const int sites, const ulong seed, const uint level, const uint count, const ulong begin,
                             __global const uchar *restrict active, __global uint *restrict priority,
                             __global uchar *restrict state)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from conftest import usable_devices
 from runs import digest
+from tiny import JOBS
 
 ROOT = Path(__file__).resolve().parent.parent
 REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
@@ -94,7 +95,9 @@ import simdtex
 from cases import REFERENCE, assert_same_bits, ising, texture
 from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
+from tiny import exact_sizes
 
+exact_sizes()
 info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
 few = (np.indices((5, 6)).sum(0) // 2 % 3).astype(np.uint8)
@@ -149,17 +152,30 @@ machine.sync()
 REPORT = re.compile(r"data race|Invalid (read|write)|uninitialized|out of bounds", re.IGNORECASE)
 
 
-def under_oclgrind(folder, code):
+def under_oclgrind(folder, code, *arguments, races="1"):
     found = library("oclgrind/liboclgrind-rt-icd.so") or library("**/liboclgrind-rt-icd.so")
     if found is None:
         missing("Oclgrind")
-    variables = {"OCL_ICD_VENDORS": vendors(folder, found), "OCLGRIND_DATA_RACES": "1"}
-    return child(code, OCLGRIND_CHECK_API="1", PYOPENCL_NO_CACHE="1", **variables)
+    variables = {"OCL_ICD_VENDORS": vendors(folder, found), "OCLGRIND_DATA_RACES": races}
+    return child(code, *arguments, OCLGRIND_CHECK_API="1", PYOPENCL_NO_CACHE="1", **variables)
+
+
+EVERY = "import runpy; runpy.run_module('tiny', run_name='__main__')"
+SLOWEST = ("tileset", "tiles", "classify", "maps")
 
 
 @pytest.mark.slow
-def test_no_kernel_races_or_leaves_its_bounds(tmp_path):
-    done = under_oclgrind(tmp_path, TINY)
+@pytest.mark.parametrize(
+    ("code", "arguments", "races"),
+    [
+        (TINY, [], "1"),
+        (EVERY, [{"vector": 16}], "0"),  # a vector also reads sites that others write, without an effect
+        (EVERY, [{"items": 32}, *(name for name in JOBS if name not in SLOWEST)], "0"),
+    ],
+    ids=["races", "every-job", "items"],
+)
+def test_no_kernel_races_or_leaves_its_bounds(tmp_path, code, arguments, races):
+    done = under_oclgrind(tmp_path, code, *map(str, arguments), races=races)
     assert done.returncode == 0, done.stdout
     assert "same bits throughout" in done.stdout
     assert not REPORT.search(done.stdout), done.stdout

@@ -1,8 +1,11 @@
 """Every run of the table is Algorithm 1, the same on every device and in every form of launch, resumed and in tiles."""
 
+import contextlib
 import functools
+import importlib
 import inspect
 import json
+import pkgutil
 from dataclasses import fields
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, opencl, slow_but
 from kept import HERE, PACKAGE, Kept, key, sources
 from runs import LARGE, PINNED, RUNS, SEED, digest, large, outcome
+from tiny import JOBS, Guarding
 
 import simdtex
 from simdtex.checkpoint import Checkpoint
@@ -68,6 +72,28 @@ def test_the_bytes_are_those_pinned(reference, name):
 @pytest.mark.parametrize("name", slow_but(("large grass-16-bit", "large pyramid-coffee"), LARGE))
 def test_the_bytes_of_larger_runs_are_those_pinned(any_device, name):
     assert digest(large(name, opencl(any_device))) == pinned()[name]
+
+
+@pytest.fixture
+def guarding(monkeypatch):
+    """Let all arrays of the package refuse negative indices in an array."""
+    for found in pkgutil.walk_packages(simdtex.__path__, "simdtex."):
+        with contextlib.suppress(ImportError):  # of an optional library
+            module = importlib.import_module(found.name)
+            if getattr(module, "np", None) is np:
+                monkeypatch.setattr(module, "np", Guarding())
+
+
+@pytest.mark.parametrize("name", slow_but([name for name in JOBS if name not in ("tileset", "tiles")], JOBS))
+def test_no_gather_of_the_reference_is_at_minus_one(guarding, name):
+    """-1 is no source, no neighbour, no candidate: NumPy would read the last element."""
+    JOBS[name]({"device": REFERENCE})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RUNS)
+def test_nor_is_one_of_any_run(guarding, name):
+    assert digest(map(np.asarray, outcome(name)[0])) == pinned()[name]
 
 
 def test_every_run_is_pinned_and_no_other():

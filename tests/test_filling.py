@@ -182,6 +182,18 @@ def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, l
     assert (rows, cols) == (slice(60 - around, 60 + side + around), slice(50 - around, 50 + side + around))
 
 
+@pytest.mark.parametrize("options", [{"levels": 1}, {"levels": 1, "schedule": "luby"}, {"levels": 3}], ids=str)
+def test_equal_holes_get_different_pixels_and_each_those_that_it_gets_alone(options):
+    """The random numbers of a site are those of its place in the picture."""
+    parts = [np.s_[10:22, first : first + 12] for first in (12, 60, 108)]
+    given = {"sample": np.random.default_rng(3).integers(0, 256, (20, 20), np.uint8), "order": 1, "xi": -1.0} | options
+    flat = np.full((32, 132), 128, np.uint8)
+    filled = fill(flat, hole_at(*parts, shape=flat.shape), **given)
+    first, second, third = (filled[part] for part in parts)
+    assert max(np.mean(first == second), np.mean(second == third), np.mean(first == third)) < 0.5
+    assert_same_bits(fill(flat, hole_at(parts[1], shape=flat.shape), **given)[parts[1]], second)
+
+
 def test_many_holes_are_in_one_window():
     mask = np.zeros((100, 100), bool)
     mask.flat[[k * 2000 + 10 + 20 * j for k in range(4) for j in range(4)]] = True

@@ -465,6 +465,19 @@ def test_each_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path, na
     assert "POCL_CACHE_DIR" not in os.environ
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
+@pytest.mark.parametrize(("frame", "words"), [("built", "perhaps a cache is damaged"), ("sync", "run a.py again")])
+def test_a_crash_is_laid_to_a_cache_only_if_a_compilation_was_under_way(monkeypatch, tmp_path, frame, words):
+    report = tmp_path / "simdtex" / "crashes.txt"
+    report.parent.mkdir()
+    report.write_text(f'Fatal Python error\n  File "b.py", line 9 in {frame}\n  File "a.py", line 1 in <module>\n')
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for name, value in (("_report", None), ("_reported", 0), ("apart", False)):
+        monkeypatch.setattr(devices, name, value)
+    with pytest.warns(UserWarning, match=words):
+        devices._prepare_caches()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
 @pytest.mark.parametrize("damaged", ["info", "*.so", "*.bc", "binary", "*.sqlite"])

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits
+from cases import REFERENCE, assert_same_bits, texture
 from click.testing import CliRunner
 from skimage import data
 
@@ -78,6 +78,15 @@ def test_a_border_is_the_same_in_all_tiles_that_have_it(tiles):
         squares = [rolled[y * size :, x * size :][: 2 * wide, : 2 * wide] for y, x in np.argwhere(torus(2) == colour)]
         for one in squares[1:]:
             assert_same_bits(squares[0], one)
+
+
+def test_the_three_runs_share_no_random_number(monkeypatch):
+    plans, plan = [], Tiles.plan
+    monkeypatch.setattr(Tiles, "plan", lambda *given: plans.append(plan(*given)) or plans[-1])
+    simdtex.tileset(texture((14, 15)), 16, order=1, levels=2, rng=1, device=REFERENCE)
+    grids = [one.grid(0) for one in plans]
+    keys = np.concatenate([grid.places(np.arange(grid.size)) for grid in grids])
+    assert (len(plans), np.unique(keys).size) == (3, keys.size)
 
 
 def test_all_pixels_are_from_the_sample(tiles):

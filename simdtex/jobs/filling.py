@@ -397,8 +397,7 @@ class Filling:
             Given(values, known, sample.place, suggests=False),
             guide,
             most=max(window.levels, _fewest_levels(pictures)) if window.levels else None,
-            key=(window.rows.start * self.hole.shape[1] + window.cols.start, self.hole.shape[1]),
-        )
+        ).keyed(window.rows.start * self.hole.shape[1] + window.cols.start, self.hole.shape[1])
 
 
 def widened(hole: Mask, grow: int, feather: int) -> NDArray[Any]:

@@ -241,8 +241,7 @@ class Tiles:
         if len(self.pictures.pixels) > 1:
             samples = tuple(np.full((*one.shape[:2], 1), n) for n, one in enumerate(self.pictures.pixels))
             guide = samples, self.labels(grid)[..., None]
-        key = begin, shape[1]
-        return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile, key=key)
+        return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile).keyed(begin, shape[1])
 
     def labels(self, grid: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return the number of the sample of each pixel, which is that of the nearest corner, NaN half way."""

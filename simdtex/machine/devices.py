@@ -13,6 +13,7 @@ import atexit
 import faulthandler
 import functools
 import os
+import re
 import shutil
 import signal
 import site
@@ -163,7 +164,11 @@ def _prepare_caches() -> None:
         return
     _report, _reported, apart = report, len(text), " in failure\n" in text
     if text and not text.endswith(_SAID):
-        _compile_anew("", "the OpenCL runtime crashed in an earlier run")
+        last, again = text.rpartition(_SAID)[2], ""
+        if " in built\n" not in last and " in failure\n" not in last:  # no compilation was under way
+            (*_, program) = "it", *re.findall(r'File "(.*)", line \d+ in <module>', last)
+            again = f"run {program} again and, if it crashes again, with another device, and report it"
+        _compile_anew("", "an earlier process that used OpenCL crashed", again)
 
 
 def report_crashes() -> None:
@@ -172,18 +177,16 @@ def report_crashes() -> None:
         faulthandler.enable(os.open(_report, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666))
 
 
-def _compile_anew(report: str, why: str) -> None:
+def _compile_anew(report: str, why: str, remedy: str = "") -> None:
     """Warn that all kernels are compiled anew, and add to the reports, so that later processes do not read them."""
     global _reported
     _reported += len(report + _SAID)
     if _report:
         with suppress(OSError), _report.open("a") as file:
             file.write(report + _SAID)
-    warnings.warn(
-        f"{why}, perhaps because a cache is damaged, and kernels are compiled anew; delete the folders pocl, pyopencl, "
-        f"pytools and simdtex in {_report.parent.parent if _report else 'the cache folder'}",
-        stacklevel=3,
-    )
+    folder = _report.parent.parent if _report else "the cache folder"
+    cache = f"perhaps a cache is damaged: delete the folders pocl, pyopencl, pytools and simdtex in {folder}"
+    warnings.warn(f"{why}, and kernels are compiled anew; {remedy or cache}", stacklevel=3)
 
 
 def intel_library() -> Path | None:

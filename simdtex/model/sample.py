@@ -447,14 +447,13 @@ class Sample:
         With a volume the result is (layer, row, column); with several pictures the number of the picture is the last.
         """
         place = np.stack(self._coordinates(source), -1)
-        number = self.picture_of(source).astype(np.int32) if len(self.boxes) > 1 else None
-        if number is not None:
+        if len(self.boxes) > 1:
+            number = self.picture_of(source).astype(np.int32)
             place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[number]
-        if self.reduction > 1:
+            place = np.concatenate([place * np.int32(self.reduction), number[..., None]], -1)
+        else:
             place *= self.reduction
-        if number is not None:
-            place = np.concatenate([place, number[..., None]], -1)
-        return np.where((source < 0)[..., None], np.int32(-1), place) if (source < 0).any() else place
+        return np.where((source < 0)[..., None], np.int32(-1), place)
 
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the pixel index of places as `place` returns them; -1 if the first number is below 0."""

@@ -51,7 +51,29 @@ def finish(
     offsets, weights = gaussian_offsets(sd)
     first, count = rows.start * grid.cols, len(rows) * grid.cols
     if machine is None:
-        return _finished(field, given, grid, sample, offsets, weights, np.arange(first, first + count, dtype=np.int32))
+        sites = np.arange(first, first + count, dtype=np.int32)
+        source = field.source.ravel()
+        shown, usable = sample.working[: sample.shown].astype(np.int64), sample.inside.ravel()
+        values = field.values[: sample.shown].reshape(sample.shown, -1).astype(np.int64)
+        own = gathered(shown, source[sites], 0)
+
+        def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> NDArray[np.int64]:
+            row, col = (np.stack(np.divmod(pixel, np.int32(sample.cols))) + offset[:, None]).astype(np.int64)
+            at = np.stack([row, col]) - sample.margin
+            there = (pixel >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+            found = np.where(there, row * sample.cols + col, -1)
+            return np.where(gathered(usable, found, False), found, -1)
+
+        total, sums = np.zeros(sites.size, np.int64), np.zeros(own.shape, np.int64)
+        for offset, weight in zip(offsets, weights.tolist(), strict=True):
+            r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
+            p = within(gathered(source, r, -1), -offset)
+            q = np.where((p < 0) & (gathered(given.ravel(), r, 0) > 0), within(source[sites], offset), -1)
+            there = (source[sites] >= 0) & ((p >= 0) | (q >= 0))
+            by = np.where(p < 0, gathered(values, r, 0) - gathered(shown, q, 0), gathered(shown, p, 0) - own)
+            total += weight * there
+            sums += weight * np.where(there, by, 0)
+        return ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
     out = machine.empty((sample.shown, count), np.int16)
     machine.launch(
         "finish",
@@ -64,36 +86,3 @@ def finish(
     )
     found: NDArray[np.int16] = machine.get(out)
     return found
-
-
-def _finished(
-    field: Field,
-    given: NDArray[np.uint8],
-    grid: Grid,
-    sample: Sample,
-    offsets: NDArray[np.int32],
-    weights: NDArray[np.int32],
-    sites: NDArray[np.int32],
-) -> NDArray[np.int16]:
-    source = field.source.ravel()
-    shown, usable = sample.working[: sample.shown].astype(np.int64), sample.inside.ravel()
-    values = field.values[: sample.shown].reshape(sample.shown, -1).astype(np.int64)
-    own = gathered(shown, source[sites], 0)
-
-    def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> NDArray[np.int64]:
-        row, col = (np.stack(np.divmod(pixel, np.int32(sample.cols))) + offset[:, None]).astype(np.int64)
-        at = np.stack([row, col]) - sample.margin
-        there = (pixel >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
-        found = np.where(there, row * sample.cols + col, -1)
-        return np.where(gathered(usable, found, False), found, -1)
-
-    total, sums = np.zeros(sites.size, np.int64), np.zeros(own.shape, np.int64)
-    for offset, weight in zip(offsets, weights.tolist(), strict=True):
-        r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
-        p = within(gathered(source, r, -1), -offset)
-        q = np.where((p < 0) & (gathered(given.ravel(), r, 0) > 0), within(source[sites], offset), -1)
-        there = (source[sites] >= 0) & ((p >= 0) | (q >= 0))
-        by = np.where(p < 0, gathered(values, r, 0) - gathered(shown, q, 0), gathered(shown, p, 0) - own)
-        total += weight * there
-        sums += weight * np.where(there, by, 0)
-    return ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)

@@ -93,8 +93,7 @@ class RandomSubset(Scattered):
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """Return each active site with probability p."""
         wanting = active.numbers()
-        place = setting.grid.key[0] + wanting
-        bits = random.draw4(setting.seed, setting.level, steps, place, random.SCHEDULE)[0]
+        bits = random.draw4(setting.seed, setting.level, steps, setting.grid.key[0] + wanting, random.SCHEDULE)[0]
         return wanting[bits < self.p * 2.0**32]
 
 

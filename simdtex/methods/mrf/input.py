@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ class Input:
 
     A pixel of ``sample`` and a site of X are means over squares of ``reduction`` pixels. ``coarser`` is the input, of
     half the size, of levels whose spacing is twice the reduction or more; if it is None, they have this input, too.
-    ``key`` is the number of the first pixel of X in a larger output, and the columns of that; (0, 0): X is the output.
+    ``key`` is that of random numbers (`simdtex.model.lattice.Grid`).
     """
 
     sample: Sample
@@ -42,7 +43,7 @@ class Input:
     remedy: str = SMALLER
     reduction: int = 1
     coarser: Input | None = None
-    key: tuple[int, int] = (0, 0)
+    key: tuple[int, int, int] = (0, 0, 1)
 
     @property
     def kinds(self) -> Soft | None:
@@ -58,10 +59,15 @@ class Input:
         """All inputs, the finest first."""
         return [self, *(self.coarser.sizes if self.coarser else ())]
 
+    def keyed(self, first: int, cols: int) -> Self:
+        """Return the input of an output that is part of a larger one, of ``cols`` columns, from a pixel on."""
+        key = first, cols, self.reduction
+        return replace(self, key=key, coarser=self.coarser and self.coarser.keyed(first, cols))
+
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the sample."""
         grid = Grid.of(self.shape, 2**number // self.reduction, self.options.boundary == "torus")
-        return replace(grid, key=(*self.key, self.reduction)) if self.key[1] else grid
+        return replace(grid, key=self.key)
 
     def of(self, number: int) -> Input:
         """Return the input of a level: this one, or a coarser one."""

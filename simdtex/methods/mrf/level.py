@@ -162,8 +162,8 @@ class Lattices:
     def squares(self) -> NDArray[np.int32] | None:
         """The first pixel of the square of each pixel of the sample of half the size; None if there is no such sample.
 
-        If there is one, the level above has it, and the only level of this sample begins with its arrangement. -1 for
-        pixels that no site has: those of the margin, and those that are unknown or may not be taken.
+        If there is one, the level above has it, and the only level of this sample begins with its arrangement. Pixels
+        that no site has, as those of the margin, have -1.
         """
         if not self.coarser:
             return None

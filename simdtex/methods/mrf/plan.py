@@ -74,7 +74,6 @@ def plan(
     most: int | None = None,
     soft: Soft | None = None,
     period: tuple[int, int] | None = None,
-    key: tuple[int, int] = (0, 0),
 ) -> Plan:
     """Return the plan of a run, with its input validated and its sample in working levels.
 
@@ -95,8 +94,6 @@ def plan(
         The probability of each category, and of each picture of Y, at each site of X.
     period : (int, int), optional
         Rows and columns after which the lattice of a regular sample repeats on a torus; None: those of X.
-    key : (int, int)
-        The number of the first pixel of X in a larger output, and the columns of that; (0, 0): X is the output.
     """
     pictures = options.of(pictures)
     if soft and soft.images is not None:
@@ -127,7 +124,7 @@ def plan(
     values = round(heavy * (channels * len(offsets) + len(guides)))
     if given and given.partly:
         values += guides[-1].channels * centre_known(options, len(offsets)) ** 2
-    scenes = [Scene(pictures, shape, given, guides, regular, key)]
+    scenes = [Scene(pictures, shape, given, guides, regular)]
     count = halvings(scenes[0], options, levels, soft)
     while True:  # with as many halvings as leave known pixels
         try:
@@ -155,7 +152,7 @@ def reduced(
         own, sample = sampled(here, 1 if found else levels - number, offsets, values, options, 2**number)
         levels = levels if found else own + number
         held = planes(here.given, sample) if here.given and here.given.whole.any() else None
-        schedule, rest = schedules.get(options.schedule), {"reduction": 2**number, "coarser": found, "key": here.key}
+        schedule, rest = schedules.get(options.schedule), {"reduction": 2**number, "coarser": found}
         found = Plan(sample, here.shape, offsets, options, schedule, levels, here.given, held, soft, **rest)
     assert found
     return found
@@ -169,7 +166,6 @@ class Scene(NamedTuple):
     given: Given | None
     guides: list[Any]
     regular: Phases | None
-    key: tuple[int, int]
 
     def halved(self) -> Scene:
         """Return the input of half the size."""
@@ -179,7 +175,6 @@ class Scene(NamedTuple):
             self.given and self.given.halved(),
             [guide.halved() for guide in self.guides],
             self.regular and self.regular.halved(),
-            self.key,
         )
 
 
