@@ -355,6 +355,18 @@ def test_a_file_that_stops_half_way_ends_the_connection_and_others_go_on(monkeyp
         assert second.wait("picture")[0]["name"] == "b.png"
 
 
+class Deadly:
+    """A name that ends the process which receives it."""
+
+    def __reduce__(self):
+        return os._exit, (3,)
+
+
+def test_a_file_that_crashes_its_reader_is_told():
+    with pytest.raises(ValueError, match="ends the process that reads it: save it again as PNG"):
+        sessions.read_apart(Deadly(), b"")
+
+
 def test_a_reading_that_lasts_too_long_is_ended_and_waits_for_no_other_page(monkeypatch, port):
     first, second, read = Client(port), Client(port), sessions.read_apart
     both = threading.Barrier(2)  # which none passes before the other is read too

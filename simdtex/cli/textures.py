@@ -217,6 +217,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
     pixels = material.pixels[0]
     data = read_inputs("synth", options, material, how)
+    place = options.pop("geo", None)  # of the known pixels; a new picture was taken nowhere else
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
     if isinstance(known, HardData) and not known.from_top:
@@ -228,7 +229,6 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
         left_out = ("tiles", "workers", "also", "source_map", "preview")
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
         return None
-    place = options.pop("geo", None)  # a new picture was taken nowhere else
     like = (material.metadata or NOTHING).at(place and NOTHING._replace(geo=place))._replace(exif=None)
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
     writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)

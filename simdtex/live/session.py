@@ -19,8 +19,8 @@ from copy import deepcopy
 from functools import cache, partial
 from importlib.metadata import version
 from math import inf
-from multiprocessing import TimeoutError as Late
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -613,8 +613,27 @@ def _read(message: Message, buffers: Sequence[Any]) -> Picture:
 
 def read_apart(name: str, data: bytes) -> Image:
     """Return the picture in the bytes of a file, read in a process of its own, which is ended after `READ_WAIT`."""
-    with get_context("spawn").Pool(1, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        try:
-            return pool.apply_async(read_bytes, (name, data), {"max_pixels": MAX_PIXELS}).get(READ_WAIT)
-        except Late:
-            raise ValueError(f"{name} cannot be read within {READ_WAIT:.0f} s: save it again as PNG") from None
+    context = get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_reading, args=(there, name, data), daemon=True)
+    process.start()
+    there.close()
+    try:
+        late = ValueError(f"{name} cannot be read within {READ_WAIT:.0f} s: save it again as PNG")
+        found: Image | ValueError = here.recv() if here.poll(READ_WAIT) else late
+    except EOFError:
+        found = ValueError(f"{name} ends the process that reads it: save it again as PNG")
+    finally:
+        process.kill()
+        here.close()
+    if isinstance(found, ValueError):
+        raise found
+    return found
+
+
+def _reading(there: Connection, name: str, data: bytes) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        there.send(read_bytes(name, data, max_pixels=MAX_PIXELS))
+    except ValueError as error:
+        there.send(ValueError(str(error)))
