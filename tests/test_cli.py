@@ -200,7 +200,7 @@ def test_a_dry_run_tells_size_memory_and_time_and_writes_nothing(inputs, name):
     done = run(command, *words, "-o", OUTPUTS.get(name, "out.png"), "--dry-run", "--device", "reference")
     assert done.exit_code == 0, done.output
     out, more = OUTPUTS.get(name, "out.png"), r", \d+ MiB of memory, about \d+\.\d (s|min) on reference \(NumPy\)"
-    assert re.fullmatch(rf"{out}: {summary}{more}; nothing was written\n", done.output), done.output
+    assert re.fullmatch(rf"{out}: {summary}{more}; nothing was written\n", done.stdout), done.output
     assert sorted(os.listdir()) == before
 
 

@@ -1,7 +1,6 @@
 """Files that name other files or themselves, callbacks that change inputs, signals at any moment."""
 
 import os
-import random
 import signal
 import struct
 import subprocess
@@ -155,7 +154,7 @@ def test_a_signal_at_any_moment_ends_with_one_sentence_and_no_output(tmp_path):
     how = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     began = time.perf_counter()
     subprocess.run(words, check=True, **how)
-    lasts, rng, wrong = time.perf_counter() - began, random.Random(SEED), []
+    lasts, rng, wrong = time.perf_counter() - began, np.random.default_rng(SEED), []
     (tmp_path / "o.png").unlink()
     for number in [signal.SIGINT, signal.SIGTERM] * 100:
         process = subprocess.Popen(words, **how)

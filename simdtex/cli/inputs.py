@@ -684,6 +684,7 @@ def read_lead(
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files:
         check_input(Named(output, "folder"), Named(path, "read"))
+    material = read_material(albedos[:1], how)
     if unknown := [name for name in found.unknown if folder / name not in found.files]:
         note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
-    return Folder(found, albedos[0], output), read_material(albedos[:1], how)
+    return Folder(found, albedos[0], output), material

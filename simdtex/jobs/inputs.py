@@ -48,8 +48,8 @@ output : simdtex.run.Output
     Only with ``full_output=True``.
 """
 
-SHARED = ("rng", "device", "callback", "checkpoint")
-"""The inputs of a job that are not copied."""
+SHARED = ("rng", "device", "callback", "checkpoint", "options")
+"""The inputs of a job that are not copied; a schedule among the options may tell its owner what it saw."""
 
 ABSENT = SimpleNamespace(channel_axis=None, rng=None, full_output=False, checkpoint=None, mask=None, known_source=None)
 """The values of inputs that a job does not have."""
