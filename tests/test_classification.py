@@ -362,7 +362,7 @@ def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
 @pytest.mark.slow
 def test_labels_are_a_training_image(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
-    labels, common = read_labels("labels.png"), ["--categorical", "--order", 2, "--device", "reference"]
+    labels, common = read_labels("labels.png")[::-1], ["--categorical", "--order", 2, "--device", "reference"]
     words = ["simulate", "labels.png", "-o", "many.npz", "--seed", 5, *common]
     result = CliRunner().invoke(main, [*map(str, words)])
     assert result.exit_code == 0, result.output
@@ -373,7 +373,7 @@ def test_labels_are_a_training_image(folder):
         picture.save("known.png", transparency=2)
     words = ["estimate", "labels.png", "-o", "maps.npz", "--known", "known.png", "--categorical"]
     assert CliRunner().invoke(main, [*words, "--device", "reference"]).exit_code == 0
-    known = np.ma.masked_equal(read_labels("known.png"), 0)
+    known = np.ma.masked_equal(read_labels("known.png")[::-1], 0)
     wanted = simdtex.estimate(labels, known=known, categorical=True, device="reference")
     assert (np.load("maps.npz")["probability"] == wanted.probability.values).all()
 

@@ -407,11 +407,14 @@ def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, s
 
 @pytest.mark.slow
 def test_what_solid_writes_is_a_training_image(tmp_path, monkeypatch):
-    """A block of three axes is a volume in each format, the same to the bit; --channels makes it a picture."""
+    """A block of three axes is a volume in each format, the same to the bit; --channels makes it a picture.
+
+    The first row of a page or a slice, which is a picture, is its northern edge.
+    """
     monkeypatch.chdir(tmp_path)
     training, found = facies((9, 14, 15)), []
     for name in ("ti.npy", "ti.npz", "ti.tif", "ti.nrrd", "slices"):
-        volume.write(name, training)
+        volume.write(name, training[:, ::-1] if name in ("ti.tif", "slices") else training)
         words = shlex.split("--size 9x8x7 --order 2 --seed 7 --device reference")
         result = CliRunner().invoke(main, ["simulate", name, "-o", f"{name}-out.npz", *words])
         assert result.exit_code == 0 and "9x8x7" in result.output, result.output

@@ -110,7 +110,7 @@ def guarded(made):
 
 def exact_sizes():
     """Let the buffers of devices have the sizes of their arrays, so that a read beyond the end of one is outside."""
-    opencl.Pool.take = lambda pool, size: opencl.Taken(pool._new(max(1, size)), [])
+    opencl.Pool.take = lambda pool, size: pool._use(pool._new(max(1, size)), [])
 
 
 if __name__ == "__main__":  # tiny.py {"options": of the machine} JOB...
