@@ -448,7 +448,7 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
 
 @pytest.mark.parametrize("name", ["pocl", "pocl/kcache", "pyopencl", "pytools", "own"])
 def test_each_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path, name):
-    """Writing fails for whoever runs the test, also for root."""
+    """The folder refuses temporary files, also if root runs the test."""
     (tmp_path / name).mkdir(parents=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path / "own") if name == "own" else "")

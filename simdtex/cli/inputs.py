@@ -375,12 +375,12 @@ def read_map(path: Path, files: Files) -> Any:
     if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
         return image.read_mask(path, image.read(path).pixels.shape, ascending=how.ascending)
     found, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
-    pixels = planes(found)
+    pixels = planes(found) > 0 if name == "region" else planes(found)
     several = pixels.shape[-1] > 1
     values: Any = in_place(pixels, grid) if grid else pixels if several else pixels[..., 0]
     if several:
         return values.transpose("variable", ...) if grid else np.moveaxis(values, -1, 0)
-    return values > 0 if name == "region" else values
+    return values
 
 
 def read_like(path: Path, files: Files) -> Any:
