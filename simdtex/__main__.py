@@ -25,8 +25,8 @@ def main() -> None:
         from simdtex.cli import main as command
 
         command()
-    except KeyboardInterrupt:
-        sys.exit(130)
+    except KeyboardInterrupt:  # of the signal before `leave` took it
+        leave()
     except OSError as error:  # of standard output, outside of a command
         from simdtex.cli.command import settle
 
