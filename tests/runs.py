@@ -276,7 +276,7 @@ RUNS = {
     "density": textures(DENSITY | {"levels": 2, "bandwidth": 0.3}, samples=((9, 10),), shape=(6, 7), tiles=4),
     "density-colour": textures(DENSITY | OPEN, channels=3, samples=((9, 8),), shape=(1, 17), dtype=np.float64),
     "density-16-bit": textures(DENSITY | {"levels": 2}, channels=2, dtype=np.uint16, samples=((9, 10),), shape=(7, 6)),
-    "paper-icm": textures({"preset": "paper", "order": 1, "relaxation": "icm"}, shape=(5, 6)),
+    "paper-density": textures({"preset": "paper", "order": 1, "relaxation": "gibbs", "pixel": "density"}, shape=(5, 6)),
     "mode-colour": textures(
         MORE | OPEN | {"pixel": "density", "order": 1, "xi": -9.0, "free_sweeps": 1}, channels=2, shape=(4, 5)
     ),

@@ -148,7 +148,7 @@ def test_a_callback_that_overwrites_all_inputs_changes_nothing(name, monkeypatch
 
 @pytest.mark.slow
 def test_a_signal_at_any_moment_ends_with_one_sentence_and_no_output(tmp_path):
-    """At 200 moments of a command; before Python runs the program and after its last line, the signal itself ends it."""
+    """At 200 moments of a command; before its first line and after its last one, the signal itself ends it."""
     PIL.Image.fromarray(PRIVATE).save(tmp_path / "a.png")
     words = [sys.executable, "-m", "simdtex", "synth", "a.png", "-o", "o.png", "--size", "32", "--seed", "1", "--quiet"]
     how = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -297,8 +297,8 @@ class Options:
     free_sites: str = sampling(
         "all",
         Choice(("all", "kept")),
-        "Let the free sweeps of every level relax all sites, or those of the finest level the sites kept from the level "
-        "above, some of which stand out otherwise",
+        "Let free sweeps relax all sites of every level (all), or only, at the finest level, the sites kept from the "
+        "level above, some of which stand out otherwise (kept)",
         paper="kept",
         shown=(),
     )
