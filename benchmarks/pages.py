@@ -146,9 +146,9 @@ def mixtures(machine):
     yield "A, begun with a picture", mix(wood, start=start, iterations=5)
 
 
-def solids(machine):
-    """Two blocks as one sees them."""
-    for name, sample in (("gravel, reduced", FAR["gravel"]), ("tissue", SAMPLES["tissue"])):
+def solids(chosen, machine):
+    """Blocks as one sees them."""
+    for name, sample in chosen.items():
         given = {"channel_axis": common.axis(sample), "rng": 1, "device": machine}
         yield name, view(simdtex.synthesize_solid(sample, (96, 96, 96), **given), size=288)
 
@@ -195,18 +195,31 @@ def colours(machine):
         yield "", synth(machine, sample, 192, method="pyramid", preset="paper")
 
 
+def palettes(machine):
+    """Heeger and Bergen, Figure 6: the palettes of three samples with the patterns of each."""
+    names = ("stucco", "green marble", "wood")
+    samples = [COLOUR[name] for name in names]
+    for pattern, name in enumerate(names):
+        yield f"pattern: {name}", samples[pattern]
+        for palette, other in enumerate(names):
+            given = {"channel_axis": -1, "rng": 1, "device": machine}
+            yield f"palette: {other}", simdtex.mix(samples, (128, 128), pattern=pattern, palette=palette, **given)
+
+
 MADE = {
     "multires/edges": (mended, 4, None),
     "multires/seams": (joined, 3, None),
     "pyramid/gallery-strong": (partial(gallery, STRONG), 4, 1),
     "pyramid/gallery-failures": (partial(gallery, FAILURES), 4, 1),
     "pyramid/mixtures": (mixtures, 4, 1),
-    "pyramid/solid": (solids, 1, 1),
+    "pyramid/solid": (partial(solids, {"gravel, reduced": FAR["gravel"], "tissue": SAMPLES["tissue"]}), 1, 1),
     "figures/levels": (levels, 3, 1),
     **{f"figures/{name}": (partial(orders, sample), 1, 1) for name, sample in TEXTURES.items()},
     "figures/alpha": (partial(thresholds, TEXTURES["brick"], 0, [{"alpha": 0.15, "preset": "paper"}]), 3, 1),
     "figures/beta": (partial(thresholds, TEXTURES["gravel"], 1, [{"alpha": one} for one in (1, 3, 10, np.inf)]), 3, 1),
     "figures/colour": (colours, 4, 1),
+    "figures/solid": (partial(solids, {name: COLOUR[name] for name in ("granite", "green marble")}), 1, 1),
+    "figures/mixtures": (palettes, 4, 1),
 }
 """Name -> what yields the labels and pictures of a sheet, its columns, and the scale of its pictures."""
 
