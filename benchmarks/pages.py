@@ -155,8 +155,6 @@ def solids(chosen, machine):
 
 # ---------------------------------------------------------------- the papers' figures
 
-PAPER = {"preset": "paper", "pixel": "source", "edges": "reflect", "levels": 7, "relaxation": "icm"}
-
 
 def levels(machine):
     """Paget and Longstaff, Figure 5: the picture at the end of every level."""
@@ -166,7 +164,7 @@ def levels(machine):
         if progress.stage:
             pictures[progress.level] = progress.image()
 
-    synth(machine, sample, 256, order=8, callback=watch, **PAPER)
+    synth(machine, sample, 256, order=8, callback=watch, preset="paper")
     yield "sample", sample
     yield from ((f"level {level}", magnified(one, 256 // len(one))) for level, one in pictures.items())
 
@@ -175,8 +173,8 @@ def orders(sample, machine):
     """Paget and Longstaff, Figure 6: a sample beside pictures at two orders."""
     row = np.full((256, 2 * 256 + len(sample) + 16), 255, np.uint8)
     row[: len(sample), : len(sample)] = sample
-    row[:, len(sample) + 8 :][:, :256] = synth(machine, sample, 256, order=8, **PAPER)
-    row[:, -256:] = synth(machine, sample, 256, order=18, **PAPER)
+    row[:, len(sample) + 8 :][:, :256] = synth(machine, sample, 256, order=8, preset="paper")
+    row[:, -256:] = synth(machine, sample, 256, order=18, preset="paper")
     yield "sample, order 8, order 18", row
 
 
