@@ -35,14 +35,14 @@ DEFAULTS = {
     **{"order": None, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"lattice": "auto", "reduction": None},
-    **{"free_sweeps": 2, "pixel": "source", "phases": 1, "edges": "auto"},
+    **{"free_sweeps": 2, "free_sites": "all", "pixel": "source", "phases": 1, "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4, "coarse_chance": 0},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
     **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None, "soft_weight": 1.0},
 }
 PAPER = {
-    **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
-    **{"edges": "whole", "search": "exact", "overview": 64},
+    **{"relaxation": "icm", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 1, "free_sites": "kept", "xi": -8.0},
+    **{"edges": "whole", "search": "exact", "overview": 1},
     **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "lattice": "none", "reduction": 1},
 }
 
@@ -107,13 +107,15 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
         def active(level=level, X=X):
             if cooling:  # noqa: B023 - as it is by then
                 return [s for s in level.sites if X.t[level.pixel(s)] > 0]
-            return [s for s in level.sites if level.pixel(s) not in level.held]
+            kept = o.free_sites == "kept" and len(sizes) == 1
+            movable = [s for s in level.sites if not kept or s[0] % 2 == s[1] % 2 == 0]
+            return [s for s in movable if level.pixel(s) not in level.held]
 
         steps = schedule(level, active)
         while any(X.t[level.pixel(s)] > 0 for s in level.sites):  # 6.2
             sweep(level, X, steps)  # 6.3
         cooling = False
-        for _ in range(o.free_sweeps):
+        for _ in range(o.free_sweeps if o.free_sites == "all" or 0 == number < levels - 1 else 0):
             sweep(level, X, steps)
     image = finished(Y, X, o) if o.finish else picture(Y, X)
     if known is not None:
@@ -281,9 +283,7 @@ def number_of_levels(samples, shape, o):
 
     def enough(levels, least):
         spacing = 2 ** (levels - 1)
-        sides = [
-            [max(0, n - (2 * radius * spacing if o.edges == "whole" else 0)) // spacing for n in y] for y in samples
-        ]
+        sides = [[n // spacing for n in y] for y in samples]
         return sum(rows * cols for rows, cols in sides) >= least
 
     smallest = min(n for sides in (*samples, shape) for n in sides)
@@ -292,7 +292,7 @@ def number_of_levels(samples, shape, o):
         assert o.levels <= most
         return o.levels
     levels = 1
-    while levels < most and min(shape) > 2 * radius * 2**levels:
+    while levels < most and min(shape) > (2 * radius if o.overview >= 32 else 1) * 2**levels:
         if not enough(levels + 1, o.overview if levels > 3 else min(32, o.overview)):
             break
         levels += 1
@@ -432,6 +432,7 @@ def positions(Y, spacing, step, o):
                 every.append((n, i, j))
                 whole += [(n, i, j)] * ((i, j) in inside)
     reflect = o.edges == "reflect" or (o.edges == "auto" and (spacing > 1 or len(whole) < 0.75 * len(every)))
+    reflect = reflect or (o.edges == "whole" and spacing > 1 and len(whole) < 256)
     return [place for place in (every if reflect else whole) if sure(Y, place, spacing, o)]
 
 

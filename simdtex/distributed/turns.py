@@ -248,7 +248,7 @@ class Watch(Observer):
             left = turn.temperature_sum / (1024 * level.rows * level.cols * first)
             cooled, free = max(0.0, 1 - sqrt(left)), 0.0
         elif turn.phase == "sweep":
-            cooled, free = 1.0, min(1.0, (turn.free + part) / max(1, self._run.lattices.options.free_sweeps))
+            cooled, free = 1.0, min(1.0, (turn.free + part) / max(1, self._run.lattices.free_sweeps(turn.level)))
         return fraction_done(self._expected, turn.level, cooled, free)
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:

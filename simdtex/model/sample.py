@@ -28,6 +28,9 @@ UNSURE = 0.25
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
 
+FEW = 256
+"""Number of whole neighbourhoods below which a coarse level reflects the sample with ``edges="whole"``."""
+
 
 class Places(NamedTuple):
     """The places of a level's candidates: the crossings of some rows and columns of the sample.
@@ -306,9 +309,9 @@ class Sample:
             The number of decimations along each axis, equation (10), whose pixels are places; it is rounded down to a
             power of 2. From `spacing` on, every pixel is a place.
         edges : {"whole", "reflect", "auto"}
-            ``"whole"``: places whose neighbourhood lies in their picture, equation (4). ``"reflect"``: all, if the
-            margin is wide enough. ``"auto"``: whole at the finest level, if those are three quarters of all places or
-            more, else reflect.
+            ``"whole"``: places whose neighbourhood lies in their picture, equation (4), but all at a coarse level
+            with fewer than `FEW` of them. ``"reflect"``: all, if the margin is wide enough. ``"auto"``: whole at the
+            finest level, if those are three quarters of all places or more, else reflect.
 
         Raises
         ------
@@ -322,8 +325,13 @@ class Sample:
         row, col, whole = self._crossings(int(offsets.max()) * spacing, step)
         found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
         apart = self._in_pixels(offsets, spacing)
-        few = np.count_nonzero(found & whole) < ENOUGH_WHOLE * np.count_nonzero(found)
-        if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
+        of_all, of_whole = np.count_nonzero(found), np.count_nonzero(found & whole)
+        reflects = {
+            "auto": spacing > 1 or of_whole < ENOUGH_WHOLE * of_all,
+            "whole": spacing > 1 and of_whole < FEW,
+            "reflect": True,
+        }
+        if not reflects[edges]:
             found &= whole
         if self.pictures.clean:
             row, col, allowed = row[found.any(1)], col[found.any(0)], None

@@ -83,12 +83,17 @@ class Conditions(ABC):
             source[known], temperature[known] = held.source[known], 0
         return Field(*map(machine.put, (values, source, temperature)))
 
-    def movable(self, machine: Machine, number: int, grid: Grid) -> Array | None:
-        """Return an (H, W) uint16 array that is 0 at the known sites of a grid; None if all sites are free."""
-        held = self.at(number, grid)
-        if held is None or not held.known.any():
-            return None
-        return machine.put((~held.known).astype(np.uint16))
+    def movable(self, machine: Machine, number: int, grid: Grid, kept: bool) -> Array | None:
+        """Return an (H, W) uint16 array that is 0 at sites that a free sweep does not relax; None if it relaxes all.
+
+        These are the known sites and, with ``kept``, those that are not on the lattice of the level above.
+        """
+        held, free = self.at(number, grid), np.ones(grid.shape, bool)
+        if held is not None:
+            free &= ~held.known
+        for line in np.ix_(*grid.lines()) if kept else ():
+            free &= line % 2 == 0
+        return None if free.all() else machine.put(free.astype(np.uint16))
 
 
 class Conditioning(Conditions):

@@ -96,6 +96,10 @@ class Counts(Protocol):
     """The counts of a state that tell whether its level is at equilibrium."""
 
     @property
+    def level(self) -> int:
+        """The level, 0 the finest."""
+
+    @property
     def free(self) -> int:
         """Number of finished free sweeps."""
 
@@ -253,7 +257,7 @@ class Lattices:
             ),
             in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
             evaluations=machine.put(np.zeros(grid.shape, np.int32)),
-            movable=self.conditions.movable(machine, number, grid),
+            movable=self.conditions.movable(machine, number, grid, self.kept_only),
             soft=self._soft(grid),
             lists={},
         )
@@ -338,7 +342,17 @@ class Lattices:
 
     def at_equilibrium(self, state: Counts) -> bool:
         """Return whether all temperatures of the level are 0 and its free sweeps are done."""
-        return not state.active and state.free == self.options.free_sweeps
+        return not state.active and state.free == self.free_sweeps(state.level)
+
+    def free_sweeps(self, number: int) -> int:
+        """Return the number of free sweeps of a level."""
+        kept = self.options.free_sites == "kept"
+        return 0 if kept and not 0 == number < self.levels - 1 else self.options.free_sweeps
+
+    @property
+    def kept_only(self) -> bool:
+        """Whether free sweeps relax only the sites that are also on the level above."""
+        return self.options.free_sites == "kept" and not self.coarser  # else all are: see `squares`
 
     def exhaustive(self, number: int) -> bool:
         """Return whether a site of a level evaluates all its candidates."""
@@ -549,17 +563,13 @@ def number_of_levels(
 
     def candidates(levels: int) -> int:
         spacing = 2 ** (levels - 1)
-        margin = 0 if options.edges != "whole" else 2 * radius * spacing
-        sides = [[max(0, n - margin) for n in sample] for sample in samples]
-        return sum(prod(-(-n // spacing) for n in one[:-2]) * prod(n // spacing for n in one[-2:]) for one in sides)
+        return sum(prod(-(-n // spacing) for n in one[:-2]) * prod(n // spacing for n in one[-2:]) for one in samples)
 
     most = 1 + int(log2(min(*shape[-2:], *(side for sample in samples for side in sample[-2:]))))
-    while most > 1 and not candidates(most):
-        most -= 1
     if options.levels is None:
         levels = 1
-        reach = 2 * radius * 2  # of a neighbourhood at the next level
-        while levels < most and min(shape[-2:]) > reach * 2 ** (levels - 1):
+        least = 2 * radius if options.overview >= FEWEST else 1  # sites in a row of the coarsest lattice, less one
+        while levels < most and min(shape[-2:]) > least * 2**levels:
             if candidates(levels + 1) < (min(FEWEST, options.overview) if 2**levels <= WIDE else options.overview):
                 break
             levels += 1

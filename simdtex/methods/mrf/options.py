@@ -165,8 +165,9 @@ class Options:
         Whole(1),
         "Keep at least this many candidates at the coarsest of the default levels; fewer repeat more of the sample's "
         "layout",
-        more="For four levels or fewer 32 are enough, so that the coarsest spacing is 8 pixels for a small sample too.",
-        paper=64,
+        more="For four levels or fewer 32 are enough, so that the coarsest spacing is 8 pixels for a small sample too. "
+        "With fewer than 32, the output's coarsest lattice has 2x2 sites or more, as in the paper's Figure 5.",
+        paper=1,
         shown=(),
         slider=(16, 1024, 16),
     )
@@ -211,7 +212,7 @@ class Options:
         "Take only candidates whose neighbourhood is inside the sample (whole), reflect the sample to take all "
         "(reflect), or reflect it at all levels but the finest (auto)",
         more="``auto`` reflects at the finest level too if fewer than three quarters of the positions have a whole "
-        "neighbourhood in the sample.",
+        "neighbourhood in the sample; ``whole`` reflects at coarse levels with fewer than 256 such positions.",
         symbol="equation (4)",
         paper="whole",
     )
@@ -263,7 +264,7 @@ class Options:
         "Take the mode of the LCPDF (icm), or draw from it (gibbs); the coarsest level always draws",
         more="The mode carries no information while all sites are unknown.",
         symbol="Algorithm 1",
-        paper="gibbs",
+        paper="icm",
     )
     bandwidth: float = sampling(
         0.15,
@@ -280,26 +281,37 @@ class Options:
         "Set the pace of cooling: further below 0 takes fewer sweeps",
         more="The paper gives no number.",
         symbol="xi of equation (13)",
-        paper=-1.0,
-        slider=(-4, -0.25, 0.25),
+        paper=-8.0,
+        slider=(-8, -0.25, 0.25),
         label="Cooling (xi)",
     )
     free_sweeps: int = sampling(
         2,
         Whole(0),
         "Sweep this many times over all sites, including those of the coarser level, after the equilibrium of a level",
-        paper=0,
+        paper=1,
         jobs={"simulate": 3, "simulate 3-D": 2},
         slider=(0, 8, 1),
         shown=("fill", "extend", "simulate", "schedules"),
+    )
+    free_sites: str = sampling(
+        "all",
+        Choice(("all", "kept")),
+        "Let the free sweeps of every level relax all sites, or those of the finest level the sites kept from the level "
+        "above, some of which stand out otherwise",
+        paper="kept",
+        shown=(),
     )
     pixel: str = sampling(
         "source",
         Choice(("source", "density")),
         "Take pixels of the sample (source), or grey levels of the Parzen density, whose kernel also spreads over the "
         "site itself (density)",
-        more='``density`` with ``relaxation="icm"``, the mode, requires the exact search; 16-bit samples take long.',
-        paper="density",
+        more="``density`` is equations (6) and (7) to the letter, and adds noise of the bandwidth at every site: 0.66 "
+        "standard deviations of the sample at order 8 with bandwidth 1, so that little of the texture is left. With "
+        '``relaxation="icm"``, the mode, it requires the exact search; 16-bit samples take long.',
+        symbol="equations (6) and (7)",
+        paper="source",
     )
     schedule: str | schedules.Schedule = parallel(
         "coloring",

@@ -106,7 +106,7 @@ class Record(Observer):
             cooled = 1 - sqrt(left / self._first_left)
             cooled += min(0.1, 1 - cooled) * share
         else:
-            free = min(1.0, (state.free + share) / max(1, self._run.options.free_sweeps))
+            free = min(1.0, (state.free + share) / max(1, self._run.free_sweeps(level)))
         self._fraction = max(self._fraction, fraction_done(self._expected, level, cooled, free))
 
     def step(self, state: State, info: Info) -> None:
@@ -227,7 +227,8 @@ def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
             each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
         sweeps = 0.0 if run.coarser else sweeps  # it begins with an arrangement
         sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
-        work[number] = (sweep * sweeps, sweep * options.free_sweeps)
+        share = 0.25 if run.kept_only else 1.0
+        work[number] = (sweep * sweeps, sweep * share * run.free_sweeps(number))
     return work
 
 
