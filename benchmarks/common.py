@@ -66,12 +66,14 @@ def several_of(kind):
 
 
 def chosen(known, names=()):
-    """The entries of a dictionary that are named, by a list or as ``"a,b"``; all without names."""
-    wanted = names.split(",") if isinstance(names, str) and names else names or list(known)
+    """The entries of a dictionary that are named, by a list or as ``"a,b*"``; all without names."""
+    wanted, found = names.split(",") if isinstance(names, str) and names else names or list(known), {}
     for name in wanted:
-        if name not in known:
+        some = {one: known[one] for one in known if fnmatch(one, name)}
+        if not some:
             raise ValueError(f"there is no {name}: choose of {', '.join(known)}")
-    return {name: known[name] for name in wanted}
+        found |= some
+    return found
 
 
 def parsed(text):

@@ -1,24 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pictures of the pages on multiresolution sampling and on pyramid matching.
+"""The pictures of the pages on multiresolution sampling, on pyramid matching and on the papers' figures.
 
-    python benchmarks/pages.py [--only multires/edges,pyramid/solid] [--out docs] [--device TEXT]
+    python benchmarks/pages.py [--only "multires/edges,figures/*"] [--out docs] [--device TEXT]
 
-Writes a PNG file for each name, the same bytes every time.
+Writes a PNG file for each name, the same bytes every time. Samples are pictures that scikit-image carries, or drawn by
+``benchmarks/drawings.py``.
 """
 
 from functools import partial
 from itertools import product
 
 import common
+import drawings
 import numpy as np
 from skimage import data
 from skimage.transform import resize
 
 import simdtex
 from simdtex.experiments.quality import seam
+from simdtex.io.image import example
 from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import Stretched
-from simdtex.report.sheet import view
+from simdtex.report.sheet import magnified, view
 
 
 def reduced(picture, factor):
@@ -58,6 +61,31 @@ FAILURES = {
     "locally oriented: hair": data.astronaut()[20:84, 190:254],
 }
 """Textures with structures beyond them, and of what kind they are."""
+
+
+TEXTURES = {
+    "sand": FAR["gravel"],
+    "wood": np.rint(data.coffee()[270:398, 472:600].mean(-1)).astype(np.uint8),
+    "grass": SAMPLES["grass"],
+    "gravel": SAMPLES["gravel"],
+    "cells": drawings.cells(),
+    "reptile": drawings.reptile(),
+    "brick": example("brick")[:128, :128].T,  # courses are level
+    "canvas": drawings.canvas(),
+    "mesh": drawings.mesh(),
+    "gingham": drawings.gingham(),
+}
+"""Samples of 128x128 grey pixels, from the stochastic to the well structured."""
+
+COLOUR = {
+    "stucco": drawings.stucco(),
+    "granite": drawings.granite(),
+    "green marble": drawings.marble(),
+    "fur": SAMPLES["fur"],
+    "wood": SAMPLES["wood"],
+    "wood in the light": STRONG["wood in the light"],
+}
+"""Samples of Heeger and Bergen's Figure 3."""
 
 
 def synth(machine, sample, side, **options):
@@ -118,11 +146,62 @@ def mixtures(machine):
     yield "A, begun with a picture", mix(wood, start=start, iterations=5)
 
 
-def solids(machine):
-    """Two blocks as one sees them."""
-    for name, sample in (("gravel, reduced", FAR["gravel"]), ("tissue", SAMPLES["tissue"])):
+def solids(chosen, machine):
+    """Blocks as one sees them."""
+    for name, sample in chosen.items():
         given = {"channel_axis": common.axis(sample), "rng": 1, "device": machine}
         yield name, view(simdtex.synthesize_solid(sample, (96, 96, 96), **given), size=288)
+
+
+# ---------------------------------------------------------------- the papers' figures
+
+
+def levels(machine):
+    """Paget and Longstaff, Figure 5: the picture at the end of every level."""
+    sample, pictures = TEXTURES["reptile"], {}
+
+    def watch(progress):
+        if progress.stage:
+            pictures[progress.level] = progress.image()
+
+    synth(machine, sample, 256, order=8, callback=watch, preset="paper")
+    yield "sample", sample
+    yield from ((f"level {level}", magnified(one, 256 // len(one))) for level, one in pictures.items())
+
+
+def orders(sample, machine):
+    """Paget and Longstaff, Figure 6: a sample beside pictures at two orders."""
+    row = np.full((256, 2 * 256 + len(sample) + 16), 255, np.uint8)
+    row[: len(sample), : len(sample)] = sample
+    row[:, len(sample) + 8 :][:, :256] = synth(machine, sample, 256, order=8, preset="paper")
+    row[:, -256:] = synth(machine, sample, 256, order=18, preset="paper")
+    yield "sample, order 8, order 18", row
+
+
+def thresholds(sample, beta, more, machine):
+    """De Bonet, Figures 11 and 12: the sample repeated, six thresholds, and more options."""
+    yield "sample", sample
+    for options in [{"alpha": alpha} for alpha in (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)] + more:
+        label = ", ".join(f"{name} {value}" for name, value in options.items())
+        yield label, synth(machine, sample, 256, method="multires", beta=beta, **options)
+
+
+def colours(machine):
+    """Heeger and Bergen, Figures 2 and 3: samples in colour, and pictures."""
+    for name, sample in COLOUR.items():
+        yield name, sample
+        yield "", synth(machine, sample, 192, method="pyramid", preset="paper")
+
+
+def palettes(machine):
+    """Heeger and Bergen, Figure 6: the palettes of three samples with the patterns of each."""
+    names = ("stucco", "green marble", "wood")
+    samples = [COLOUR[name] for name in names]
+    for pattern, name in enumerate(names):
+        yield f"pattern: {name}", samples[pattern]
+        for palette, other in enumerate(names):
+            given = {"channel_axis": -1, "rng": 1, "device": machine}
+            yield f"palette: {other}", simdtex.mix(samples, (128, 128), pattern=pattern, palette=palette, **given)
 
 
 MADE = {
@@ -131,7 +210,14 @@ MADE = {
     "pyramid/gallery-strong": (partial(gallery, STRONG), 4, 1),
     "pyramid/gallery-failures": (partial(gallery, FAILURES), 4, 1),
     "pyramid/mixtures": (mixtures, 4, 1),
-    "pyramid/solid": (solids, 1, 1),
+    "pyramid/solid": (partial(solids, {"gravel, reduced": FAR["gravel"], "tissue": SAMPLES["tissue"]}), 1, 1),
+    "figures/levels": (levels, 3, 1),
+    **{f"figures/{name}": (partial(orders, sample), 1, 1) for name, sample in TEXTURES.items()},
+    "figures/alpha": (partial(thresholds, TEXTURES["brick"], 0, [{"alpha": 0.15, "preset": "paper"}]), 3, 1),
+    "figures/beta": (partial(thresholds, TEXTURES["gravel"], 1, [{"alpha": one} for one in (1, 3, 10, np.inf)]), 3, 1),
+    "figures/colour": (colours, 4, 1),
+    "figures/solid": (partial(solids, {name: COLOUR[name] for name in ("granite", "green marble")}), 1, 1),
+    "figures/mixtures": (palettes, 4, 1),
 }
 """Name -> what yields the labels and pictures of a sheet, its columns, and the scale of its pictures."""
 
