@@ -95,77 +95,145 @@ NEIGHBOURS_AT_ONCE = 2**20
 """The most neighbours that are processed together."""
 
 
+class Pattern(NamedTuple):
+    """A periodic pattern of colours, a formula of the layer, row and column of a site.
+
+    (layers layer + rows row + cols floor(column / width)) mod period * width + column mod width
+    """
+
+    layers: int
+    rows: int
+    cols: int
+    period: int
+    width: int = 1
+
+    @property
+    def colors(self) -> int:
+        """Number of colours."""
+        return self.period * self.width
+
+    def at(self, *place: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Return the colours of sites, whose place is [layer,] row, column."""
+        layer, row, col = (0, *place)[-3:]
+        turned = layer * self.layers + row * self.rows + col // self.width * self.cols
+        found: NDArray[np.int32] = (turned % self.period * self.width + col % self.width).astype(np.int32)
+        return found
+
+
+NO_SITES, NO_COLORS = np.zeros(0, np.int64), np.zeros(0, np.int32)
+
+
 class Plan(NamedTuple):
     """The colouring of a lattice.
 
-    ``pattern``, the sublattice whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols +
-    column of the sites with separate colours, and ``own`` (n,) int32, those colours; ``compact`` (colours before,)
-    int32, the number of each colour among the used ones; ``colors``, the number of used colours.
+    ``pattern``; ``colors``, the number of used colours; ``seam`` (n,) int64, ascending, the numbers row cols + column
+    of the sites with separate colours, and ``own`` (n,) int32, those colours; ``names`` (colours of the pattern,)
+    int32, the number of each among the used ones, empty if all are used.
     """
 
-    pattern: Sublattice
-    seam: NDArray[np.int64]
-    own: NDArray[np.int32]
-    compact: NDArray[np.int32]
+    pattern: Pattern
     colors: int
+    seam: NDArray[np.int64] = NO_SITES
+    own: NDArray[np.int32] = NO_COLORS
+    names: NDArray[np.int32] = NO_COLORS
 
 
-def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
-    """Return the colours of a level's lattice, or of a window of it: (rows, cols) int32, 0 .. colours - 1.
+@Operation
+def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
+    """Return the colours of a level's lattice, or of a window of it: an int32 array with the grid's shape.
 
-    A volume's lattice, (layers, rows, cols), has the modular colouring of `coloring_of_layers`.
+    A window's sites have their colours in the whole. Cost: O(sites).
+    """
+    if machine is None:
+        found = plan.pattern.at(*np.ix_(*grid.lines()))
+        found = plan.names[found] if plan.names.size else found
+        if plan.seam.size:
+            (rows, cols), (top, left) = grid.whole.shape, grid.first
+            i, j = (plan.seam // cols - top) % rows, (plan.seam % cols - left) % cols
+            seen = (i < grid.rows) & (j < grid.cols)
+            found[i[seen], j[seen]] = plan.own[seen]
+        return found
+    colors = machine.empty(grid.shape, np.int32)
+    names = machine.put(plan.names), plan.names.size
+    machine.launch("coloring_sites", (grid.size,), grid.struct, *plan.pattern, *names, colors)
+    if plan.seam.size:
+        seam = machine.put(plan.seam), machine.put(plan.own), plan.seam.size
+        machine.launch("coloring_seam", (plan.seam.size,), grid.struct, *seam, colors)
+    return colors
 
-    A picture's lattice has the best lattice colouring of the plane if its size admits that without a seam. Otherwise it
-    has either a lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
-    greedily, whichever has fewer colours; a vast lattice has the former, if any. A window's sites have their colours in
-    the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a few
-    tens of rounds along its seam.
+
+@Operation
+def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the sites colour by colour, and the bounds of the colours among them.
+
+    The result is the sites' numbers (S,) int32, row by row within a colour, and (count + 1,) int64 on the host, the
+    first index of each colour in them, and the end of the last. Raises ValueError if a colour is not one of 0 to
+    ``count`` - 1. Cost: O(sites + count).
+    """
+    if machine is None:
+        order = np.argsort(colors, None, kind="stable")
+        starts = np.searchsorted(colors.ravel()[order], np.arange(count + 1))
+    else:
+        length = max(CHUNK, count)  # counts take no more memory than sites
+        runs = -(-colors.size // length)
+        shape, counts = (colors.size, length, runs), machine.empty((count, runs), np.int32)
+        machine.launch("coloring_count", (runs,), colors, *shape, count, counts)
+        ends = np.cumsum(machine.get(counts), dtype=np.int64)
+        starts = np.append(0, ends[runs - 1 :: runs])
+    if starts[0] or starts[-1] < colors.size:
+        raise ValueError(f"a schedule has a site in a group that is not one of its groups, 0 to {count - 1}")
+    if machine is None:
+        return order.astype(np.int32), starts
+    places = np.append(0, ends[:-1]).astype(np.int32)
+    sites = machine.empty((colors.size,), np.int32)
+    machine.launch("coloring_list", (runs,), colors, *shape, machine.put(places), sites)
+    return sites, starts
+
+
+def coloring_plan(grid: Grid, order: int, seed: int = 0) -> Plan:
+    """Return the colouring of the whole lattice of a grid, for equation (14).
+
+    A volume's lattice has the modular colouring of `coloring_of_layers`. A picture's lattice has the best lattice
+    colouring of the plane if its size admits that without a seam. Otherwise it has either a lattice colouring with more
+    colours that fits, or the best one with its clashes along the seam coloured greedily, whichever has fewer colours; a
+    vast lattice has the former, if any. ``seed`` sets the priorities of the greedy rounds. Cost: once for a whole
+    lattice a few tens of rounds along its seam.
     """
     if grid.layered:
         m, *by = coloring_of_layers(order)
-        return (np.tensordot([*by, 1], np.indices(grid.shape), 1) % m).astype(np.int32)
+        return Plan(Pattern(*by, 1, m), m)
     rows, cols = grid.whole.shape
-    plan = lattice_plan(rows, cols, grid.torus, order, seed)
-    row, col = grid.lines()
-    colors = _cosets(plan.pattern, row[:, None], col[None, :])
-    here, there = (np.full(n, -1) for n in (rows, cols))
-    here[row], there[col] = np.arange(row.size), np.arange(col.size)
-    i, j = (line[at] for line, at in zip((here, there), np.divmod(plan.seam, cols), strict=True))
-    seen = (i >= 0) & (j >= 0)
-    colors[i[seen], j[seen]] = plan.own[seen]
-    return plan.compact[colors]
+    return lattice_plan(rows, cols, grid.torus, order, seed)
 
 
 @lru_cache(maxsize=32)
 def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
-    """Return the colouring of a whole lattice."""
+    """Return the colouring of a whole lattice of a picture."""
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
     offsets = neighbourhood_offsets(order).astype(np.int64)
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, len(offsets) + 1)) if torus else best
-    none, own = np.zeros(0, np.int64), None
+    pattern, seam, own = cosets(best), NO_SITES, None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
-        seam = _clashing(rows, cols, offsets, best)
+        seam = _clashing(rows, cols, offsets, pattern)
         priority = random.draw4(seed, 0, 0, seam, random.COLOR)[0].astype(np.int64)
         most = max(best.index, seamless.index - 1) if seamless else inf
-        own = _greedy(rows, cols, offsets, best, seam, priority, most)
+        own = _greedy(rows, cols, offsets, pattern, seam, priority, most)
     if own is None:
         assert seamless is not None  # otherwise greedy colours have no limit
-        best, seam, own = seamless, none, none.astype(np.int32)
-    used = _used(rows, cols, offsets, best, seam, own)
-    return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
+        pattern, seam, own = cosets(seamless), NO_SITES, NO_COLORS
+    used = _used(rows, cols, offsets, pattern, seam, own)
+    names = (np.cumsum(used) - 1).astype(np.int32)
+    return Plan(pattern, int(used.sum()), seam, names[own], names)
 
 
-def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return the colours of sites: their cosets of the sublattice spanned by (a, 0) and (b, c) (row, column).
+def cosets(lattice: Sublattice) -> Pattern:
+    """Return the pattern whose colours are the cosets of a sublattice.
 
     Two sites of one coset differ by a sublattice vector, and each of those is longer than any neighbour's offset.
     """
-    a, b, c = pattern.a, pattern.b, pattern.c
-    turned = (row % a).astype(np.int32) + (-(col // c) * b % a).astype(np.int32)
-    found: NDArray[np.int32] = np.where(turned < a, turned, turned - a) * np.int32(c) + (col % c).astype(np.int32)
-    return found
+    return Pattern(0, 1, -lattice.b % lattice.a, lattice.a, lattice.c)
 
 
 def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
@@ -183,7 +251,7 @@ def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
     )
 
 
-def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
+def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Pattern) -> NDArray[np.int64]:
     """Return the later site of each pair of neighbours across the seam in one coset."""
     site = _along(rows, cols, int(offsets.max()))
     clash = [np.zeros(0, bool)]
@@ -191,8 +259,8 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
         row, col = np.divmod(here, cols)
         k, m = row + offsets[:, :1], col + offsets[:, 1:]
         across = np.nonzero((k < 0) | (k >= rows) | (m < 0) | (m >= cols))
-        k, m, own = k[across] % rows, m[across] % cols, _cosets(pattern, row, col)[across[1]]
-        met = (k * cols + m < here[across[1]]) & (_cosets(pattern, k, m) == own)
+        k, m, own = k[across] % rows, m[across] % cols, pattern.at(row, col)[across[1]]
+        met = (k * cols + m < here[across[1]]) & (pattern.at(k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
     found: NDArray[np.int64] = site[np.concatenate(clash)]
     return found
@@ -207,7 +275,7 @@ def _greedy(
     rows: int,
     cols: int,
     offsets: NDArray[np.int64],
-    pattern: Sublattice,
+    pattern: Pattern,
     bare: NDArray[np.int64],
     priority: NDArray[np.int64],
     most: float,
@@ -218,7 +286,7 @@ def _greedy(
     that no neighbour has. The result is None if some site needs the colour ``most`` or a higher one.
     """
     n = bare.size
-    taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
+    taken = np.zeros((n, max(pattern.colors, len(offsets) + 1) + 1), bool)
     near = np.empty((len(offsets), n), np.int64)
     first = 0
     for here in _pieces(bare, len(offsets)):
@@ -229,7 +297,7 @@ def _greedy(
         other = bare[at] == r
         near[:, first : first + here.size] = np.where(other & (r != here), at, n)
         fixed = np.nonzero(~other)
-        taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
+        taken[first + fixed[1], pattern.at(k[fixed], m[fixed])] = True
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
@@ -251,20 +319,20 @@ def _used(
     rows: int,
     cols: int,
     offsets: NDArray[np.int64],
-    pattern: Sublattice,
+    pattern: Pattern,
     seam: NDArray[np.int64],
     own: NDArray[np.int32],
 ) -> NDArray[np.bool_]:
     """Return a mask of the used colours."""
-    used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
+    used = np.zeros(1 + max(pattern.colors - 1, int(own.max(initial=0))), bool)
     used[own] = True
     radius = int(offsets.max())
-    if rows - radius >= pattern.a and cols - 2 * radius >= pattern.c:
-        used[: pattern.index] = True  # away from the seam lies one site of each coset
+    if rows - radius >= pattern.period and cols - 2 * radius >= pattern.width:
+        used[: pattern.colors] = True  # away from the seam lies one site of each coset
         return used
     site = np.arange(rows * cols)
     site = site[~np.isin(site, seam)]
-    used[_cosets(pattern, *np.divmod(site, cols))] = True
+    used[pattern.at(*np.divmod(site, cols))] = True
     return used
 
 

@@ -10,24 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.machine.interface import Machine
-from simdtex.model.lattice import Grid, coloring_of_layers
-from simdtex.ops.sites import coloring, lattice_plan
+from simdtex.machine.interface import Array, Machine
+from simdtex.model.lattice import Grid
+from simdtex.ops.sites import Pattern, Plan, by_color, coloring, coloring_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
 
 
 class State(NamedTuple):
-    """The state of a partition.
+    """The state of a partition: ``sweep``, the number of sweeps started."""
 
-    ``sites`` (sites,) int32, the numbers of the sites, group after group and row by row within each;
-    ``starts`` (groups + 1,) int64, the first index of each group in ``sites``, and the end of the last; ``sweep``, the
-    number of sweeps started.
-    """
-
-    sites: NDArray[np.int32]
-    starts: NDArray[np.int64]
-    sweep: int
+    sweep: int = 0
 
 
 class Partition:
@@ -38,9 +31,14 @@ class Partition:
     """Whether the groups have a new random order in each sweep, or always the same order."""
     tile: tuple[int, int] | None = None
     windows = False
+    patterned = False
+    """Whether `groups` and `count` are defined for windows, even if they do not relax as the whole."""
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers."""
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
+        """Return the group of each site of a lattice, or of a window if `windows` is true.
+
+        The result is an array (rows, cols) of integers of NumPy, or of int32 of the machine.
+        """
         raise NotImplementedError
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
@@ -48,33 +46,37 @@ class Partition:
         raise NotImplementedError
 
     def init(self, setting: Setting) -> State:
-        """Return the state of a level; the groups of a window are those of its sites in the whole lattice."""
+        """Return the state of a level."""
+        return State()
+
+    def lists(self, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
+        """Return all sites, group after group, and the bounds of the groups, as `simdtex.ops.sites.by_color` does.
+
+        The groups of a window are those of its sites in the whole lattice.
+        """
         machine, grid, offsets, order, seed, _ = setting
-        group = self.groups(machine, grid if self.windows else grid.whole, offsets, order, seed)
-        if self.windows:
-            count = self.count(grid, order, seed)
+        if self.windows or self.patterned:
+            group, count = self.groups(machine, grid, offsets, order, seed), self.count(grid, order, seed)
         else:
+            group = self.groups(machine, grid.whole, offsets, order, seed)
             if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
                 group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
             count, group = int(group.max()) + 1, grid.cut(group)
-        group = np.ravel(group)
-        few = group.astype(np.uint16) if count <= 2**16 else group  # sorts in linear time
-        place = np.argsort(few, kind="stable")
-        starts = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=count))])
-        return State(place.astype(np.int32), starts, 0)
+        if isinstance(group, np.ndarray):
+            group = machine.put(group.clip(-1, count).astype(np.int32))
+        return by_color(machine, group, count)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
-        sweep, groups = state.sweep + 1, state.starts.size - 1
-        turn = np.arange(groups)
+        sweep = state.sweep + 1
+        sites, starts = active.grouped(self.lists, setting)
+        steps = np.stack([starts[:-1], starts[1:]], 1)
         if self.shuffled:
             first, at = divmod(sweep, AHEAD)
-            turn = _orders(setting.seed, setting.level, first * AHEAD, groups)[at]
-        sites, starts = active.among(state.sites, state.starts)
-        steps = np.stack([starts[:-1], starts[1:]], 1)[turn]
+            steps = steps[_orders(setting.seed, setting.level, first * AHEAD, len(steps))[at]]
         steps = steps[steps[:, 1] > steps[:, 0]]
         steps = steps if len(steps) else np.zeros((1, 2), np.int64)  # an empty sweep is one empty group
-        return state._replace(sweep=sweep), Info(sites, sweep, True, steps)
+        return State(sweep), Info(sites, sweep, True, steps)
 
 
 AHEAD = 32
@@ -88,7 +90,25 @@ def _orders(seed: int, level: int, first: int, groups: int) -> NDArray[np.intp]:
     return np.argsort(bits.reshape(AHEAD, groups), 1, kind="stable")
 
 
-class Coloring(Partition):
+class Patterned(Partition):
+    """Groups by a pattern, which a machine computes for any window; a subclass defines the pattern."""
+
+    windows = patterned = True
+
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return the pattern of the whole lattice of a grid."""
+        raise NotImplementedError
+
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
+        """Return the colours of the pattern, an array of the machine; O(sites)."""
+        return coloring(machine, grid, self.plan(grid, order, seed))
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """Return the number of colours of the whole lattice."""
+        return self.plan(grid, order, seed).colors
+
+
+class Coloring(Patterned):
     """One colour class of the lattice per step, with the colours in a new random order in each sweep.
 
     No two sites of a step are neighbours, equation (14), and each active site is relaxed exactly once per sweep. All
@@ -97,22 +117,14 @@ class Coloring(Partition):
 
     name = "coloring"
     shuffled = True
-    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Always."""
         return True
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return the colours; O(sites)."""
-        return coloring(grid, order, seed)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Return the number of colours of the whole lattice."""
-        if grid.layered:
-            return coloring_of_layers(order)[0]
-        rows, cols = grid.whole.shape
-        return lattice_plan(rows, cols, grid.torus, order, seed).colors
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return the colouring."""
+        return coloring_plan(grid, order, seed)
 
 
 class FixedColoring(Coloring):
@@ -126,7 +138,7 @@ class FixedColoring(Coloring):
     shuffled = False
 
 
-class Checkerboard(Partition):
+class Checkerboard(Patterned):
     """Two colours, black then white, whatever the order of the neighbourhood.
 
     Sites are independent for order 1 on an open lattice or a torus with even sides. Above order 1 diagonal neighbours
@@ -135,23 +147,18 @@ class Checkerboard(Partition):
     """
 
     name = "checkerboard"
-    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Return whether every neighbour has the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in grid.shape)
         return even and bool((offsets.sum(1) % 2 == 1).all())
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Row plus column, odd or even."""
-        return np.asarray(sum(np.ix_(*grid.lines())) % 2)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Two, or one of a single site."""
-        return min(2, grid.whole.size)
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Layer plus row plus column, even or odd; one colour of a single site."""
+        return Plan(Pattern(1, 1, 1, 2), min(2, grid.whole.size))
 
 
-class Synchronous(Partition):
+class Synchronous(Patterned):
     """All active sites together, from the old values.
 
     There is no guarantee: neighbours relax together, against equation (14). The sampled distribution is another one,
@@ -159,19 +166,14 @@ class Synchronous(Partition):
     """
 
     name = "synchronous"
-    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours, since every neighbourhood holds the four nearest sites."""
         return grid.size == 1
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return one group for all sites."""
-        return np.zeros(grid.shape, np.int64)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """One."""
-        return 1
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """One colour."""
+        return Plan(Pattern(0, 0, 0, 1), 1)
 
 
 class Raster(Partition):
@@ -192,7 +194,7 @@ class Raster(Partition):
         return np.arange(grid.size).reshape(grid.shape)
 
 
-class Block(Partition):
+class Block(Patterned):
     """Tiles that relax independently at the same time, each row by row, as in naive multi-device code.
 
     A site reads the current values of its neighbours within its tile; beyond the edge of the tile it reads those at the
@@ -205,6 +207,8 @@ class Block(Partition):
         Size of a tile, in sites of the level's lattice.
     """
 
+    windows = False
+
     def __init__(self, rows: int = 16, cols: int = 16) -> None:
         whole("rows of a tile", rows, 1)
         whole("columns of a tile", cols, 1)
@@ -216,9 +220,8 @@ class Block(Partition):
         assert self.tile is not None
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
         """Return the place of each site within its tile."""
         assert self.tile is not None
-        row, col = np.indices((grid.rows, grid.cols))
-        place: NDArray[Any] = row % self.tile[0] * self.tile[1] + col % self.tile[1]
-        return place
+        rows, cols = (min(tile, n) for tile, n in zip(self.tile, grid.whole.shape, strict=True))
+        return Plan(Pattern(0, 1, 0, rows, cols), rows * cols)

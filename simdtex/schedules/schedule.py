@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,12 +59,24 @@ class Active(Protocol):
         """
         ...
 
+    def grouped(self, lists: Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
+        """Return the active sites of the list that ``lists(setting)`` returns, as `among` does.
+
+        The function is called once for a level, and its list, an array of NumPy or of the machine, is kept.
+        """
+        ...
+
+
+Lists: TypeAlias = Callable[[Setting], tuple[Array, NDArray[np.int64]]]
+"""A function that returns the numbers of sites, group after group, and the bounds of the groups."""
+
 
 class Masked:
     """The active sites by a constant mask (rows, cols); None: all are active."""
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._mask = np.ones(grid.shape, bool) if mask is None else mask
+        self._lists: dict[Any, Any] = {}
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the given mask."""
@@ -84,6 +96,14 @@ class Masked:
             return sites, starts
         wanted = self._mask.ravel()[sites]
         return sites[wanted], np.concatenate([[0], np.cumsum(wanted)])[starts]
+
+    def grouped(self, lists: Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
+        """Return the active sites of a list, which is copied to the host."""
+        key = lists, setting.grid, setting.order, setting.seed
+        if key not in self._lists:
+            sites, starts = lists(setting)
+            self._lists[key] = setting.machine.get(sites), starts
+        return self.among(*self._lists[key])
 
 
 class Info(NamedTuple):

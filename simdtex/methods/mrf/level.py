@@ -416,7 +416,7 @@ class Level:
     soft : (kinds, H, W) float32 array, optional
         The cost of each kind by soft data, without the penalties of the kinds.
     lists : dict
-        The schedule's lists of sites on the machine: each is copied there once.
+        The schedule's lists of sites on the machine: each is found, or copied there, once.
     """
 
     setting: Setting
@@ -429,7 +429,7 @@ class Level:
     evaluations: Array = None
     movable: Array | None = None
     soft: NDArray[np.float32] | None = None
-    lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
+    lists: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def number(self) -> int:
@@ -505,12 +505,20 @@ class Active:
         grid = self._level.grid
         return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def grouped(self, lists: schedules.Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
+        """Return the active sites of a list that stays on the machine."""
+        known, key = self._level.lists, (lists, setting.grid, setting.order, setting.seed)
+        if key not in known:
+            known[key] = lists(setting)
+        return self.among(*known[key])
+
+    def among(self, sites: Array, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Return the active sites of a list, found on the machine."""
         known, machine = self._level.lists, self._level.machine
         if id(sites) not in known:
             begins, firsts = stretches(starts)
-            known[id(sites)] = sites, machine.put(sites), machine.put(begins), firsts
+            here = machine.put(sites) if isinstance(sites, np.ndarray) else sites
+            known[id(sites)] = sites, here, machine.put(begins), firsts
         _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
