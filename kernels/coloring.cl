@@ -1,76 +1,59 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sites that relax together, equation (14): the colour of each site, and the list of the sites colour by colour. No two
-// sites of a colour of the schedule `coloring` are neighbours. Other schedules have groups, as other patterns.
+// Sites that relax together, equation (14): the colour of each site, and the list of the sites colour by colour.
 #include "common/lattice.h"
 
-// The colour of each site: a formula of its place in the whole lattice,
+// The coset of each site in a sublattice, of its place in the whole lattice (simdtex.model.lattice.Sublattice):
 //
-//   (layers layer + rows row + cols floor(col / width)) mod period * width + col mod width
+//   (layers layer + rows row - b floor(col / c)) mod a * c + col mod c
 //
-// For a coset of the sublattice spanned by (period, 0) and (b, width), row and column, rows = 1 and cols = -b mod period.
-//
-// names  (named,)  the number of each colour among those that occur; none: its own
+// names  (named,)  the number of each coset among those that occur; none: its own
 // colors (sites,)  out
 // One work-item per site.
-__kernel void coloring_sites(const Lattice g, const int layers, const int rows, const int cols, const int period,
-                             const int width, __global const int *restrict names, const int named,
-                             __global int *restrict colors)
+__kernel void coloring_sites(const Lattice g, const int a, const int b, const int c, const int layers, const int rows,
+                             __global const int *restrict names, const int named, __global int *restrict colors)
 {
-    const int site = get_global_id(0), area = g.rows * g.cols;
-    if (site >= g.layers * area)
+    const int site = get_global_id(0), i = site / g.cols;
+    if (i >= g.layers * g.rows)
         return;
-    const ulong layer = wrap(g.front + site / area, g.whole_layers);
-    const ulong row = wrap(g.top + site % area / g.cols, g.whole_rows), col = wrap(g.left + site % g.cols, g.whole_cols);
-    const ulong turned = layer * layers + row * rows + col / width * cols;
-    const int color = (int)(turned % period * width + col % width);
-    colors[site] = named ? names[color] : color;
+    const ulong layer = wrap(g.front + i / g.rows, g.whole_layers);
+    const ulong row = wrap(g.top + i % g.rows, g.whole_rows), col = wrap(g.left + site % g.cols, g.whole_cols);
+    const ulong turned = layer * layers + row * rows + col / c * (a - b);
+    const int coset = (int)(turned % a * c + col % c);
+    colors[site] = named ? names[coset] : coset;
 }
 
-// The colours of the sites along the seam of a torus that cuts through the pattern, as far as they lie in the window.
-//
-// seam (n,)  their places in the whole lattice, row by row; own (n,)  their colours
-// One work-item per place.
-__kernel void coloring_seam(const Lattice g, __global const long *restrict seam, __global const int *restrict own,
-                            const int n, __global int *restrict colors)
+// The colours of sites along the seam of a torus that cuts through the cosets. One work-item per site of seam (n,).
+__kernel void coloring_seam(__global const int *restrict seam, __global const int *restrict own, const int n,
+                            __global int *restrict colors)
 {
     const int k = get_global_id(0);
-    if (k >= n)
-        return;
-    const int i = wrap((int)(seam[k] / g.whole_cols) - g.top, g.whole_rows);
-    const int j = wrap((int)(seam[k] % g.whole_cols) - g.left, g.whole_cols);
-    if (i < g.rows && j < g.cols)
-        colors[i * g.cols + j] = own[k];
+    if (k < n)
+        colors[seam[k]] = own[k];
 }
 
-// How many sites of each run, `length` sites row by row, have each colour. Colours outside 0 .. count - 1 are left out.
-//
-// colors (sites,)
-// counts (count, runs)  out
-// One work-item per run.
-__kernel void coloring_count(__global const int *restrict colors, const int sites, const int length, const int runs,
-                             const int count, __global int *restrict counts)
-{
-    const int r = get_global_id(0);
-    if (r >= runs)
-        return;
-    for (int color = 0; color < count; ++color)
-        counts[color * runs + r] = 0;
-    for (int site = r * length; site < min(sites, (r + 1) * length); ++site)
+// A stable counting sort. Work-item r takes a run of `length` sites; colours that are not 0 .. count - 1 are left out.
+#define RUN const int sites, const int length, const int runs, const int count
+#define EACH                                                                                                           \
+    for (int first = r * length, site = first; r < runs && site < sites && site - first < length; ++site)              \
         if (colors[site] >= 0 && colors[site] < count)
-            ++counts[colors[site] * runs + r];
-}
+#define OF(color) (size_t)(color) * runs + r
 
-// The sites, colour by colour and row by row within each: a stable counting sort.
-//
-// places (count, runs)  in: where the run's sites of a colour begin in the list; out: where they end
-// list   (sites,)       out
-// One work-item per run.
-__kernel void coloring_list(__global const int *restrict colors, const int sites, const int length, const int runs,
-                            __global int *restrict places, __global int *restrict list)
+// counts (count, runs)  out: how many sites of each run have each colour
+__kernel void coloring_count(__global const int *restrict colors, RUN, __global int *restrict counts)
 {
     const int r = get_global_id(0);
-    if (r >= runs)
-        return;
-    for (int site = r * length; site < min(sites, (r + 1) * length); ++site)
-        list[places[colors[site] * runs + r]++] = site;
+    for (int color = 0; r < runs && color < count; ++color)
+        counts[OF(color)] = 0;
+    EACH
+        ++counts[OF(colors[site])];
+}
+
+// places (count, runs)  in: where the run's sites of each colour begin in the list; out: where they end
+// list   (sites,)       out
+__kernel void coloring_list(__global const int *restrict colors, RUN, __global int *restrict places,
+                            __global int *restrict list)
+{
+    const int r = get_global_id(0);
+    EACH
+        list[places[OF(colors[site])]++] = site;
 }

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, slow_but
+from cases import REFERENCE, assert_same_bits, colors_of, slow_but
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simdtex import random
 from simdtex.model.lattice import Grid, coloring_sublattice, neighbourhood_offsets
 from simdtex.ops import sites as module
-from simdtex.ops.sites import IN, UNDECIDED, coloring, lattice_plan, luby
+from simdtex.ops.sites import IN, UNDECIDED, lattice_plan, luby
 
 # -- The colouring against equation (14), by brute force, for every order up to 32; and its number of colours.
 # The bound where a torus does not hold the best pattern: a site at the seam takes the lowest colour that none of its
@@ -25,7 +25,7 @@ ORDERS = range(1, 33)
 
 
 def colour(order, rows, cols, torus, seed=0):
-    colors = coloring(Grid.of((rows, cols), 1, torus), order, seed)
+    colors = colors_of(Grid.of((rows, cols), 1, torus), order, seed)
     assert colors.shape == (rows, cols)
     assert colors.dtype == np.int32
     return colors
@@ -144,7 +144,7 @@ def test_the_seam_is_coloured_as_by_plain_loops(order):
 @pytest.mark.parametrize("spacing", [1, 2, 4])
 def test_a_coarser_level_is_coloured_as_a_lattice_of_its_own(spacing):
     grid = Grid.of((23, 30), spacing)
-    assert_same_bits(coloring(grid, 5, 3), colour(5, grid.rows, grid.cols, True, seed=3))
+    assert_same_bits(colors_of(grid, 5, 3), colour(5, grid.rows, grid.cols, True, seed=3))
 
 
 @given(
@@ -159,8 +159,8 @@ def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size
     rows, cols = (min(a, b) for a, b in zip(size, shape, strict=True))
     top, left = corner if torus else (min(at, n - k) for at, n, k in zip(corner, shape, (rows, cols), strict=True))
     window = grid.window(top, left, rows, cols)
-    assert_same_bits(coloring(window, order, 7), window.cut(coloring(grid, order, 7)))
-    assert lattice_plan(*shape, torus, order, 7).colors == coloring(grid, order, 7).max() + 1
+    assert_same_bits(colors_of(window, order, 7), window.cut(colors_of(grid, order, 7)))
+    assert lattice_plan(*shape, torus, order, 7).colors == colors_of(grid, order, 7).max() + 1
 
 
 def test_sites_are_looked_at_piece_by_piece(monkeypatch):
@@ -174,7 +174,7 @@ def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
     """No work goes with the area: 10^10 sites."""
     grid = Grid((99_991, 100_003))
     window = grid.window(99_980, 99_990, 30, 40)
-    colors = coloring(window, 2, 1)
+    colors = colors_of(window, 2, 1)
     assert not conflicts(colors, 2, False)
     assert colors.max() < lattice_plan(99_991, 100_003, True, 2, 1).colors <= 9
 
@@ -183,7 +183,7 @@ def test_a_vast_torus_takes_a_pattern_that_fits():
     """The other one would be looked for along two million sites."""
     grid = Grid((2**20, 2**20))
     window = grid.window(2**20 - 20, 2**20 - 25, 45, 50)
-    assert not conflicts(coloring(window, 18, 1), 18, False)
+    assert not conflicts(colors_of(window, 18, 1), 18, False)
     plan = lattice_plan(2**20, 2**20, True, 18, 1)
     assert (plan.seam.size, plan.colors) == (0, coloring_sublattice(18, 2**20, 2**20, limit=61).index)
 

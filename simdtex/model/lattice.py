@@ -236,16 +236,26 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sublattice:
-    """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring."""
+    """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring.
+
+    ``layers`` and ``rows`` are multiples of the layer and the row that add up to the row of these.
+    """
 
     a: int
     b: int
     c: int
+    layers: int = 0
+    rows: int = 1
 
     @property
     def index(self) -> int:
         """Number of cosets."""
         return self.a * self.c
+
+    def coset(self, row: Any, col: Any, layer: Any = 0) -> NDArray[np.int32]:
+        """Return the numbers of the cosets of sites, 0 to a * c - 1."""
+        turned = layer * self.layers + row * self.rows - col // self.c * self.b
+        return np.asarray(turned % self.a * self.c + col % self.c, np.int32)
 
     def shortest(self) -> int:
         """Return the squared length of the shortest vector."""

@@ -9,10 +9,10 @@ it. A random maximal set of sites without neighbours takes the rounds of Luby (1
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import lru_cache
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import (
     Grid,
     Sublattice,
-    coloring_of_layers,
     coloring_sublattice,
     gathered,
     neighbourhood_offsets,
@@ -95,70 +94,44 @@ NEIGHBOURS_AT_ONCE = 2**20
 """The most neighbours that are processed together."""
 
 
-class Pattern(NamedTuple):
-    """A periodic pattern of colours, a formula of the layer, row and column of a site.
-
-    (layers layer + rows row + cols floor(column / width)) mod period * width + column mod width
-    """
-
-    layers: int
-    rows: int
-    cols: int
-    period: int
-    width: int = 1
-
-    @property
-    def colors(self) -> int:
-        """Number of colours."""
-        return self.period * self.width
-
-    def at(self, *place: NDArray[np.int64]) -> NDArray[np.int32]:
-        """Return the colours of sites, whose place is [layer,] row, column."""
-        layer, row, col = (0, *place)[-3:]
-        turned = layer * self.layers + row * self.rows + col // self.width * self.cols
-        found: NDArray[np.int32] = (turned % self.period * self.width + col % self.width).astype(np.int32)
-        return found
-
-
-NO_SITES, NO_COLORS = np.zeros(0, np.int64), np.zeros(0, np.int32)
+NOTHING: NDArray[Any] = np.zeros(0, np.int64)
 
 
 class Plan(NamedTuple):
     """The colouring of a lattice.
 
-    ``pattern``; ``colors``, the number of used colours; ``seam`` (n,) int64, ascending, the numbers row cols + column
-    of the sites with separate colours, and ``own`` (n,) int32, those colours; ``names`` (colours of the pattern,)
-    int32, the number of each among the used ones, empty if all are used.
+    ``pattern``, the sublattice whose cosets are the colours; ``colors``, the number of used colours; ``seam`` (n,)
+    int64, ascending, the numbers row cols + column of the sites with separate colours, and ``own`` (n,) int32, those
+    colours; ``names`` (cosets,) int32, the number of each coset among the used colours, empty if all are used.
     """
 
-    pattern: Pattern
+    pattern: Sublattice
     colors: int
-    seam: NDArray[np.int64] = NO_SITES
-    own: NDArray[np.int32] = NO_COLORS
-    names: NDArray[np.int32] = NO_COLORS
+    seam: NDArray[np.int64] = NOTHING
+    own: NDArray[np.int32] = NOTHING
+    names: NDArray[np.int32] = NOTHING
 
 
 @Operation
 def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
-    """Return the colours of a level's lattice, or of a window of it: an int32 array with the grid's shape.
+    """Return the colours of a lattice, or of a window of it: an int32 array with the grid's shape, on the machine.
 
     A window's sites have their colours in the whole. Cost: O(sites).
     """
+    (rows, cols), (top, left) = grid.whole.shape[-2:], grid.first[-2:]
+    i, j = (plan.seam // cols - top) % rows, (plan.seam % cols - left) % cols
+    here = (i < grid.rows) & (j < grid.cols)
+    seam, own = (i * grid.cols + j)[here].astype(np.int32), plan.own[here]
     if machine is None:
-        found = plan.pattern.at(*np.ix_(*grid.lines()))
+        *layer, row, col = np.ix_(*grid.lines())
+        found = plan.pattern.coset(row, col, *layer)
         found = plan.names[found] if plan.names.size else found
-        if plan.seam.size:
-            (rows, cols), (top, left) = grid.whole.shape, grid.first
-            i, j = (plan.seam // cols - top) % rows, (plan.seam % cols - left) % cols
-            seen = (i < grid.rows) & (j < grid.cols)
-            found[i[seen], j[seen]] = plan.own[seen]
+        found.flat[seam] = own
         return found
-    colors = machine.empty(grid.shape, np.int32)
-    names = machine.put(plan.names), plan.names.size
-    machine.launch("coloring_sites", (grid.size,), grid.struct, *plan.pattern, *names, colors)
-    if plan.seam.size:
-        seam = machine.put(plan.seam), machine.put(plan.own), plan.seam.size
-        machine.launch("coloring_seam", (plan.seam.size,), grid.struct, *seam, colors)
+    colors, names = machine.empty(grid.shape, np.int32), machine.put(plan.names)
+    machine.launch("coloring_sites", (grid.size,), grid.struct, *astuple(plan.pattern), names, names.size, colors)
+    if seam.size:
+        machine.launch("coloring_seam", (seam.size,), machine.put(seam), machine.put(own), seam.size, colors)
     return colors
 
 
@@ -166,92 +139,66 @@ def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
 def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
     """Return the sites colour by colour, and the bounds of the colours among them.
 
-    The result is the sites' numbers (S,) int32, row by row within a colour, and (count + 1,) int64 on the host, the
+    The result is the sites' numbers (S,) int32, row by row within a colour, on the machine, and (count + 1,) int64, the
     first index of each colour in them, and the end of the last. Raises ValueError if a colour is not one of 0 to
     ``count`` - 1. Cost: O(sites + count).
     """
     if machine is None:
-        order = np.argsort(colors, None, kind="stable")
-        starts = np.searchsorted(colors.ravel()[order], np.arange(count + 1))
+        sites: Array = np.argsort(colors, None, kind="stable").astype(np.int32)
+        starts = np.searchsorted(colors.ravel()[sites], np.arange(count + 1))
     else:
-        length = max(CHUNK, count)  # counts take no more memory than sites
+        length = max(CHUNK, count)  # so that counts take no more memory than sites
         runs = -(-colors.size // length)
-        shape, counts = (colors.size, length, runs), machine.empty((count, runs), np.int32)
-        machine.launch("coloring_count", (runs,), colors, *shape, count, counts)
-        ends = np.cumsum(machine.get(counts), dtype=np.int64)
-        starts = np.append(0, ends[runs - 1 :: runs])
+        shape, counts = (colors.size, length, runs, count), machine.empty((count, runs), np.int32)
+        machine.launch("coloring_count", (runs,), colors, *shape, counts)
+        before = np.append(0, np.cumsum(machine.get(counts), dtype=np.int64))
+        sites, starts = machine.empty((colors.size,), np.int32), before[::runs]
+        machine.launch("coloring_list", (runs,), colors, *shape, machine.put(before[:-1].astype(np.int32)), sites)
     if starts[0] or starts[-1] < colors.size:
-        raise ValueError(f"a schedule has a site in a group that is not one of its groups, 0 to {count - 1}")
-    if machine is None:
-        return order.astype(np.int32), starts
-    places = np.append(0, ends[:-1]).astype(np.int32)
-    sites = machine.empty((colors.size,), np.int32)
-    machine.launch("coloring_list", (runs,), colors, *shape, machine.put(places), sites)
+        raise ValueError(f"a schedule has sites in groups that are not 0 to {count - 1}, as its `count` says")
     return sites, starts
-
-
-def coloring_plan(grid: Grid, order: int, seed: int = 0) -> Plan:
-    """Return the colouring of the whole lattice of a grid, for equation (14).
-
-    A volume's lattice has the modular colouring of `coloring_of_layers`. A picture's lattice has the best lattice
-    colouring of the plane if its size admits that without a seam. Otherwise it has either a lattice colouring with more
-    colours that fits, or the best one with its clashes along the seam coloured greedily, whichever has fewer colours; a
-    vast lattice has the former, if any. ``seed`` sets the priorities of the greedy rounds. Cost: once for a whole
-    lattice a few tens of rounds along its seam.
-    """
-    if grid.layered:
-        m, *by = coloring_of_layers(order)
-        return Plan(Pattern(*by, 1, m), m)
-    rows, cols = grid.whole.shape
-    return lattice_plan(rows, cols, grid.torus, order, seed)
 
 
 @lru_cache(maxsize=32)
 def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
-    """Return the colouring of a whole lattice of a picture."""
+    """Return the colouring of a picture's whole lattice, for equation (14).
+
+    It is the best lattice colouring of the plane if its size admits that without a seam. Otherwise it is either a
+    lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured greedily,
+    whichever has fewer colours; a vast lattice has the former, if any. ``seed`` sets the priorities of the greedy
+    rounds. Cost: a few tens of rounds along the seam.
+    """
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
     offsets = neighbourhood_offsets(order).astype(np.int64)
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, len(offsets) + 1)) if torus else best
-    pattern, seam, own = cosets(best), NO_SITES, None
+    seam, own = NOTHING, None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
-        seam = _clashing(rows, cols, offsets, pattern)
+        seam = _clashing(rows, cols, offsets, best)
         priority = random.draw4(seed, 0, 0, seam, random.COLOR)[0].astype(np.int64)
         most = max(best.index, seamless.index - 1) if seamless else inf
-        own = _greedy(rows, cols, offsets, pattern, seam, priority, most)
+        own = _greedy(rows, cols, offsets, best, seam, priority, most)
     if own is None:
         assert seamless is not None  # otherwise greedy colours have no limit
-        pattern, seam, own = cosets(seamless), NO_SITES, NO_COLORS
-    used = _used(rows, cols, offsets, pattern, seam, own)
+        best, seam, own = seamless, NOTHING, NOTHING
+    used, radius = np.zeros(1 + max(best.index - 1, int(own.max(initial=0))), bool), int(offsets.max())
+    used[own] = True
+    if rows - radius >= best.a and cols - 2 * radius >= best.c:
+        used[: best.index] = True  # away from the seam lies one site of each coset
+    else:
+        used[best.coset(*np.divmod(np.delete(np.arange(rows * cols), seam), cols))] = True
     names = (np.cumsum(used) - 1).astype(np.int32)
-    return Plan(pattern, int(used.sum()), seam, names[own], names)
-
-
-def cosets(lattice: Sublattice) -> Pattern:
-    """Return the pattern whose colours are the cosets of a sublattice.
-
-    Two sites of one coset differ by a sublattice vector, and each of those is longer than any neighbour's offset.
-    """
-    return Pattern(0, 1, -lattice.b % lattice.a, lattice.a, lattice.c)
+    return Plan(best, int(used.sum()), seam, names[own], names)
 
 
 def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
     """Return the sites with neighbours before them across the seam, in ascending order."""
-    row, col = np.arange(rows), np.arange(cols)
-    low = row >= rows - radius
-    side = (col < radius) | (col >= cols - radius)
-    return np.sort(
-        np.concatenate(
-            [
-                (row[low][:, None] * cols + col[None, :]).ravel(),
-                (row[~low][:, None] * cols + col[side][None, :]).ravel(),
-            ]
-        )
-    )
+    row, col = np.arange(rows)[:, None] * cols, np.arange(cols)
+    return np.union1d(row[-radius:] + col, row + col[(col < radius) | (col >= cols - radius)])
 
 
-def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Pattern) -> NDArray[np.int64]:
+def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
     """Return the later site of each pair of neighbours across the seam in one coset."""
     site = _along(rows, cols, int(offsets.max()))
     clash = [np.zeros(0, bool)]
@@ -259,8 +206,8 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Pattern
         row, col = np.divmod(here, cols)
         k, m = row + offsets[:, :1], col + offsets[:, 1:]
         across = np.nonzero((k < 0) | (k >= rows) | (m < 0) | (m >= cols))
-        k, m, own = k[across] % rows, m[across] % cols, pattern.at(row, col)[across[1]]
-        met = (k * cols + m < here[across[1]]) & (pattern.at(k, m) == own)
+        k, m, own = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
+        met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
     found: NDArray[np.int64] = site[np.concatenate(clash)]
     return found
@@ -275,7 +222,7 @@ def _greedy(
     rows: int,
     cols: int,
     offsets: NDArray[np.int64],
-    pattern: Pattern,
+    pattern: Sublattice,
     bare: NDArray[np.int64],
     priority: NDArray[np.int64],
     most: float,
@@ -286,7 +233,7 @@ def _greedy(
     that no neighbour has. The result is None if some site needs the colour ``most`` or a higher one.
     """
     n = bare.size
-    taken = np.zeros((n, max(pattern.colors, len(offsets) + 1) + 1), bool)
+    taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
     near = np.empty((len(offsets), n), np.int64)
     first = 0
     for here in _pieces(bare, len(offsets)):
@@ -297,7 +244,7 @@ def _greedy(
         other = bare[at] == r
         near[:, first : first + here.size] = np.where(other & (r != here), at, n)
         fixed = np.nonzero(~other)
-        taken[first + fixed[1], pattern.at(k[fixed], m[fixed])] = True
+        taken[first + fixed[1], pattern.coset(k[fixed], m[fixed])] = True
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
@@ -313,27 +260,6 @@ def _greedy(
         rank[now] = -1
         left = left[colors[left] == UNCOLORED]
     return colors
-
-
-def _used(
-    rows: int,
-    cols: int,
-    offsets: NDArray[np.int64],
-    pattern: Pattern,
-    seam: NDArray[np.int64],
-    own: NDArray[np.int32],
-) -> NDArray[np.bool_]:
-    """Return a mask of the used colours."""
-    used = np.zeros(1 + max(pattern.colors - 1, int(own.max(initial=0))), bool)
-    used[own] = True
-    radius = int(offsets.max())
-    if rows - radius >= pattern.period and cols - 2 * radius >= pattern.width:
-        used[: pattern.colors] = True  # away from the seam lies one site of each coset
-        return used
-    site = np.arange(rows * cols)
-    site = site[~np.isin(site, seam)]
-    used[pattern.at(*np.divmod(site, cols))] = True
-    return used
 
 
 UNDECIDED, IN, OUT = 0, 1, 2

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Machine
-from simdtex.model.lattice import Grid
-from simdtex.ops.sites import Pattern, Plan, by_color, coloring, coloring_plan
+from simdtex.model.lattice import Grid, Sublattice, coloring_of_layers
+from simdtex.ops.sites import Plan, by_color, coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
 
@@ -24,52 +24,54 @@ class State(NamedTuple):
 
 
 class Partition:
-    """One group of sites per step; a subclass defines the groups."""
+    """One group of sites per step; a subclass defines `groups` or, if a formula gives them, `plan`."""
 
     name: str
     shuffled = False
     """Whether the groups have a new random order in each sweep, or always the same order."""
     tile: tuple[int, int] | None = None
     windows = False
-    patterned = False
-    """Whether `groups` and `count` are defined for windows, even if they do not relax as the whole."""
+
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return the groups of the whole lattice of a grid, as colours."""
+        raise NotImplementedError
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
-        """Return the group of each site of a lattice, or of a window if `windows` is true.
+        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers.
 
-        The result is an array (rows, cols) of integers of NumPy, or of int32 of the machine.
+        The default is an array of the machine, which has the groups of `plan`.
         """
-        raise NotImplementedError
+        return coloring(machine, grid, self.plan(grid, order, seed))
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the number of groups of the whole lattice, if `windows` is true."""
-        raise NotImplementedError
+        return self.plan(grid, order, seed).colors
 
     def init(self, setting: Setting) -> State:
         """Return the state of a level."""
         return State()
 
     def lists(self, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
-        """Return all sites, group after group, and the bounds of the groups, as `simdtex.ops.sites.by_color` does.
-
-        The groups of a window are those of its sites in the whole lattice.
-        """
+        """Return all sites, group after group, and the bounds of the groups (`simdtex.ops.sites.by_color`)."""
         machine, grid, offsets, order, seed, _ = setting
-        if self.windows or self.patterned:
-            group, count = self.groups(machine, grid, offsets, order, seed), self.count(grid, order, seed)
-        else:
-            group = self.groups(machine, grid.whole, offsets, order, seed)
+        group = self.groups(machine, grid, offsets, order, seed)
+        if isinstance(group, np.ndarray) and not self.windows:
             if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
-                group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
-            count, group = int(group.max()) + 1, grid.cut(group)
+                group = np.unique(group, return_inverse=True)[1]
+            count = int(group.max()) + 1
+        else:
+            count = self.count(grid, order, seed)
         if isinstance(group, np.ndarray):
-            group = machine.put(group.clip(-1, count).astype(np.int32))
+            group = machine.put(group.astype(np.int64, casting="same_kind").clip(-1, count).astype(np.int32))
         return by_color(machine, group, count)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
         sweep = state.sweep + 1
-        sites, starts = active.grouped(self.lists, setting)
+        key = self.lists, setting.grid, setting.order, setting.seed
+        if key not in active.kept:
+            active.kept[key] = self.lists(setting)
+        sites, starts = active.among(*active.kept[key])
         steps = np.stack([starts[:-1], starts[1:]], 1)
         if self.shuffled:
             first, at = divmod(sweep, AHEAD)
@@ -90,25 +92,7 @@ def _orders(seed: int, level: int, first: int, groups: int) -> NDArray[np.intp]:
     return np.argsort(bits.reshape(AHEAD, groups), 1, kind="stable")
 
 
-class Patterned(Partition):
-    """Groups by a pattern, which a machine computes for any window; a subclass defines the pattern."""
-
-    windows = patterned = True
-
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
-        """Return the pattern of the whole lattice of a grid."""
-        raise NotImplementedError
-
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
-        """Return the colours of the pattern, an array of the machine; O(sites)."""
-        return coloring(machine, grid, self.plan(grid, order, seed))
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Return the number of colours of the whole lattice."""
-        return self.plan(grid, order, seed).colors
-
-
-class Coloring(Patterned):
+class Coloring(Partition):
     """One colour class of the lattice per step, with the colours in a new random order in each sweep.
 
     No two sites of a step are neighbours, equation (14), and each active site is relaxed exactly once per sweep. All
@@ -117,14 +101,19 @@ class Coloring(Patterned):
 
     name = "coloring"
     shuffled = True
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Always."""
         return True
 
     def plan(self, grid: Grid, order: int, seed: int) -> Plan:
-        """Return the colouring."""
-        return coloring_plan(grid, order, seed)
+        """Return the colouring of a volume or a picture."""
+        if grid.layered:
+            m, *by = coloring_of_layers(order)
+            return Plan(Sublattice(m, m - 1, 1, *by), m)
+        rows, cols = grid.whole.shape
+        return lattice_plan(rows, cols, grid.torus, order, seed)
 
 
 class FixedColoring(Coloring):
@@ -138,7 +127,7 @@ class FixedColoring(Coloring):
     shuffled = False
 
 
-class Checkerboard(Patterned):
+class Checkerboard(Partition):
     """Two colours, black then white, whatever the order of the neighbourhood.
 
     Sites are independent for order 1 on an open lattice or a torus with even sides. Above order 1 diagonal neighbours
@@ -147,6 +136,7 @@ class Checkerboard(Patterned):
     """
 
     name = "checkerboard"
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Return whether every neighbour has the other colour."""
@@ -155,10 +145,10 @@ class Checkerboard(Patterned):
 
     def plan(self, grid: Grid, order: int, seed: int) -> Plan:
         """Layer plus row plus column, even or odd; one colour of a single site."""
-        return Plan(Pattern(1, 1, 1, 2), min(2, grid.whole.size))
+        return Plan(Sublattice(2, 1, 1, layers=1), min(2, grid.whole.size))
 
 
-class Synchronous(Patterned):
+class Synchronous(Partition):
     """All active sites together, from the old values.
 
     There is no guarantee: neighbours relax together, against equation (14). The sampled distribution is another one,
@@ -166,6 +156,7 @@ class Synchronous(Patterned):
     """
 
     name = "synchronous"
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours, since every neighbourhood holds the four nearest sites."""
@@ -173,7 +164,7 @@ class Synchronous(Patterned):
 
     def plan(self, grid: Grid, order: int, seed: int) -> Plan:
         """One colour."""
-        return Plan(Pattern(0, 0, 0, 1), 1)
+        return Plan(Sublattice(1, 0, 1), 1)
 
 
 class Raster(Partition):
@@ -194,7 +185,7 @@ class Raster(Partition):
         return np.arange(grid.size).reshape(grid.shape)
 
 
-class Block(Patterned):
+class Block(Partition):
     """Tiles that relax independently at the same time, each row by row, as in naive multi-device code.
 
     A site reads the current values of its neighbours within its tile; beyond the edge of the tile it reads those at the
@@ -206,8 +197,6 @@ class Block(Patterned):
     rows, cols : int
         Size of a tile, in sites of the level's lattice.
     """
-
-    windows = False
 
     def __init__(self, rows: int = 16, cols: int = 16) -> None:
         whole("rows of a tile", rows, 1)
@@ -224,4 +213,4 @@ class Block(Patterned):
         """Return the place of each site within its tile."""
         assert self.tile is not None
         rows, cols = (min(tile, n) for tile, n in zip(self.tile, grid.whole.shape, strict=True))
-        return Plan(Pattern(0, 1, 0, rows, cols), rows * cols)
+        return Plan(Sublattice(rows, 0, cols), rows * cols)

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,9 @@ class Setting(NamedTuple):
 
 
 class Active(Protocol):
-    """The sites that are active now."""
+    """The sites that are active now, and ``kept``: what a schedule has found for the level, such as lists of sites."""
+
+    kept: dict[Any, Any]
 
     def mask(self) -> NDArray[np.bool_]:
         """Return whether each site is active, (rows, cols), on the host."""
@@ -40,13 +42,14 @@ class Active(Protocol):
         """Return the numbers of the active sites, in ascending order, on the host."""
         ...
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Return the active sites of a list of numbers, group after group.
 
         Parameters
         ----------
         sites : (S,) array
-            Numbers of sites; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
+            Numbers of sites; an array of the machine, or one that a schedule's state keeps, so that a machine may keep
+            its own copy of it.
         starts : (groups + 1,) array
             The first index of each group in ``sites``, and the end of the last.
 
@@ -59,24 +62,13 @@ class Active(Protocol):
         """
         ...
 
-    def grouped(self, lists: Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active sites of the list that ``lists(setting)`` returns, as `among` does.
-
-        The function is called once for a level, and its list, an array of NumPy or of the machine, is kept.
-        """
-        ...
-
-
-Lists: TypeAlias = Callable[[Setting], tuple[Array, NDArray[np.int64]]]
-"""A function that returns the numbers of sites, group after group, and the bounds of the groups."""
-
 
 class Masked:
-    """The active sites by a constant mask (rows, cols); None: all are active."""
+    """The active sites by a constant mask (rows, cols), None: all are active; ``machine`` has the schedule's lists."""
 
-    def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
-        self._mask = np.ones(grid.shape, bool) if mask is None else mask
-        self._lists: dict[Any, Any] = {}
+    def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None, machine: Machine | None = None) -> None:
+        self._mask, self._machine = np.ones(grid.shape, bool) if mask is None else mask, machine
+        self.kept: dict[Any, Any] = {}
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the given mask."""
@@ -90,20 +82,13 @@ class Masked:
         """Return the numbers of the active sites, which are computed once."""
         return self._numbers
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Return the active sites of a list, computed in NumPy."""
         if self._mask.all():
             return sites, starts
+        sites = self._machine.get(sites) if self._machine else sites
         wanted = self._mask.ravel()[sites]
         return sites[wanted], np.concatenate([[0], np.cumsum(wanted)])[starts]
-
-    def grouped(self, lists: Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active sites of a list, which is copied to the host."""
-        key = lists, setting.grid, setting.order, setting.seed
-        if key not in self._lists:
-            sites, starts = lists(setting)
-            self._lists[key] = setting.machine.get(sites), starts
-        return self.among(*self._lists[key])
 
 
 class Info(NamedTuple):

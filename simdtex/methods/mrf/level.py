@@ -416,7 +416,7 @@ class Level:
     soft : (kinds, H, W) float32 array, optional
         The cost of each kind by soft data, without the penalties of the kinds.
     lists : dict
-        The schedule's lists of sites on the machine: each is found, or copied there, once.
+        The schedule's lists of sites on the machine: each is made, or copied there, once.
     """
 
     setting: Setting
@@ -492,6 +492,7 @@ class Active:
     def __init__(self, level: Level, temperature: Array, free: bool) -> None:
         self._level = level
         self._plane = level.movable if free else temperature  # above 0 at active sites; None: all are active
+        self.kept = level.lists
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the mask of active sites, read back from the machine."""
@@ -505,16 +506,9 @@ class Active:
         grid = self._level.grid
         return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
-    def grouped(self, lists: schedules.Lists, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
-        """Return the active sites of a list that stays on the machine."""
-        known, key = self._level.lists, (lists, setting.grid, setting.order, setting.seed)
-        if key not in known:
-            known[key] = lists(setting)
-        return self.among(*known[key])
-
     def among(self, sites: Array, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Return the active sites of a list, found on the machine."""
-        known, machine = self._level.lists, self._level.machine
+        known, machine = self.kept, self._level.machine
         if id(sites) not in known:
             begins, firsts = stretches(starts)
             here = machine.put(sites) if isinstance(sites, np.ndarray) else sites
