@@ -360,6 +360,8 @@ def test_groups_that_are_not_as_many_as_counted_are_refused(machine):
             own.windows = True
             with pytest.raises(ValueError, match="sites in groups that are not 0 to 1, as its `count` says"):
                 walk(own, Grid((2, 4)), machine=m)
+        with pytest.raises(TypeError, match="Cannot cast"):
+            walk(Own(1.5, 0, "float64"), Grid((2, 4)), machine=m)
 
 
 class Told:
