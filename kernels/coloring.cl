@@ -6,29 +6,28 @@
 //
 //   (layers layer + rows row - b floor(col / c)) mod a * c + col mod c
 //
-// names  (named,)  the number of each coset among those that occur; none: its own
-// colors (sites,)  out
+// names     (named,)  the number of each coset among those that occur; none: its own
+// seam, own (n,)      sites along the seam of a torus that cuts through the cosets, ascending, and their colours
+// colors    (sites,)  out
 // One work-item per site.
 __kernel void coloring_sites(const Lattice g, const int a, const int b, const int c, const int layers, const int rows,
-                             __global const int *restrict names, const int named, __global int *restrict colors)
+                             __global const int *restrict names, const int named, __global const long *restrict seam,
+                             __global const int *restrict own, const int n, __global int *restrict colors)
 {
     const int site = get_global_id(0), i = site / g.cols;
     if (i >= g.layers * g.rows)
         return;
-    const ulong layer = wrap(g.front + i / g.rows, g.whole_layers);
-    const ulong row = wrap(g.top + i % g.rows, g.whole_rows), col = wrap(g.left + site % g.cols, g.whole_cols);
-    const ulong turned = layer * layers + row * rows + col / c * (a - b);
-    const int coset = (int)(turned % a * c + col % c);
-    colors[site] = named ? names[coset] : coset;
-}
-
-// The colours of sites along the seam of a torus that cuts through the cosets. One work-item per site of seam (n,).
-__kernel void coloring_seam(__global const int *restrict seam, __global const int *restrict own, const int n,
-                            __global int *restrict colors)
-{
-    const int k = get_global_id(0);
-    if (k < n)
-        colors[seam[k]] = own[k];
+    const long layer = wrap(g.front + i / g.rows, g.whole_layers);
+    const long row = wrap(g.top + i % g.rows, g.whole_rows), col = wrap(g.left + site % g.cols, g.whole_cols);
+    const int coset = (int)((layer * layers + row * rows + col / c * (a - b)) % a * c + col % c);
+    const long place = row * g.whole_cols + col;
+    int first = 0;
+    for (int end = n; first < end;)
+        if (seam[(first + end) / 2] < place)
+            first = (first + end) / 2 + 1;
+        else
+            end = (first + end) / 2;
+    colors[site] = first < n && seam[first] == place ? own[first] : named ? names[coset] : coset;
 }
 
 // A stable counting sort. Work-item r takes a run of `length` sites; colours that are not 0 .. count - 1 are left out.

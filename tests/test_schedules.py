@@ -84,7 +84,7 @@ def walk(schedule, grid, sweeps=1, *, order=2, seed=1, level=0, mask=None, machi
     """What the steps of each sweep decided; all sites active where nothing else is said."""
     mask = everywhere(grid) if mask is None else mask
     told_of = setting(grid, order, seed, level, machine)
-    state, active = schedule.init(told_of), Masked(grid, mask, machine)
+    state, active = schedule.init(told_of), Masked(grid, mask)
     told = []
     for _ in range(sweeps):
         infos = []

@@ -252,10 +252,10 @@ class Sublattice:
         """Number of cosets."""
         return self.a * self.c
 
-    def coset(self, row: Any, col: Any, layer: Any = 0) -> NDArray[np.int32]:
-        """Return the numbers of the cosets of sites, 0 to a * c - 1."""
-        turned = layer * self.layers + row * self.rows - col // self.c * self.b
-        return np.asarray(turned % self.a * self.c + col % self.c, np.int32)
+    def coset(self, row: Any, col: Any, layer: Any = 0) -> Any:
+        """Return the numbers of the cosets of sites, 0 to a * c - 1; rows and columns are arrays, or plural."""
+        turned = row * self.rows - col // self.c * self.b + layer * self.layers
+        return turned % self.a * self.c + col % self.c
 
     def shortest(self) -> int:
         """Return the squared length of the shortest vector."""

@@ -116,22 +116,21 @@ class Plan(NamedTuple):
 def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
     """Return the colours of a lattice, or of a window of it: an int32 array with the grid's shape, on the machine.
 
-    A window's sites have their colours in the whole. Cost: O(sites).
+    A window's sites have their colours in the whole. Cost: O(sites log seam).
     """
-    (rows, cols), (top, left) = grid.whole.shape[-2:], grid.first[-2:]
-    i, j = (plan.seam // cols - top) % rows, (plan.seam % cols - left) % cols
-    here = (i < grid.rows) & (j < grid.cols)
-    seam, own = (i * grid.cols + j)[here].astype(np.int32), plan.own[here]
     if machine is None:
         *layer, row, col = np.ix_(*grid.lines())
         found = plan.pattern.coset(row, col, *layer)
         found = plan.names[found] if plan.names.size else found
-        found.flat[seam] = own
-        return found
-    colors, names = machine.empty(grid.shape, np.int32), machine.put(plan.names)
-    machine.launch("coloring_sites", (grid.size,), grid.struct, *astuple(plan.pattern), names, names.size, colors)
-    if seam.size:
-        machine.launch("coloring_seam", (seam.size,), machine.put(seam), machine.put(own), seam.size, colors)
+        number = row * grid.whole.cols + col
+        at = np.searchsorted(plan.seam, number)
+        return np.where(np.append(plan.seam, -1)[at] == number, np.append(plan.own, 0)[at], found).astype(np.int32)
+    colors, (names, seam, own) = (
+        machine.empty(grid.shape, np.int32),
+        map(machine.put, (plan.names, plan.seam, plan.own)),
+    )
+    table = names, names.size, seam, own, seam.size
+    machine.launch("coloring_sites", (grid.size,), grid.struct, *astuple(plan.pattern), *table, colors)
     return colors
 
 

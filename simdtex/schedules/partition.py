@@ -14,7 +14,7 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.model.lattice import Grid, Sublattice, coloring_of_layers
 from simdtex.ops.sites import Plan, by_color, coloring, lattice_plan
 from simdtex.options import whole
-from simdtex.schedules.schedule import Active, Info, Setting
+from simdtex.schedules.schedule import Active, Info, Lists, Setting
 
 
 class State(NamedTuple):
@@ -51,7 +51,7 @@ class Partition:
         """Return the state of a level."""
         return State()
 
-    def lists(self, setting: Setting) -> tuple[Array, NDArray[np.int64]]:
+    def lists(self, setting: Setting) -> Lists:
         """Return all sites, group after group, and the bounds of the groups (`simdtex.ops.sites.by_color`)."""
         machine, grid, offsets, order, seed, _ = setting
         group = self.groups(machine, grid, offsets, order, seed)
@@ -69,9 +69,8 @@ class Partition:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
         sweep = state.sweep + 1
         key = self.lists, setting.grid, setting.order, setting.seed
-        if key not in active.kept:
-            active.kept[key] = self.lists(setting)
-        sites, starts = active.among(*active.kept[key])
+        sites, starts = active.kept[key] = active.kept.get(key) or self.lists(setting)
+        sites, starts = active.among(sites, starts, setting.machine)
         steps = np.stack([starts[:-1], starts[1:]], 1)
         if self.shuffled:
             first, at = divmod(sweep, AHEAD)

@@ -29,6 +29,7 @@ from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import TAIL, square_of
 from simdtex.ops.use import STEPS, FairUse, Regions
 from simdtex.schedules import Setting
+from simdtex.schedules.schedule import Lists
 
 WHOLE = 256
 """Number of candidates of a coarsest level up to which neighbourhoods cover much of the sample's layout."""
@@ -506,17 +507,16 @@ class Active:
         grid = self._level.grid
         return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
-    def among(self, sites: Array, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
         """Return the active sites of a list, found on the machine."""
-        known, machine = self.kept, self._level.machine
+        known, own = self.kept, self._level.machine
         if id(sites) not in known:
             begins, firsts = stretches(starts)
-            here = machine.put(sites) if isinstance(sites, np.ndarray) else sites
-            known[id(sites)] = sites, here, machine.put(begins), firsts
+            known[id(sites)] = sites, sites if machine else own.put(sites), own.put(begins), firsts
         _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
-        return among(machine, here, begins, firsts, self._plane)
+        return among(own, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:
