@@ -146,7 +146,7 @@ def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array
         sites: Array = np.argsort(colors, None, kind="stable").astype(np.int32)
         starts = np.searchsorted(colors.ravel()[sites], np.arange(count + 1))
     else:
-        length = max(CHUNK, count)  # so that counts take no more memory than sites
+        length = max(CHUNK, 4 * count)  # so that counts take less memory than sites
         runs = -(-colors.size // length)
         shape, counts = (colors.size, length, runs, count), machine.empty((count, runs), np.int32)
         machine.launch("coloring_count", (runs,), colors, *shape, counts)
