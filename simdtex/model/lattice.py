@@ -238,7 +238,7 @@ class Grid:
 class Sublattice:
     """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring.
 
-    ``layers`` and ``rows`` are multiples of the layer and the row that add up to the row of these.
+    In layer k and row i of a volume, the row that counts here is ``layers`` k + ``rows`` i.
     """
 
     a: int
