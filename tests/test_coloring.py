@@ -201,9 +201,11 @@ WINDOWS = [
 VOLUMES = [Grid.of((5, 9, 11), 1, False), Grid.of((4, 6, 7), 2, False), Grid((3, 4, 5), False, 1, (8, 9, 7), (2, 5, 1))]
 
 
-@pytest.mark.parametrize("name", ["coloring", "coloring-fixed", "checkerboard", "synchronous", "block:3x5", "block"])
+@pytest.mark.parametrize(
+    "name", ["coloring", "coloring-fixed", "checkerboard", "synchronous", "raster", "block:3x5", "block"]
+)
 def test_a_device_has_the_groups_of_the_reference(machine, name):
-    """Those of a coloring on a torus that does not fit, where the seam has colours of its own, among them."""
+    """Among them those of a coloring on a torus that does not fit, where the seam has colours of its own."""
     schedule, seams = get(name), 0
     for grid in [*WHOLES, *([] if schedule.tile else WINDOWS + VOLUMES)]:
         for order in (1, 2, 8) if name == "coloring" and grid.whole.size < 10**6 else (2,):
@@ -216,19 +218,21 @@ def test_a_device_has_the_groups_of_the_reference(machine, name):
     assert (seams > 4) == (name in ("coloring", "coloring-fixed"))
 
 
-def test_a_checkerboard_and_blocks_are_what_their_names_say():
+def test_groups_are_what_their_names_say():
     row, col = np.indices((13, 11))
     expected = {"checkerboard": (row + col) % 2, "block:3x5": row % 3 * 5 + col % 5, "synchronous": row * 0}
-    expected["block:20x4"] = row * 4 + col % 4
+    expected |= {"block:20x4": row * 4 + col % 4, "raster": row * 11 + col}
     for name, groups in expected.items():
         assert_same_bits(get(name).groups(REFERENCE, Grid((13, 11)), None, 2, 1), groups.astype(np.int32))
     window, volume = Grid((13, 11)).window(4, -3, 9, 9), Grid.of((3, 4, 5), 1, False)
     assert_same_bits(
         get("checkerboard").groups(REFERENCE, window, None, 2, 1), window.cut((row + col) % 2).astype("i4")
     )
-    assert_same_bits(
-        get("checkerboard").groups(REFERENCE, volume, None, 2, 1), (np.indices((3, 4, 5)).sum(0) % 2).astype(np.int32)
-    )
+    for name, groups in (
+        ("checkerboard", np.indices((3, 4, 5)).sum(0) % 2),
+        ("raster", np.arange(60).reshape(3, 4, 5)),
+    ):
+        assert_same_bits(get(name).groups(REFERENCE, volume, None, 2, 1), groups.astype(np.int32))
 
 
 SIDES = st.integers(1, 40)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,9 +179,10 @@ class Raster(Partition):
         """Always."""
         return True
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return a group for each site."""
-        return np.arange(grid.size).reshape(grid.shape)
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return a colour for each site."""
+        (*_, rows, cols), size = grid.whole.shape, grid.whole.size
+        return Plan(Sublattice(size // cols, 0, cols, layers=rows), size)
 
 
 class Block(Partition):
