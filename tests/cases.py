@@ -22,7 +22,7 @@ from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.neighbourhood import Confidences, Field
 from simdtex.ops.relax import AllCandidates, CandidateList, InPhase, Relaxation, in_phase
 from simdtex.ops.square import TAIL, square_of
-from simdtex.schedules import Setting
+from simdtex.schedules import Coloring, Setting
 
 REFERENCE = Reference()
 
@@ -33,6 +33,11 @@ def opencl(info, **options):
     from simdtex.machine.opencl import OpenCL
 
     return OpenCL(info, **options)
+
+
+def colors_of(grid, order, seed=0, machine=REFERENCE):
+    """The colours of a lattice or a window of it, read back from a machine."""
+    return np.array(machine.get(Coloring().groups(machine, grid, None, order, seed)))
 
 
 def slow_but(quick, every):

@@ -1,18 +1,20 @@
 """Sets of sites that do not neighbour: the colouring against equation (14), and Luby's random independent sets."""
 
 from dataclasses import replace
+from itertools import accumulate, chain
 
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, slow_but
+from cases import REFERENCE, assert_same_bits, colors_of, slow_but
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simdtex import random
 from simdtex.model.lattice import Grid, coloring_sublattice, neighbourhood_offsets
 from simdtex.ops import sites as module
-from simdtex.ops.sites import IN, UNDECIDED, coloring, lattice_plan, luby
+from simdtex.ops.sites import IN, UNDECIDED, by_color, lattice_plan, luby
+from simdtex.schedules import get
 
 # -- The colouring against equation (14), by brute force, for every order up to 32; and its number of colours.
 # The bound where a torus does not hold the best pattern: a site at the seam takes the lowest colour that none of its
@@ -25,7 +27,7 @@ ORDERS = range(1, 33)
 
 
 def colour(order, rows, cols, torus, seed=0):
-    colors = coloring(Grid.of((rows, cols), 1, torus), order, seed)
+    colors = colors_of(Grid.of((rows, cols), 1, torus), order, seed)
     assert colors.shape == (rows, cols)
     assert colors.dtype == np.int32
     return colors
@@ -144,7 +146,7 @@ def test_the_seam_is_coloured_as_by_plain_loops(order):
 @pytest.mark.parametrize("spacing", [1, 2, 4])
 def test_a_coarser_level_is_coloured_as_a_lattice_of_its_own(spacing):
     grid = Grid.of((23, 30), spacing)
-    assert_same_bits(coloring(grid, 5, 3), colour(5, grid.rows, grid.cols, True, seed=3))
+    assert_same_bits(colors_of(grid, 5, 3), colour(5, grid.rows, grid.cols, True, seed=3))
 
 
 @given(
@@ -159,8 +161,8 @@ def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size
     rows, cols = (min(a, b) for a, b in zip(size, shape, strict=True))
     top, left = corner if torus else (min(at, n - k) for at, n, k in zip(corner, shape, (rows, cols), strict=True))
     window = grid.window(top, left, rows, cols)
-    assert_same_bits(coloring(window, order, 7), window.cut(coloring(grid, order, 7)))
-    assert lattice_plan(*shape, torus, order, 7).colors == coloring(grid, order, 7).max() + 1
+    assert_same_bits(colors_of(window, order, 7), window.cut(colors_of(grid, order, 7)))
+    assert lattice_plan(*shape, torus, order, 7).colors == colors_of(grid, order, 7).max() + 1
 
 
 def test_sites_are_looked_at_piece_by_piece(monkeypatch):
@@ -174,7 +176,7 @@ def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
     """No work goes with the area: 10^10 sites."""
     grid = Grid((99_991, 100_003))
     window = grid.window(99_980, 99_990, 30, 40)
-    colors = coloring(window, 2, 1)
+    colors = colors_of(window, 2, 1)
     assert not conflicts(colors, 2, False)
     assert colors.max() < lattice_plan(99_991, 100_003, True, 2, 1).colors <= 9
 
@@ -183,9 +185,73 @@ def test_a_vast_torus_takes_a_pattern_that_fits():
     """The other one would be looked for along two million sites."""
     grid = Grid((2**20, 2**20))
     window = grid.window(2**20 - 20, 2**20 - 25, 45, 50)
-    assert not conflicts(coloring(window, 18, 1), 18, False)
+    assert not conflicts(colors_of(window, 18, 1), 18, False)
     plan = lattice_plan(2**20, 2**20, True, 18, 1)
     assert (plan.seam.size, plan.colors) == (0, coloring_sublattice(18, 2**20, 2**20, limit=61).index)
+
+
+# -- The kernels: cosets and the seam, for pictures, windows and volumes; and the list of sites, by plain loops.
+
+WHOLES = [Grid((1, 1)), Grid((2, 3)), Grid((29, 37)), Grid.of((64, 40), 2), Grid((3, 18)), Grid.of((23, 30), 1, False)]
+WINDOWS = [
+    *(Grid((29, 37)).window(*place) for place in [(20, 30, 15, 16), (-3, 2, 29, 5), (0, 36, 7, 37)]),
+    *(Grid.of((40, 30), 1, False).window(*place) for place in [(21, 3, 19, 20), (0, 0, 1, 30)]),
+    *(Grid((99_991, 100_003)).window(*place) for place in [(99_980, 99_990, 30, 40), (50_000, 100_000, 9, 9)]),
+]
+VOLUMES = [Grid.of((5, 9, 11), 1, False), Grid.of((4, 6, 7), 2, False), Grid((3, 4, 5), False, 1, (8, 9, 7), (2, 5, 1))]
+
+
+@pytest.mark.parametrize(
+    "name", ["coloring", "coloring-fixed", "checkerboard", "synchronous", "raster", "block:3x5", "block"]
+)
+def test_a_device_has_the_groups_of_the_reference(machine, name):
+    """Among them those of a coloring on a torus that does not fit, where the seam has colours of its own."""
+    schedule, seams = get(name), 0
+    for grid in [*WHOLES, *([] if schedule.tile else WINDOWS + VOLUMES)]:
+        for order in (1, 2, 8) if name == "coloring" and grid.whole.size < 10**6 else (2,):
+            ours, theirs = (schedule.groups(m, grid, None, order, 9) for m in (machine, REFERENCE))
+            assert_same_bits(machine.get(ours), theirs)
+            assert (theirs.shape, theirs.dtype) == (grid.shape, np.int32)
+            count = schedule.count(grid, order, 9)
+            assert theirs.max() + 1 == count if grid in WHOLES else theirs.max() < count
+            seams += schedule.plan(grid, order, 9).seam.size > 0
+    assert (seams > 4) == (name in ("coloring", "coloring-fixed"))
+
+
+def test_groups_are_what_their_names_say():
+    row, col = np.indices((13, 11))
+    expected = {"checkerboard": (row + col) % 2, "block:3x5": row % 3 * 5 + col % 5, "synchronous": row * 0}
+    expected |= {"block:20x4": row * 4 + col % 4, "raster": row * 11 + col}
+    for name, groups in expected.items():
+        assert_same_bits(get(name).groups(REFERENCE, Grid((13, 11)), None, 2, 1), groups.astype(np.int32))
+    window, volume = Grid((13, 11)).window(4, -3, 9, 9), Grid.of((3, 4, 5), 1, False)
+    assert_same_bits(
+        get("checkerboard").groups(REFERENCE, window, None, 2, 1), window.cut((row + col) % 2).astype("i4")
+    )
+    for name, groups in (
+        ("checkerboard", np.indices((3, 4, 5)).sum(0) % 2),
+        ("raster", np.arange(60).reshape(3, 4, 5)),
+    ):
+        assert_same_bits(get(name).groups(REFERENCE, volume, None, 2, 1), groups.astype(np.int32))
+
+
+SIDES = st.integers(1, 40)
+
+
+@given(st.tuples(SIDES, SIDES), st.integers(1, 90), st.sampled_from([1, 7, 256]), st.integers(0, 9))
+@settings(max_examples=40)
+def test_the_list_has_the_sites_colour_by_colour_and_row_by_row(machine, shape, count, chunk, seed):
+    colors = np.random.default_rng(seed).integers(0, count, shape).astype(np.int32)
+    each = [[site for site in range(colors.size) if colors.flat[site] == color] for color in range(count)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "CHUNK", chunk)
+        for m in (REFERENCE, machine):
+            sites, starts = by_color(m, m.put(colors), count)
+            assert_same_bits(np.asarray(m.get(sites)), np.array([*chain(*each)], np.int32))
+            assert starts.tolist() == [0, *accumulate(map(len, each))]
+            for strange in (-1, count):
+                with pytest.raises(ValueError, match=f"sites in groups that are not 0 to {count - 1}"):
+                    by_color(m, m.put(np.append(colors, np.int32(strange))), count)
 
 
 # -- Luby's random maximal independent sets against a greedy choice in order of the same priorities, by plain loops.

@@ -34,7 +34,7 @@ def test_every_function_of_a_kernel_is_named_and_every_name_is_one():
 
 
 ALWAYS = {"start", "active_survey"}
-GROUPS = {"active_count", "active_keep"}
+GROUPS = {"active_count", "active_keep", "coloring_sites", "coloring_count", "coloring_list"}
 RUNS = {
     "default": ({}, GROUPS | {"use", "relax"}),
     "exact": ({"search": "exact", "balance": 0}, GROUPS | {"relax"}),

@@ -13,7 +13,7 @@ import nrrd
 import numpy as np
 import pytest
 import xarray
-from cases import assert_same_bits, slow_but
+from cases import assert_same_bits, colors_of, slow_but
 from click.testing import CliRunner
 from scipy.ndimage import gaussian_filter
 
@@ -28,7 +28,6 @@ from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offset
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.lcpdf import optimal_bandwidth
-from simdtex.ops.sites import coloring
 from simdtex.ops.square import square_of
 
 SHAPE = (7, 9, 11)
@@ -81,7 +80,7 @@ def test_sites_and_neighbours_are_those_of_plain_loops(order, spacing):
 @pytest.mark.parametrize("order", [1, 2, 3, 8, 9])
 def test_no_neighbours_share_a_colour(order):
     grid = Grid.of((5, 9, 11), 1, False)
-    colors = coloring(grid, order)
+    colors = colors_of(grid, order)
     assert colors.shape == grid.shape and set(colors.ravel()) <= set(range(coloring_of_layers(order)[0]))
     near = grid.neighbours(np.arange(grid.size, dtype=np.int32), neighbourhood_offsets(order, 3))
     same = colors.ravel()[near] == colors.ravel()[None, :]

@@ -16,7 +16,7 @@ from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_source
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
-from simdtex.methods.mrf.level import parts
+from simdtex.methods.mrf.level import Active, parts
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import LEVEL, constants
@@ -116,6 +116,21 @@ def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, se
                 assert_same_bits(mine["penalty"], theirs["penalty"])
             for name in ("values", "source", "temperature"):
                 assert_same_bits(after[-1][name], whole[-1][name])
+
+
+@pytest.mark.parametrize("schedule", ["coloring", "checkerboard", "block:3x5", "synchronous"])
+def test_the_list_of_sites_is_made_on_the_device_and_stays_there(cl_device, monkeypatch, schedule):
+    machine, copied = opencl(cl_device), []
+    run = prepared(machine, (60, 61), schedule=schedule, levels=1)
+    level, state, copies = run.level(0), run.begin(), (machine.put, machine.get)
+    for name, copy in zip(("put", "get"), copies, strict=True):
+        monkeypatch.setattr(machine, name, lambda array, copy=copy: (copied.append(array.size), copy(array))[1])
+    memory, first = level.schedule.step(level.setting, state.schedule, Active(level, state.temperature, False))
+    assert 0 < sum(copied) < level.grid.size / 4  # the counts of its groups, which say where each begins
+    copied.clear()
+    _, second = level.schedule.step(level.setting, memory, Active(level, state.temperature, True))
+    assert not copied and (memory, plain(memory)) == ((1,), True)
+    assert_same_bits(*(copies[1](info.sites) for info in (first, second)))
 
 
 def test_a_state_tells_what_is_left():

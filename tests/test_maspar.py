@@ -4,7 +4,7 @@ import operator
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits
+from cases import REFERENCE, assert_same_bits, colors_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +17,6 @@ from simdtex.maspar.machine import CLOCK, COSTS, FULL, MP1
 from simdtex.maspar.sites import Walk, coloring
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.lcpdf import Key
-from simdtex.ops.sites import coloring as engine
 
 TYPES = ("int32", "uint64", "float32")
 BINARY = ("add", "sub", "mul", "lt", "le", "gt", "ge", "eq", "ne")
@@ -204,7 +203,7 @@ def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, orde
 def test_elements_colour_their_sites_as_the_engine_does(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 5)
-    wanted = engine(grid, order, 5)
+    wanted = colors_of(grid, order, 5)
     assert (grid.decimated(seen(color)) == wanted).all()
     assert count == wanted.max() + 1
 
@@ -214,7 +213,7 @@ def test_colours_beyond_a_word_and_on_a_device(machine):
     for each, shape, order in ((machine, (13, 11), 8), (REFERENCE, (11, 11), 40)):
         mp1, grid = MP1(each, ProcessorArray(8, 8), shape), Grid(shape)
         color, count = coloring(mp1, Walk(mp1, grid, neighbourhood_offsets(order)), order, 7)
-        assert (seen(color) == engine(grid, order, 7)).all()
+        assert (seen(color) == colors_of(grid, order, 7)).all()
     assert count > 64
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import plain
 import pyopencl as cl
 import pytest
-from cases import REFERENCE, assert_same_bits, check_chi_square, host, opencl, problem, slow_but, texture
+from cases import REFERENCE, assert_same_bits, check_chi_square, colors_of, host, opencl, problem, slow_but, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +16,6 @@ from simdtex.model.lattice import Grid
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import SUGGESTING, relax, relax_out_of_place
-from simdtex.ops.sites import coloring
 from simdtex.schedules import Checked, Coloring
 
 
@@ -183,7 +182,7 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     """In pieces, too, where a step has more sites than a launch may."""
     monkeypatch.setattr("simdtex.machine.opencl.LONGEST", longest)
     p = problem(11, order=4, shape=(20, 24), edges="reflect")
-    colors = coloring(p.grid, p.order).ravel()
+    colors = colors_of(p.grid, p.order).ravel()
     sites = np.argsort(colors, kind="stable").astype(np.int32)
     bounds = np.concatenate([[0], np.cumsum(np.bincount(colors))])
     steps = np.stack([bounds[:-1], bounds[1:]], 1)[::-1]

@@ -328,15 +328,40 @@ def test_raster_and_block_go_row_by_row():
     assert plainly(walk(get("block:9x9"), Grid.of((13, 11), 2)))[0][:3] == [([s], 1, False) for s in (0, 1, 2)]
 
 
-def test_groups_of_ones_own_may_have_any_numbers():
-    class Odd(schedules.Partition):
-        name = "odd"
+class Own(schedules.Partition):
+    """Two groups of one's own, by the parity of the column."""
 
-        def groups(self, machine, grid, offsets, order, seed):
-            return np.where(np.indices((grid.rows, grid.cols))[1] % 2, -3, 10**12)
+    name, windows = "own", False
 
-    odd, even = walk(Odd(), Grid((2, 4)))[0]
-    assert (odd.sites.tolist(), even.sites.tolist()) == ([1, 3, 5, 7], [0, 2, 4, 6])
+    def __init__(self, odd, even, dtype):
+        self.numbers = np.array([even, odd], dtype)
+
+    def groups(self, machine, grid, offsets, order, seed):
+        return self.numbers[np.indices((grid.rows, grid.cols))[1] % 2]
+
+    def count(self, grid, order, seed):
+        return 2
+
+
+NUMBERS = [(-3, 10**12, "int64"), (0, 1, "int32"), (0, 200, "uint8"), (0, 2**63 + 1, "uint64"), (False, True, "bool")]
+
+
+@pytest.mark.parametrize("numbers", NUMBERS, ids=str)
+def test_groups_of_ones_own_may_have_any_numbers(machine, numbers):
+    for m in (REFERENCE, machine):
+        odd, even = walk(Own(*numbers), Grid((2, 4)), machine=m)[0]
+        assert (odd.sites.tolist(), even.sites.tolist()) == ([1, 3, 5, 7], [0, 2, 4, 6])
+
+
+def test_groups_that_are_not_as_many_as_counted_are_refused(machine):
+    for m in (REFERENCE, machine):
+        for odd, dtype in ((2, "uint8"), (2**32, "int64"), (-1, "int64")):
+            own = Own(odd, 0, dtype)
+            own.windows = True
+            with pytest.raises(ValueError, match="sites in groups that are not 0 to 1, as its `count` says"):
+                walk(own, Grid((2, 4)), machine=m)
+        with pytest.raises(TypeError, match="Cannot cast"):
+            walk(Own(1.5, 0, "float64"), Grid((2, 4)), machine=m)
 
 
 class Told:

@@ -37,7 +37,7 @@ NONE: Mapping[str, int | str] = {}
 SMALL_GROUP = 4
 """Work-group size on a CPU for kernels with much work in each item: few sites still occupy all cores."""
 
-ONE_PROGRAM = ("active", "start", "use")
+ONE_PROGRAM = ("active", "coloring", "start", "use")
 """Kernel files without -D constants that every run of ``mrf`` needs, compiled as one program: each takes about 50 ms to
 load on PoCL."""
 

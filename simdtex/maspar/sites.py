@@ -108,7 +108,7 @@ def coloring(mp1: MP1, walk: Walk, order: int, seed: int) -> tuple[Plural, int]:
             found = along_seam(mp1, walk, best, seed, most)
         if found is None:
             assert seamless is not None  # otherwise greedy colours have no limit
-            found = coset(seamless, walk.row, walk.col)
+            found = seamless.coset(walk.row, walk.col)
         numbers = 0
         for number in range(max(enough, best.index, seamless.index if seamless else 0)):
             here = found == number
@@ -119,26 +119,20 @@ def coloring(mp1: MP1, walk: Walk, order: int, seed: int) -> tuple[Plural, int]:
     return color, numbers
 
 
-def coset(pattern: Sublattice, row: Plural, col: Plural) -> Plural:
-    """Return the cosets of sites in the sublattice spanned by (a, 0) and (b, c)."""
-    a, b, c = pattern.a, pattern.b, pattern.c
-    return (row + (col // c) * -b) % a * c + col % c
-
-
 def along_seam(mp1: MP1, walk: Walk, pattern: Sublattice, seed: int, most: int) -> Plural | None:
     """Return the cosets, with other colours for sites that clash across the seam; None if one needs ``most`` colours.
 
     ``most`` 0 is no limit.
     """
     rows, cols = walk.grid.rows, walk.grid.cols
-    number, own, color = walk.row * cols + walk.col, coset(pattern, walk.row, walk.col), mp1.plural()
+    number, own, color = walk.row * cols + walk.col, pattern.coset(walk.row, walk.col), mp1.plural()
     color.set(own)
     bare = mp1.plural()
     for down, right in walk.offsets.tolist():  # the later site of each pair of neighbours in one coset
         row, col = walk.row + down, walk.col + right
         across = (row < 0) | (row >= rows) | (col < 0) | (col >= cols)
         row, col = row % rows, col % cols
-        met = (coset(pattern, row, col) == own) & (row * cols + col < number)
+        met = (pattern.coset(row, col) == own) & (row * cols + col < number)
         bare.set(bare | (across & met))
     carried = mp1.plural("uint64", 2)  # the colour plus 1, or 0 of a site without one; and then its key
     key = mp1.random(number, Key(seed, 0, 0), random.COLOR) & (2**32 - 1)

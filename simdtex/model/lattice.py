@@ -236,16 +236,26 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sublattice:
-    """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring."""
+    """The sites n (a, 0) + m (b, c), (row, column); the a * c cosets are the colours of a lattice colouring.
+
+    In layer k and row i of a volume, the row that counts here is ``layers`` k + ``rows`` i.
+    """
 
     a: int
     b: int
     c: int
+    layers: int = 0
+    rows: int = 1
 
     @property
     def index(self) -> int:
         """Number of cosets."""
         return self.a * self.c
+
+    def coset(self, row: Any, col: Any, layer: Any = 0) -> Any:
+        """Return the numbers of the cosets of sites, 0 to a * c - 1; rows and columns are arrays, or plural."""
+        turned = row * self.rows - col // self.c * self.b + layer * self.layers
+        return turned % self.a * self.c + col % self.c
 
     def shortest(self) -> int:
         """Return the squared length of the shortest vector."""

@@ -9,10 +9,10 @@ it. A random maximal set of sites without neighbours takes the rounds of Luby (1
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import lru_cache
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import (
     Grid,
     Sublattice,
-    coloring_of_layers,
     coloring_sublattice,
     gathered,
     neighbourhood_offsets,
@@ -95,55 +94,84 @@ NEIGHBOURS_AT_ONCE = 2**20
 """The most neighbours that are processed together."""
 
 
+NOTHING: NDArray[Any] = np.zeros(0, np.int64)
+
+
 class Plan(NamedTuple):
     """The colouring of a lattice.
 
-    ``pattern``, the sublattice whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols +
-    column of the sites with separate colours, and ``own`` (n,) int32, those colours; ``compact`` (colours before,)
-    int32, the number of each colour among the used ones; ``colors``, the number of used colours.
+    ``pattern``, the sublattice whose cosets are the colours; ``colors``, the number of used colours; ``seam`` (n,)
+    int64, ascending, the numbers row cols + column of the sites with separate colours, and ``own`` (n,) int32, those
+    colours; ``names`` (cosets,) int32, the number of each coset among the used colours, empty if all are used.
     """
 
     pattern: Sublattice
-    seam: NDArray[np.int64]
-    own: NDArray[np.int32]
-    compact: NDArray[np.int32]
     colors: int
+    seam: NDArray[np.int64] = NOTHING
+    own: NDArray[np.int32] = NOTHING
+    names: NDArray[np.int32] = NOTHING
 
 
-def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
-    """Return the colours of a level's lattice, or of a window of it: (rows, cols) int32, 0 .. colours - 1.
+@Operation
+def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
+    """Return the colours of a lattice, or of a window of it: an int32 array with the grid's shape, on the machine.
 
-    A volume's lattice, (layers, rows, cols), has the modular colouring of `coloring_of_layers`.
-
-    A picture's lattice has the best lattice colouring of the plane if its size admits that without a seam. Otherwise it
-    has either a lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
-    greedily, whichever has fewer colours; a vast lattice has the former, if any. A window's sites have their colours in
-    the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a few
-    tens of rounds along its seam.
+    A window's sites have their colours in the whole. Cost: O(sites log seam).
     """
-    if grid.layered:
-        m, *by = coloring_of_layers(order)
-        return (np.tensordot([*by, 1], np.indices(grid.shape), 1) % m).astype(np.int32)
-    rows, cols = grid.whole.shape
-    plan = lattice_plan(rows, cols, grid.torus, order, seed)
-    row, col = grid.lines()
-    colors = _cosets(plan.pattern, row[:, None], col[None, :])
-    here, there = (np.full(n, -1) for n in (rows, cols))
-    here[row], there[col] = np.arange(row.size), np.arange(col.size)
-    i, j = (line[at] for line, at in zip((here, there), np.divmod(plan.seam, cols), strict=True))
-    seen = (i >= 0) & (j >= 0)
-    colors[i[seen], j[seen]] = plan.own[seen]
-    return plan.compact[colors]
+    if machine is None:
+        *layer, row, col = np.ix_(*grid.lines())
+        found = plan.pattern.coset(row, col, *layer)
+        found = plan.names[found] if plan.names.size else found
+        number = row * grid.whole.cols + col
+        at = np.searchsorted(plan.seam, number)
+        return np.where(np.append(plan.seam, -1)[at] == number, np.append(plan.own, 0)[at], found).astype(np.int32)
+    colors, (names, seam, own) = (
+        machine.empty(grid.shape, np.int32),
+        map(machine.put, (plan.names, plan.seam, plan.own)),
+    )
+    table = names, names.size, seam, own, seam.size
+    machine.launch("coloring_sites", (grid.size,), grid.struct, *astuple(plan.pattern), *table, colors)
+    return colors
+
+
+@Operation
+def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return the sites colour by colour, and the bounds of the colours among them.
+
+    The result is the sites' numbers (S,) int32, row by row within a colour, on the machine, and (count + 1,) int64, the
+    first index of each colour in them, and the end of the last. Raises ValueError if a colour is not one of 0 to
+    ``count`` - 1. Cost: O(sites + count).
+    """
+    if machine is None:
+        sites: Array = np.argsort(colors, None, kind="stable").astype(np.int32)
+        starts = np.searchsorted(colors.ravel()[sites], np.arange(count + 1))
+    else:
+        length = max(CHUNK, 4 * count)  # so that counts take less memory than sites
+        runs = -(-colors.size // length)
+        shape, counts = (colors.size, length, runs, count), machine.empty((count, runs), np.int32)
+        machine.launch("coloring_count", (runs,), colors, *shape, counts)
+        before = np.append(0, np.cumsum(machine.get(counts), dtype=np.int64))
+        sites, starts = machine.empty((colors.size,), np.int32), before[::runs]
+        machine.launch("coloring_list", (runs,), colors, *shape, machine.put(before[:-1].astype(np.int32)), sites)
+    if starts[0] or starts[-1] < colors.size:
+        raise ValueError(f"a schedule has sites in groups that are not 0 to {count - 1}, as its `count` says")
+    return sites, starts
 
 
 @lru_cache(maxsize=32)
 def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
-    """Return the colouring of a whole lattice."""
+    """Return the colouring of a picture's whole lattice, for equation (14).
+
+    It is the best lattice colouring of the plane if its size admits that without a seam. Otherwise it is either a
+    lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured greedily,
+    whichever has fewer colours; a vast lattice has the former, if any. ``seed`` sets the priorities of the greedy
+    rounds. Cost: a few tens of rounds along the seam.
+    """
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
     offsets = neighbourhood_offsets(order).astype(np.int64)
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, len(offsets) + 1)) if torus else best
-    none, own = np.zeros(0, np.int64), None
+    seam, own = NOTHING, None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
         seam = _clashing(rows, cols, offsets, best)
@@ -152,35 +180,21 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Pl
         own = _greedy(rows, cols, offsets, best, seam, priority, most)
     if own is None:
         assert seamless is not None  # otherwise greedy colours have no limit
-        best, seam, own = seamless, none, none.astype(np.int32)
-    used = _used(rows, cols, offsets, best, seam, own)
-    return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
-
-
-def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return the colours of sites: their cosets of the sublattice spanned by (a, 0) and (b, c) (row, column).
-
-    Two sites of one coset differ by a sublattice vector, and each of those is longer than any neighbour's offset.
-    """
-    a, b, c = pattern.a, pattern.b, pattern.c
-    turned = (row % a).astype(np.int32) + (-(col // c) * b % a).astype(np.int32)
-    found: NDArray[np.int32] = np.where(turned < a, turned, turned - a) * np.int32(c) + (col % c).astype(np.int32)
-    return found
+        best, seam, own = seamless, NOTHING, NOTHING
+    used, radius = np.zeros(1 + max(best.index - 1, int(own.max(initial=0))), bool), int(offsets.max())
+    used[own] = True
+    if rows - radius >= best.a and cols - 2 * radius >= best.c:
+        used[: best.index] = True  # away from the seam lies one site of each coset
+    else:
+        used[best.coset(*np.divmod(np.delete(np.arange(rows * cols), seam), cols))] = True
+    names = (np.cumsum(used) - 1).astype(np.int32)
+    return Plan(best, int(used.sum()), seam, names[own], names)
 
 
 def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
     """Return the sites with neighbours before them across the seam, in ascending order."""
-    row, col = np.arange(rows), np.arange(cols)
-    low = row >= rows - radius
-    side = (col < radius) | (col >= cols - radius)
-    return np.sort(
-        np.concatenate(
-            [
-                (row[low][:, None] * cols + col[None, :]).ravel(),
-                (row[~low][:, None] * cols + col[side][None, :]).ravel(),
-            ]
-        )
-    )
+    row, col = np.arange(rows)[:, None] * cols, np.arange(cols)
+    return np.union1d(row[-radius:] + col, row + col[(col < radius) | (col >= cols - radius)])
 
 
 def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
@@ -191,8 +205,8 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
         row, col = np.divmod(here, cols)
         k, m = row + offsets[:, :1], col + offsets[:, 1:]
         across = np.nonzero((k < 0) | (k >= rows) | (m < 0) | (m >= cols))
-        k, m, own = k[across] % rows, m[across] % cols, _cosets(pattern, row, col)[across[1]]
-        met = (k * cols + m < here[across[1]]) & (_cosets(pattern, k, m) == own)
+        k, m, own = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
+        met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
     found: NDArray[np.int64] = site[np.concatenate(clash)]
     return found
@@ -229,7 +243,7 @@ def _greedy(
         other = bare[at] == r
         near[:, first : first + here.size] = np.where(other & (r != here), at, n)
         fixed = np.nonzero(~other)
-        taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
+        taken[first + fixed[1], pattern.coset(k[fixed], m[fixed])] = True
         first += here.size
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
@@ -245,27 +259,6 @@ def _greedy(
         rank[now] = -1
         left = left[colors[left] == UNCOLORED]
     return colors
-
-
-def _used(
-    rows: int,
-    cols: int,
-    offsets: NDArray[np.int64],
-    pattern: Sublattice,
-    seam: NDArray[np.int64],
-    own: NDArray[np.int32],
-) -> NDArray[np.bool_]:
-    """Return a mask of the used colours."""
-    used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
-    used[own] = True
-    radius = int(offsets.max())
-    if rows - radius >= pattern.a and cols - 2 * radius >= pattern.c:
-        used[: pattern.index] = True  # away from the seam lies one site of each coset
-        return used
-    site = np.arange(rows * cols)
-    site = site[~np.isin(site, seam)]
-    used[_cosets(pattern, *np.divmod(site, cols))] = True
-    return used
 
 
 UNDECIDED, IN, OUT = 0, 1, 2

@@ -505,9 +505,9 @@ def steps(name: str, grid: Grid, order: int, seed: int) -> Steps:
     """Yield the sites of each step of a schedule, sweep after sweep without end, as if all were active."""
     schedule = schedules.get(name)
     setting = Setting(Reference(), grid, neighbourhood_offsets(order), order, seed, 0)
-    state = schedule.init(setting)
+    state, everywhere = schedule.init(setting), Masked(grid)
     while True:
-        state, info = schedule.step(setting, state, Masked(grid))
+        state, info = schedule.step(setting, state, everywhere)
         for step in info.apart(setting.machine):
             plane = np.zeros(grid.shape, bool)
             plane.flat[step.sites] = True

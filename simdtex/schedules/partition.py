@@ -4,34 +4,27 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.machine.interface import Machine
-from simdtex.model.lattice import Grid, coloring_of_layers
-from simdtex.ops.sites import coloring, lattice_plan
+from simdtex.machine.interface import Array, Machine
+from simdtex.model.lattice import Grid, Sublattice, coloring_of_layers
+from simdtex.ops.sites import Plan, by_color, coloring, lattice_plan
 from simdtex.options import whole
-from simdtex.schedules.schedule import Active, Info, Setting
+from simdtex.schedules.schedule import Active, Info, Lists, Setting
 
 
 class State(NamedTuple):
-    """The state of a partition.
+    """The state of a partition: ``sweep``, the number of sweeps started."""
 
-    ``sites`` (sites,) int32, the numbers of the sites, group after group and row by row within each;
-    ``starts`` (groups + 1,) int64, the first index of each group in ``sites``, and the end of the last; ``sweep``, the
-    number of sweeps started.
-    """
-
-    sites: NDArray[np.int32]
-    starts: NDArray[np.int64]
-    sweep: int
+    sweep: int = 0
 
 
 class Partition:
-    """One group of sites per step; a subclass defines the groups."""
+    """One group of sites per step; a subclass defines `groups` or, if a formula gives them, `plan`."""
 
     name: str
     shuffled = False
@@ -39,42 +32,52 @@ class Partition:
     tile: tuple[int, int] | None = None
     windows = False
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers."""
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return the groups of the whole lattice of a grid, as colours."""
         raise NotImplementedError
+
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
+        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers.
+
+        The default is an array of the machine, which has the groups of `plan`.
+        """
+        return coloring(machine, grid, self.plan(grid, order, seed))
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the number of groups of the whole lattice, if `windows` is true."""
-        raise NotImplementedError
+        return self.plan(grid, order, seed).colors
 
     def init(self, setting: Setting) -> State:
-        """Return the state of a level; the groups of a window are those of its sites in the whole lattice."""
+        """Return the state of a level."""
+        return State()
+
+    def lists(self, setting: Setting) -> Lists:
+        """Return all sites, group after group, and the bounds of the groups (`simdtex.ops.sites.by_color`)."""
         machine, grid, offsets, order, seed, _ = setting
-        group = self.groups(machine, grid if self.windows else grid.whole, offsets, order, seed)
-        if self.windows:
-            count = self.count(grid, order, seed)
-        else:
+        group = self.groups(machine, grid, offsets, order, seed)
+        if isinstance(group, np.ndarray) and not self.windows:
             if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
-                group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
-            count, group = int(group.max()) + 1, grid.cut(group)
-        group = np.ravel(group)
-        few = group.astype(np.uint16) if count <= 2**16 else group  # sorts in linear time
-        place = np.argsort(few, kind="stable")
-        starts = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=count))])
-        return State(place.astype(np.int32), starts, 0)
+                group = np.unique(group, return_inverse=True)[1]
+            count = int(group.max()) + 1
+        else:
+            count = self.count(grid, order, seed)
+        if isinstance(group, np.ndarray):
+            group = machine.put(group.astype(np.int64, casting="same_kind").clip(-1, count).astype(np.int32))
+        return by_color(machine, group, count)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
-        sweep, groups = state.sweep + 1, state.starts.size - 1
-        turn = np.arange(groups)
+        sweep = state.sweep + 1
+        key = self.lists, setting.grid, setting.order, setting.seed
+        sites, starts = active.kept[key] = active.kept.get(key) or self.lists(setting)
+        sites, starts = active.among(sites, starts, setting.machine)
+        steps = np.stack([starts[:-1], starts[1:]], 1)
         if self.shuffled:
             first, at = divmod(sweep, AHEAD)
-            turn = _orders(setting.seed, setting.level, first * AHEAD, groups)[at]
-        sites, starts = active.among(state.sites, state.starts)
-        steps = np.stack([starts[:-1], starts[1:]], 1)[turn]
+            steps = steps[_orders(setting.seed, setting.level, first * AHEAD, len(steps))[at]]
         steps = steps[steps[:, 1] > steps[:, 0]]
         steps = steps if len(steps) else np.zeros((1, 2), np.int64)  # an empty sweep is one empty group
-        return state._replace(sweep=sweep), Info(sites, sweep, True, steps)
+        return State(sweep), Info(sites, sweep, True, steps)
 
 
 AHEAD = 32
@@ -103,16 +106,13 @@ class Coloring(Partition):
         """Always."""
         return True
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return the colours; O(sites)."""
-        return coloring(grid, order, seed)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Return the number of colours of the whole lattice."""
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return the colouring of a volume or a picture."""
         if grid.layered:
-            return coloring_of_layers(order)[0]
+            m, *by = coloring_of_layers(order)
+            return Plan(Sublattice(m, m - 1, 1, *by), m)
         rows, cols = grid.whole.shape
-        return lattice_plan(rows, cols, grid.torus, order, seed).colors
+        return lattice_plan(rows, cols, grid.torus, order, seed)
 
 
 class FixedColoring(Coloring):
@@ -142,13 +142,9 @@ class Checkerboard(Partition):
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in grid.shape)
         return even and bool((offsets.sum(1) % 2 == 1).all())
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Row plus column, odd or even."""
-        return np.asarray(sum(np.ix_(*grid.lines())) % 2)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Two, or one of a single site."""
-        return min(2, grid.whole.size)
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Layer plus row plus column, even or odd; one colour of a single site."""
+        return Plan(Sublattice(2, 1, 1, layers=1), min(2, grid.whole.size))
 
 
 class Synchronous(Partition):
@@ -165,13 +161,9 @@ class Synchronous(Partition):
         """Only on a lattice without neighbours, since every neighbourhood holds the four nearest sites."""
         return grid.size == 1
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return one group for all sites."""
-        return np.zeros(grid.shape, np.int64)
-
-    def count(self, grid: Grid, order: int, seed: int) -> int:
-        """One."""
-        return 1
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """One colour."""
+        return Plan(Sublattice(1, 0, 1), 1)
 
 
 class Raster(Partition):
@@ -187,9 +179,10 @@ class Raster(Partition):
         """Always."""
         return True
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Return a group for each site."""
-        return np.arange(grid.size).reshape(grid.shape)
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+        """Return a colour for each site."""
+        (*_, rows, cols), size = grid.whole.shape, grid.whole.size
+        return Plan(Sublattice(size // cols, 0, cols, layers=rows), size)
 
 
 class Block(Partition):
@@ -216,9 +209,8 @@ class Block(Partition):
         assert self.tile is not None
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
-    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
         """Return the place of each site within its tile."""
         assert self.tile is not None
-        row, col = np.indices((grid.rows, grid.cols))
-        place: NDArray[Any] = row % self.tile[0] * self.tile[1] + col % self.tile[1]
-        return place
+        rows, cols = (min(tile, n) for tile, n in zip(self.tile, grid.whole.shape, strict=True))
+        return Plan(Sublattice(rows, 0, cols), rows * cols)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,14 @@ class Setting(NamedTuple):
     level: int
 
 
+Lists: TypeAlias = tuple[Array, NDArray[np.int64]]
+"""The numbers of sites, group after group, and the first index of each group in them, and the end of the last."""
+
+
 class Active(Protocol):
-    """The sites that are active now."""
+    """The sites that are active now, and ``kept``: what a schedule has found for the level, such as lists of sites."""
+
+    kept: dict[Any, Any]
 
     def mask(self) -> NDArray[np.bool_]:
         """Return whether each site is active, (rows, cols), on the host."""
@@ -40,7 +46,7 @@ class Active(Protocol):
         """Return the numbers of the active sites, in ascending order, on the host."""
         ...
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
         """Return the active sites of a list of numbers, group after group.
 
         Parameters
@@ -49,6 +55,8 @@ class Active(Protocol):
             Numbers of sites; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
         starts : (groups + 1,) array
             The first index of each group in ``sites``, and the end of the last.
+        machine : Machine, optional
+            The machine whose array ``sites`` is. None: it is an array of NumPy.
 
         Returns
         -------
@@ -65,6 +73,7 @@ class Masked:
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._mask = np.ones(grid.shape, bool) if mask is None else mask
+        self.kept: dict[Any, Any] = {}
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the given mask."""
@@ -78,10 +87,11 @@ class Masked:
         """Return the numbers of the active sites, which are computed once."""
         return self._numbers
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
         """Return the active sites of a list, computed in NumPy."""
         if self._mask.all():
             return sites, starts
+        sites = machine.get(sites) if machine else sites
         wanted = self._mask.ravel()[sites]
         return sites[wanted], np.concatenate([[0], np.cumsum(wanted)])[starts]
 

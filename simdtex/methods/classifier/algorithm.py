@@ -133,6 +133,7 @@ class Run:
         self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
+        self._everywhere = schedules.Masked(self.grid)
         self._check_schedule()
         self._taps, self._coupling = gaussian(plan.options.window), machine.put(gaussian(plan.options.coupling))
         self._weight = round(WEIGHTS * plan.options.weight)
@@ -141,7 +142,7 @@ class Run:
         self._exemplars = [known.on(machine) for known in model.exemplars]
 
     def _check_schedule(self) -> None:
-        _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), schedules.Masked(self.grid))
+        _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), self._everywhere)
         if info.sites.size / len(info.ranges) * STEPS < self.grid.size:
             raise ValueError(
                 f"the schedule {self.schedule.name} takes more than {STEPS} steps to a sweep, and each takes a pass "
@@ -223,8 +224,7 @@ class Run:
     def _swept(self, state: State) -> State:
         machine = self.machine
         evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
-        everywhere = schedules.Masked(self.grid)
-        for after, chosen in schedules.decisions(self.schedule, self._setting, state.schedule, everywhere):
+        for after, chosen in schedules.decisions(self.schedule, self._setting, state.schedule, self._everywhere):
             memory = after
             for one in chosen.apart(machine):
                 if one.sites.size:

@@ -29,6 +29,7 @@ from simdtex.ops.sites import among, stretches
 from simdtex.ops.square import TAIL, square_of
 from simdtex.ops.use import STEPS, FairUse, Regions
 from simdtex.schedules import Setting
+from simdtex.schedules.schedule import Lists
 
 WHOLE = 256
 """Number of candidates of a coarsest level up to which neighbourhoods cover much of the sample's layout."""
@@ -430,7 +431,7 @@ class Level:
     soft : (kinds, H, W) float32 array, optional
         The cost of each kind by soft data, without the penalties of the kinds.
     lists : dict
-        The schedule's lists of sites on the machine: each is copied there once.
+        The schedule's lists of sites on the machine: each is made, or copied there, once.
     """
 
     setting: Setting
@@ -443,7 +444,7 @@ class Level:
     evaluations: Array = None
     movable: Array | None = None
     soft: NDArray[np.float32] | None = None
-    lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
+    lists: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def number(self) -> int:
@@ -506,6 +507,7 @@ class Active:
     def __init__(self, level: Level, temperature: Array, free: bool) -> None:
         self._level = level
         self._plane = level.movable if free else temperature  # above 0 at active sites; None: all are active
+        self.kept = level.lists
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the mask of active sites, read back from the machine."""
@@ -519,16 +521,16 @@ class Active:
         grid = self._level.grid
         return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
-    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
         """Return the active sites of a list, found on the machine."""
-        known, machine = self._level.lists, self._level.machine
+        known, own = self.kept, self._level.machine
         if id(sites) not in known:
             begins, firsts = stretches(starts)
-            known[id(sites)] = sites, machine.put(sites), machine.put(begins), firsts
+            known[id(sites)] = sites, sites if machine else own.put(sites), own.put(begins), firsts
         _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
-        return among(machine, here, begins, firsts, self._plane)
+        return among(own, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:
