@@ -243,8 +243,9 @@ def _pictures(comparison: Comparison) -> list[Part]:
 
 
 def _scale(pictures: Sequence[NDArray[Any]]) -> int:
-    """Return the whole factor by which all pictures are enlarged: the smallest is about `SHOWN_SIDE` wide."""
-    return max(1, round(SHOWN_SIDE / min(max(one.shape[:2]) for one in pictures)))
+    """Return the whole factor for all pictures: the smallest is about `SHOWN_SIDE` wide, the largest at most twice."""
+    sides = [max(one.shape[:2]) for one in pictures]
+    return max(1, min(round(SHOWN_SIDE / min(sides)), 2 * SHOWN_SIDE // max(sides)))
 
 
 Points = tuple[list[float], list[float], list[int]]
