@@ -172,8 +172,8 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
 def maspar(sample: Path, output: Path, size: str | None, film: str, **options: Any) -> Task:
     """Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.
 
-    The output has the bytes of `simdtex synth --preset paper`. 64x64 pixels in colour from a sample of 64x64, with
-    seven levels, take about 20 s of a core with order 8, and 75 s with order 18; the time grows with the pixels of both.
+    The output has the bytes of `simdtex synth --preset paper`. 64x64 pixels in colour from a sample of 64x64
+    take about 20 s of a core with order 8, and 75 s with order 18; the time grows with the pixels of both.
     """
     from simdtex.io import image
     from simdtex.jobs.array import synthesize

@@ -244,7 +244,7 @@ def _pictures(comparison: Comparison) -> list[Part]:
 
 def _scale(pictures: Sequence[NDArray[Any]]) -> int:
     """Return the whole factor for all pictures: the smallest is about `SHOWN_SIDE` wide, the largest at most twice."""
-    sides = [max(one.shape[:2]) for one in pictures]
+    sides: list[int] = [max(one.shape[:2]) for one in pictures]
     return max(1, min(round(SHOWN_SIDE / min(sides)), 2 * SHOWN_SIDE // max(sides)))
 
 
