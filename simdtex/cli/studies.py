@@ -131,7 +131,7 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
     ("maspar gravel.png -o more.png --order 8 --size 64x64", "Make a small texture as in 1998."),
     ("maspar gravel.png -o more.png --array 4k --mapping hierarchical", "Use a smaller array, with blocks on each PE."),
     ("maspar gravel.png -o more.png --order 8 --size 64 --report page", "See the PEs at work, for several schedules."),
-    usual="output size order array report seed",
+    usual="output size order levels relaxation array film report seed quiet",
     of=None,
 )
 @click.argument("sample", type=READ)
