@@ -27,7 +27,9 @@ from simdtex.io.image import write
 from simdtex.io.tilesets import glsl
 from simdtex.model.corners import numbers, plane
 from simdtex.model.display import source_colours, temperature_colours
+from simdtex.model.lattice import Grid
 from simdtex.model.source_map import apply_source_map
+from simdtex.report import schedules
 from simdtex.report.sheet import contact_sheet, magnified
 
 HERE = Path(__file__).resolve().parent
@@ -253,6 +255,17 @@ def reservoir():
         sheet.convert("RGB").quantize(64).save(path, optimize=True)
 
 
+def array():
+    """A frame of the film of schedules of the array, for brick, and the pictures that they make."""
+    names, frame = ("coloring", "checkerboard", "synchronous", "raster"), 57
+    how = {"order": 8, "pixel": "source", "levels": 6, "edges": "reflect", "rng": 1}
+    pictures = {name: schedules.develop(brick(64), (64, 64), name, **how) for name in names}
+    shown = {name: schedules.steps(name, Grid.of((64, 64)), 8, 1) for name in names}
+    with PIL.Image.open(io.BytesIO(schedules.film(shown, pictures))) as film:
+        film.seek(frame)
+        film.convert("RGB").save(HERE / "_static" / "array.png", optimize=True)
+
+
 def tileset():
     """Planes of two sets, and beside them the packed picture and the shader of the page."""
     halves = [downscale_local_mean(picture[:256, :256], (2, 2)) for picture in (data.gravel(), data.grass())]
@@ -270,7 +283,7 @@ WISHES = (
     *(proportions, shares, methods, alpha, paper),
 )
 READERS = (materials, maps, geoscience, tileset)
-RUN = {"research": research, "reservoir": reservoir, "light": light}
+RUN = {"research": research, "reservoir": reservoir, "light": light, "array": array}
 
 
 def main():

@@ -45,6 +45,7 @@ def test_the_page_has_the_seconds_the_active_pes_and_a_film(tmp_path, monkeypatc
         assert word in page
     with PIL.Image.open(tmp_path / "page" / "film.png") as film:
         assert film.n_frames == 3
+        assert film.height > 2 * film.width / 3  # PEs above pictures
     results = json.loads((tmp_path / "page" / "results.json").read_text())
     sample = read(tmp_path / "sample.png").pixels
     how = {"array": "8x8", "order": 2, "rng": 3, "device": "reference", "full_output": True}
@@ -74,7 +75,7 @@ def test_a_film_shows_each_site_once_in_a_sweep(name):
 def test_a_film_lights_the_sites_of_a_step(monkeypatch):
     monkeypatch.setattr(report, "FRAMES", 2)
     steps = [np.eye(2, dtype=bool), ~np.eye(2, dtype=bool)]
-    with PIL.Image.open(io.BytesIO(report.film({"a": iter(steps)}))) as film:
+    with PIL.Image.open(io.BytesIO(report.film({"a": iter(steps)}, {"a": [np.full((1, 1), 9, np.uint8)] * 2}))) as film:
         frames = []
         for number in range(2):
             film.seek(number)
@@ -83,3 +84,4 @@ def test_a_film_lights_the_sites_of_a_step(monkeypatch):
     corners = [[frame[top + y * half, left + x * half].tolist() for y, x in ((0, 0), (0, 1))] for frame in frames]
     dark, done, lit = report.COLOURS.tolist()
     assert corners == [[lit, dark], [done, lit]]
+    assert (frames[1][top + report.SIDE + report.GAP :, left : left + report.SIDE][: report.SIDE] == 9).all()

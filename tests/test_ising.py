@@ -308,8 +308,10 @@ def test_schedules_have_tables_of_the_ising_model_and_a_section_of_the_report(tm
 
 
 def test_a_narrow_terminal_gets_whole_cells(capsys):
-    one = Finding("random-subset:0.25", False, 2.0, -1.74, 0.01, -1.745, 55, 0.911, 0.04, True)
+    one = Finding("random-subset:0.25", False, 2.0, -1.74, 0.01, -1.745, 55, 0.911, 0.04, True, 32)
     (table,) = ising_tables([one])
+    assert table.rows[0]["Verdict"] == "differs by 55 sigma"
+    assert replace(one, chains=7).verdict == "none, 7 of 8 chains"
     print_table(table, 80)
     shown = capsys.readouterr().out
     assert "…" not in shown and max(map(len, shown.splitlines())) <= 80

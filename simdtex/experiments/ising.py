@@ -324,6 +324,10 @@ LEVEL = 0.001
 """Probability that at least one result of a table of correct results differs."""
 
 
+ENOUGH = 8
+"""Chains that a verdict needs: of fewer, a deviation must be twice as many errors as of many to count."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """The result of a schedule at one temperature.
@@ -348,6 +352,8 @@ class Finding:
         0 if the sublattices are independent.
     differs : bool
         Whether the deviation counts.
+    chains : int
+        Their number, R.
     """
 
     schedule: str
@@ -360,10 +366,13 @@ class Finding:
     magnetisation: float
     neighbours: float
     differs: bool
+    chains: int
 
     @property
     def verdict(self) -> str:
-        """Whether the energy agrees, in words."""
+        """Whether the energy agrees, in words; of fewer than `ENOUGH` chains nothing is said."""
+        if self.chains < ENOUGH:
+            return f"none, {self.chains} of {ENOUGH} chains"
         return f"differs by {abs(self.sigmas):.0f} sigma" if self.differs else "agrees"
 
 
@@ -409,6 +418,7 @@ def _finding(run: Chains, t: int, least: float) -> Finding:
         magnetisation=float(np.abs(run.magnetisation[t]).mean()),
         neighbours=float(-energy / 2 - (run.even[t] * run.odd[t]).mean()),
         differs=abs(sigmas) > least,
+        chains=len(means),
     )
 
 

@@ -19,17 +19,19 @@ from numpy.typing import NDArray
 
 from simdtex import __version__, schedules
 from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
-from simdtex.experiments.ising import LEVEL, Chains, Finding, Spins
+from simdtex.experiments.ising import ENOUGH, LEVEL, Chains, Finding, Spins
 from simdtex.io.image import pillow_bytes, to_display
 from simdtex.jobs.array import Execution
+from simdtex.jobs.synthesis import synthesize
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.report.page import INK, Figure, Part, Section, legend, new_figure, styles, tidy, write_report
-from simdtex.report.sheet import TEXT, contact_sheet, magnified
+from simdtex.report.sheet import TEXT, contact_sheet, magnified, rgb
 from simdtex.report.tables import Table, duration_text, number_text, seconds_text, settings_table
+from simdtex.run import Progress
 from simdtex.schedules.schedule import Masked, Setting
 
-SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
+SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor to about this, pixels
 
 
 PERCENT = ("utilisation", "changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free")
@@ -229,14 +231,21 @@ def _pictures(comparison: Comparison) -> list[Part]:
 
     first = [("the sample", shown(comparison.sample))]
     first += [(_label(entry), shown(entry.runs[0].image)) for entry in comparison.entries]
-    sheet = contact_sheet(first, columns=min(4, len(first)), scale=max(1, SHOWN_SIDE // max(comparison.shape)))
+    scale = _scale([image for _, image in first])
+    sheet = contact_sheet(first, columns=min(3, len(first)), scale=scale)
     parts: list[Part] = [Figure("pictures.png", sheet, "The sample, and the output of each schedule with one seed.")]
     if len(comparison.seeds) > 1:
         turns = zip(*(entry.runs for entry in comparison.entries), strict=True)
         every = [(f"{run.schedule}, {run.seed}", shown(run.image)) for runs in turns for run in runs]
-        sheet = contact_sheet(every, columns=len(comparison.entries))
-        parts.append(Figure("seeds.png", sheet, "The outputs of all seeds, one seed a row."))
+        sheet = contact_sheet(every, columns=min(3, len(comparison.entries)), scale=scale)
+        parts.append(Figure("seeds.png", sheet, "The outputs of all seeds, seed by seed, in the same scale."))
     return parts
+
+
+def _scale(pictures: Sequence[NDArray[Any]]) -> int:
+    """Return the whole factor for all pictures: the smallest is about `SHOWN_SIDE` wide, the largest at most twice."""
+    sides: list[int] = [max(one.shape[:2]) for one in pictures]
+    return max(1, min(round(SHOWN_SIDE / min(sides)), 2 * SHOWN_SIDE // max(sides)))
 
 
 Points = tuple[list[float], list[float], list[int]]
@@ -294,12 +303,15 @@ ERRORS = (
     "Errors are one standard error of the chains' means. Sigma: deviation from the exact energy in errors. |m|: mean "
     "absolute magnetisation. Neighbours: correlation of neighbouring spins beyond the product of the magnetisations of "
     "their sublattices; 0 if even and odd sites are independent of one another. Differs: Student's t gives the "
-    f"deviation a probability below {LEVEL:g} over the number of comparisons. Agrees: it does not."
+    f"deviation a probability below {LEVEL:g} over the number of comparisons. Agrees: it does not. A verdict needs "
+    f"{ENOUGH} chains or more; --ising runs 32 at each temperature, whatever --seeds is."
 )
 
 
 def conclusion(found: Sequence[Finding]) -> list[str]:
     """Return a sentence each on the schedules that agree everywhere and on those that do not."""
+    if any(one.chains < ENOUGH for one in found):
+        return [f"No verdict: it needs {ENOUGH} chains or more at each temperature."]
     keeps = {one.schedule: one.independent for one in found}
     wrong = [name for name in keeps if any(one.differs for one in found if one.schedule == name)]
     right = [name for name in keeps if name not in wrong]
@@ -415,8 +427,8 @@ Steps = Iterator[NDArray[np.bool_]]
 FRAMES, PAUSE = 60, 200
 """The frames of a film, and the milliseconds between two."""
 
-SIDE, GAP = 200, 14
-"""The least side of a lattice in a film, and the space around it, pixels."""
+SIDE, GAP = 256, 14
+"""The side of a lattice in a film, about, and the space around it, pixels."""
 
 COLOURS = np.array([(34, 38, 43), (60, 92, 130), (255, 190, 60)], np.uint8)
 """The colours of a PE that waits, of one that has relaxed its site in this sweep, and of one that does so now."""
@@ -426,7 +438,10 @@ ACTIVE = (
     "The share of PEs that relax a site, step by step. The others wait under the mask: their sites have another colour "
     "or the temperature 0, or, at coarse levels, they have no site."
 )
-FILM = "PEs that relax a site now (light), and that have done so in this sweep (blue). A frame is a step."
+FILM = (
+    "Above: PEs that relax a site now (light), and that have done so in this sweep (blue); a frame is a step. Below: "
+    "the picture that simdtex synth makes with this schedule, from its start to its end; a frame is a 60th of each run."
+)
 WHY = (
     "The paper relaxes sites together only if none is a neighbour of another, equation (14), because a site must see "
     "the present values of its neighbours. coloring does so in as few steps as there are colours. raster keeps the "
@@ -440,19 +455,19 @@ def write_array(
     sample: NDArray[Any],
     made: NDArray[Any],
     run: Execution,
-    names: Sequence[str],
+    pictures: Mapping[str, Sequence[NDArray[Any]]],
     command: str = "",
 ) -> None:
-    """Write a page on an execution: its seconds, its active PEs, and a film of the schedules ``names``."""
+    """Write a page on an execution: its picture, seconds and active PEs, and a film of schedules and their pictures."""
     facts = run.statistics
     total = sum(sum(section.values()) for section in run.seconds.values())
     grid = Grid.of((made.shape[0], made.shape[1]))
-    moving = film({name: steps(name, grid, facts["options"]["order"], facts["seed"]) for name in names})
+    moving = film({name: steps(name, grid, facts["options"]["order"], facts["seed"]) for name in pictures}, pictures)
     lead = (
         f"{made.shape[1]} x {made.shape[0]} pixels on {facts['array']} PEs ({facts['mapping']}, {facts['layers']} "
         f"virtual layers): by the model a MasPar MP-1 would have taken {duration_text(total)}."
     )
-    seen = contact_sheet([("sample", sample), ("the picture", made)])
+    seen = contact_sheet([("sample", sample), ("the picture", made)], columns=2, scale=_scale([sample, made]))
     page = [
         Section("The picture", [Figure("pictures.png", seen, SHOWN)]),
         Section("Seconds of 1998", [section_table(run)]),
@@ -514,8 +529,20 @@ def steps(name: str, grid: Grid, order: int, seed: int) -> Steps:
             yield plane
 
 
-def film(shown: Mapping[str, Steps]) -> bytes:
-    """Return an animated PNG: the sites of each schedule side by side, a frame for each step."""
+def develop(sample: NDArray[Any], shape: tuple[int, int], schedule: str, **given: Any) -> list[NDArray[Any]]:
+    """Return `FRAMES` pictures of a run of the paper's preset with a schedule, at equal shares of the run."""
+    seen: list[NDArray[Any]] = []
+
+    def see(progress: Progress) -> None:
+        if progress.image is not None and progress.fraction * FRAMES >= len(seen) + 1:
+            seen.extend([progress.image()] * (int(progress.fraction * FRAMES) - len(seen)))
+
+    made = synthesize(sample, shape, preset="paper", schedule=schedule, callback=see, **given)
+    return [*seen[: FRAMES - 1], *[made] * (FRAMES - min(len(seen), FRAMES - 1))]
+
+
+def film(shown: Mapping[str, Steps], pictures: Mapping[str, Sequence[NDArray[Any]]]) -> bytes:
+    """Return an animated PNG: the sites of each schedule side by side, a frame for each step, above its picture."""
     font, frames = PIL.ImageFont.load_default(TEXT), []
     done: dict[str, Any] = dict.fromkeys(shown, False)
     for number in range(1, FRAMES + 1):
@@ -524,8 +551,9 @@ def film(shown: Mapping[str, Steps]) -> bytes:
             now = next(ahead)
             before = np.broadcast_to(done[name] & ~np.any(done[name] & now), now.shape)  # a site again: a new sweep
             done[name] = before | now
-            scale = max(1, SIDE // max(now.shape))
-            colours = magnified(COLOURS[np.where(now, 2, before.astype(int))], scale)
+            colours = magnified(COLOURS[np.where(now, 2, before.astype(int))], max(1, round(SIDE / max(now.shape))))
+            made = PIL.Image.fromarray(rgb(pictures[name][number - 1])).resize(colours.shape[1::-1], 0)  # nearest
+            colours = np.concatenate([colours, np.full_like(colours[:GAP], 255), np.array(made)])
             panels.append((f"{name}\n{np.count_nonzero(now):,} of {now.size:,} sites", colours))
         width = sum(len(one[0]) + GAP for _, one in panels) + GAP
         frame = PIL.Image.new("RGB", (width, len(panels[0][1]) + 4 * TEXT + 2 * GAP), "white")
