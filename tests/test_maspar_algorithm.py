@@ -18,22 +18,23 @@ from simdtex.ops.arithmetic import fma32
 from simdtex.ops.lcpdf import Choice, window
 from simdtex.schedules.schedule import neighbours_in
 
-ICM = {"relaxation": "icm", "levels": 2}  # the coarsest level draws
+DRAWN = {"relaxation": "gibbs", "pixel": "density", "free_sweeps": 0}
+MODE = {"pixel": "density", "levels": 2}  # the coarsest level draws
 
 CASES = {
     "of the array's size": ((12, 16), "12x16", {"order": 4}),
-    "smaller": ((7, 6), "16x16", {"order": 5, "levels": 2}),
-    "larger, sides no multiple": ((11, 13), "4x5", {"order": 2, "levels": 3}),
-    "larger, whole layers": ((12, 16), "4x8", {"order": 2, "boundary": "open"}),
-    "open, smaller": ((9, 10), "16x12", {"order": 4, "boundary": "open", "pixel": "source"}),
-    "colour": ((7, 12), "4x4", {"order": 2, "channels": 3}),
-    "colours of the sample": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", "xi": -0.5}),
-    "real numbers": ((8, 7), "8x4", {"order": 2, "dtype": np.float32, "bandwidth": 0.3}),
-    "nearest of ties": ((11, 9), "4x8", {"order": 2, "dtype": bool, "pixel": "source", **ICM}),
-    "nearest colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "pixel": "source", **ICM}),
-    "mode": ((11, 9), "4x8", {"order": 2, "dtype": bool, **ICM}),
-    "mode of colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "bandwidth": 0.3, **ICM}),
-    "rows of several units of noise": ((5, 6), "4x4", {"order": 2, "levels": 2, "size": (9, 44), "phases": 64}),
+    "smaller": ((7, 6), "16x16", {"order": 5, "levels": 2, **DRAWN}),
+    "larger, sides no multiple": ((11, 13), "4x5", {"order": 2, "free_sites": "all", "free_sweeps": 2}),
+    "larger, whole layers": ((12, 16), "4x8", {"order": 2, "boundary": "open", **DRAWN}),
+    "open, smaller": ((9, 10), "16x12", {"order": 4, "boundary": "open", "relaxation": "gibbs"}),
+    "colour": ((7, 12), "4x4", {"order": 2, "channels": 3, **DRAWN}),
+    "colours of the sample": ((8, 8), "8x8", {"order": 1, "channels": 3, "relaxation": "gibbs", "xi": -0.5}),
+    "real numbers": ((8, 7), "8x4", {"order": 2, "dtype": np.float32, "bandwidth": 0.3, **DRAWN}),
+    "nearest of ties": ((11, 9), "4x8", {"order": 2, "dtype": bool, "levels": 2}),
+    "nearest colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "levels": 2}),
+    "mode": ((11, 9), "4x8", {"order": 2, "dtype": bool, **MODE}),
+    "mode of colours": ((8, 8), "8x8", {"order": 1, "channels": 3, "bandwidth": 0.3, **MODE}),
+    "rows of several units of noise": ((5, 6), "4x4", {"order": 2, "levels": 2, "size": (9, 44), "phases": 64} | DRAWN),
     "one pixel": ((1, 1), "2x2", {"order": 1}),
 }
 
@@ -128,7 +129,7 @@ def test_of_tied_modes_the_lowest_is_taken(machine, make):
     """The first step of level 0 relaxes sites without a certain neighbour: all candidates weigh alike."""
     sample = np.arange(64).reshape(8, 8) % 2 * 255  # as many of the one grey level as of the other
     chosen = {"preset": "paper"} if make is simdtex.synthesize else {"array": "8x8"}
-    chosen |= {"order": 1, "xi": -4.0, "bandwidth": 1e-3, "rng": 1, **ICM}
+    chosen |= {"order": 1, "xi": -4.0, "bandwidth": 1e-3, "rng": 1, **MODE}
     for device in (REFERENCE, machine):
         assert not make(sample.astype(np.uint8), (8, 8), device=device, **chosen)[1::2, 1::2].any()
 
@@ -180,7 +181,7 @@ def test_progress_is_told_step_by_step():
     ("options", "message"),
     [
         ({"coherence": 1.0}, "does not execute coherence=1.0; leave it out, or use simdtex.synthesize"),
-        ({**ICM, "dtype": np.uint16, "memory": "16K"}, r"\d+ bytes of each PE for \d+ grey levels, and a PE has 16384"),
+        ({**MODE, "dtype": np.uint16, "memory": "16K"}, r"\d+ bytes of each PE for \d+ grey levels, and a PE has 163"),
         ({"schedule": "raster"}, "does not execute schedule='raster'"),
         ({"memory": "32K"}, "unknown memory '32K'; choose one of: 16K, 64K"),
         ({"mapping": "round"}, "choose one of: cut-and-stack, hierarchical"),

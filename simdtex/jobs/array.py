@@ -101,8 +101,8 @@ def synthesize(
     full_output : bool
         Return counts, modelled seconds and the active PEs of each step too.
     **options
-        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi``, ``relaxation``
-        and ``pixel`` of `simdtex.methods.mrf.Options`; their defaults are the paper's.
+        ``order``, ``levels``, ``overview``, ``boundary``, ``edges``, ``phases``, ``bandwidth``, ``xi``, ``relaxation``,
+        ``pixel``, ``free_sweeps`` and ``free_sites`` of `simdtex.methods.mrf.Options`; their defaults are the paper's.
 
     Returns
     -------
@@ -165,7 +165,8 @@ def level_of(run: Lattices, number: int) -> Level:
     runs = min(places.spacing // places.step, cols)  # as in simdtex.ops.square.Square
     row, col = np.divmod(np.arange(places.positions.size, dtype=np.int32), cols)
     noise = (row * runs + col % runs) * -(-cols // (runs * LANES)) * LANES + col // runs
-    return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise)
+    free = run.free_sweeps(number), run.kept_only
+    return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
 
 
 def _run(

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-EXECUTED = ("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel")
+EXECUTED = (
+    *("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel"),
+    *("free_sweeps", "free_sites"),
+)
 """The options that `synthesize` executes; all others have the paper's values."""
 
 

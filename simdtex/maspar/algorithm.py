@@ -30,7 +30,8 @@ class Level(NamedTuple):
 
     ``number`` is l, ``grid`` S^l, and ``choice`` the Gaussian of (7) and what is drawn from it; ``source`` (n,) are the
     pixel indices of the candidates, ``own`` (C, n) their values, ``sample`` (N, C, n) those of their neighbours, and
-    ``noise`` (n,) int32 the numbers of their Gumbel noise: 16 times the unit, and the lane (kernels/common/gumbel.h).
+    ``noise`` (n,) int32 the numbers of their Gumbel noise: 16 times the unit, and the lane (kernels/common/gumbel.h);
+    ``free``, the number of sweeps after the equilibrium, which relax all sites or those that are ``kept``.
     """
 
     number: int
@@ -40,6 +41,8 @@ class Level(NamedTuple):
     own: NDArray[np.float32]
     sample: NDArray[np.float32]
     noise: NDArray[np.int32]
+    free: int = 0
+    kept: bool = False
 
 
 class Problem(NamedTuple):
@@ -85,7 +88,7 @@ class Program:
             self.temperature.set(1024)  # 5
 
     def relax(self, level: Level) -> Iterator[tuple[int, NDArray[np.bool_]]]:
-        """Relax a level until its equilibrium; after each step, yield its sweep and the (layers, PEs) that relaxed.
+        """Relax a level until its end; after each step, yield its sweep and the (layers, PEs) that relaxed.
 
         Sites of the level above have t = 0, since that is its equilibrium; all others have t = 1 yet.
         """
@@ -94,14 +97,18 @@ class Program:
             with mp1.section("colouring"):
                 walk = Walk(mp1, level.grid, self.problem.offsets)  # 3, 4, 6.1
                 color, colors = coloring(mp1, walk, self.problem.order, seed)
-            relaxation = Pass(self, level, walk)
+            relaxation, free = Pass(self, level, walk), level.free
             for sweep in count(1):
                 with mp1.section("schedule"), mp1.where(walk.sites):
-                    if not mp1.any(t > 0):  # 6.2
-                        break
+                    active = t > 0
+                    if not mp1.any(active):  # 6.2
+                        free -= 1
+                        active = (walk.row | walk.col) % 2 == 0 if level.kept else walk.row >= 0
+                if free < 0:
+                    break
                 bits = random.draw4(seed, level.number, sweep, np.arange(colors), random.SCHEDULE)[0]
                 for now in np.argsort(bits, kind="stable").tolist():  # 6.2.1
-                    with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & (t > 0)) as chosen:
+                    with mp1.section("schedule"), mp1.where(walk.sites), mp1.where((color == now) & active) as chosen:
                         mp1.count(reduction=1)  # which layers have a site to relax
                     if chosen.layers:
                         relaxation.relax(chosen, sweep)  # 6.2.2
