@@ -70,11 +70,7 @@
 #define NOISY 8    // neighbours before the noise of a draw is looked at, since it costs as much as many
 #define BUCKETS 8  // of confidence, the most certain neighbours first
 #define SLACK(terms) (1.0f + ((terms) + 8) * 0x1p-22f) // what a sum in another order may exceed this one by
-#if V == 1
-#define BITS(x) as_int(x)
-#else
-#define BITS(x) JOIN(as_int, V)(x)
-#endif
+#define BITS(x) WIDE(as_int)(x)
 
 // Units of candidates to a run: common/gumbel.h.
 #define WIDTH(g) (((g).cols + (g).runs * LANES - 1) / ((g).runs * LANES))
@@ -336,16 +332,28 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs, slots = runs * wide;
     const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
+    int slot = 0, n = 0, run = 0, line = 0; // slot n of a run, and the first candidate in its row
+    __global const float *begin = levels + at[0];
     for (int b = 0; b < slots; b += ITEMS * STEP) {
         __global const float *y[STEP];
         vec d[STEP];
+        const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;
+        const int limit = as_int(allowed) + (line < best_at); // of equals the first
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
-            const int n = min(SLOT(q), slots - 1), run = n / wide;
-            y[q] = levels + at[min(run / g.runs * g.cols + run % g.runs, g.candidates - 1)] + n % wide * V;
+            const int next = min(SLOT(q), slots - 1);
+            n += next - slot;
+            slot = next;
+            if (n >= wide) { // a division takes as long as several neighbours
+                run += n / wide;
+                n %= wide;
+                line = run / g.runs * g.cols;
+                begin = levels + at[min(line + run % g.runs, g.candidates - 1)];
+            }
+            y[q] = begin + n * V;
             d[q] = 0.0f; // and what costs nothing to look up
             if (g.runs == 1) {
-                const int p = run * g.cols + n % wide * V;
+                const int p = line + n * V;
                 for (int c = 0; c < WAVES; ++c) {
                     const vec e = ((float)phases[c * area_ + site] - LOAD(waves + c * listed + p)) * phase_weight;
                     d[q] = fma(e, e, d[q]);
@@ -353,8 +361,6 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                 d[q] = LOAD(penalty + p) + fmax(d[q] - tolerance, (vec)0.0f);
             }
         }
-        const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;
-        const int limit = as_int(allowed) + (b / wide / g.runs * g.cols < best_at); // of equals the first
 #define ALONE (V < LANES && ITEMS == 1) // four slots of an item share no draw
 #define LESS_NOISE(k_)                                                                                                 \
     if (g.spread > 0.0f && k_)                                                                                         \
@@ -386,15 +392,15 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                 }
             }
             k += CHECK;
-            vec low = d[0];
+            ivec low = BITS(d[0]);
 #pragma unroll
             for (int q = 1; q < STEP; ++q)
-                low = fmin(low, d[q]);
-            alive = ANY(BITS(low) < limit);
+                low = min(low, BITS(d[q]));
+            alive = least(low) < limit;
         }
         looked += min(k, terms);
         for (int q = 0; alive && q < STEP; ++q) {
-            if (!ANY(BITS(d[q]) < limit))
+            if (least(BITS(d[q])) >= limit)
                 continue;
             const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
             int bits[V];

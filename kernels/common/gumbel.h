@@ -10,7 +10,6 @@
 
 #define MOST_GUMBEL 23.0f // G_p <= 33 log 2
 typedef WIDE(uint) uvec;
-typedef WIDE(int) ivec;
 
 // -G = log(-log((bits + 1/2) 2^-32)). Near u = 1, log u is computed from 1 - u.
 static inline vec minus_gumbel(const uvec bits)

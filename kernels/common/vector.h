@@ -13,13 +13,31 @@
 #define WIDE(name) name
 #define LOAD(p) (*(p))
 #define STORE(x, p) (*(p) = (x))
-#define ANY(x) (x)
 #else
 #define WIDE(name) JOIN(name, V)
 #define LOAD(p) JOIN(vload, V)(0, p)
 #define STORE(x, p) JOIN(vstore, V)(x, 0, p)
-#define ANY(x) any(x)
 #endif
 typedef WIDE(float) vec;
+typedef WIDE(int) ivec;
+
+// The least of V integers; PoCL's any() is a branch for each.
+static inline int least(const ivec a)
+{
+#if V == 1
+    return a;
+#else
+#if V == 16
+    const int8 half_ = min(a.lo, a.hi);
+    const int4 b = min(half_.lo, half_.hi);
+#elif V == 8
+    const int4 b = min(a.lo, a.hi);
+#else
+    const int4 b = a;
+#endif
+    const int2 c = min(b.lo, b.hi);
+    return min(c.x, c.y);
+#endif
+}
 
 #endif
