@@ -332,6 +332,8 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs, slots = runs * wide;
     const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
+    volatile int none = 0; // read in the loop, it keeps compilers from drawing before it
+    int late = 0, asked = 0; // blocks that looked at neighbours first, and those of them that asked for noise
     int slot = 0, n = 0, run = 0, line = 0; // slot n of a run, and the first candidate in its row
     __global const float *begin = levels + at[0];
     for (int b = 0; b < slots; b += ITEMS * STEP) {
@@ -362,22 +364,29 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
             }
         }
 #define ALONE (V < LANES && ITEMS == 1) // four slots of an item share no draw
-#define LESS_NOISE(k_)                                                                                                 \
-    if (g.spread > 0.0f && k_)                                                                                         \
+#define STILL_BELOW                                                                                                    \
     {                                                                                                                  \
-        uvec word[4];                                                                                                  \
-        _Pragma("unroll") for (int q = 0; q < STEP; ++q)                                                               \
-        {                                                                                                              \
-            const int unit = SLOT(q) / (LANES / V);                                                                    \
-            if (ALONE || q % 4 == 0)                                                                                   \
-                words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V), word);                \
-            d[q] += g.spread * (MOST_GUMBEL + minus_gumbel(word[ALONE || STEP < 4 ? unit % 4 : q % 4]));               \
-        }                                                                                                              \
+        ivec low = BITS(d[0]);                                                                                         \
+        _Pragma("unroll") for (int q = 1; q < STEP; ++q) low = min(low, BITS(d[q]));                                   \
+        alive = least(low) < limit;                                                                                    \
     }
+        const int noisy = m <= NOISY || 2 * asked > late ? 0 : NOISY;
         int k = 0, alive = SLOT(0) < slots;
-        LESS_NOISE(m <= NOISY)
-        while (alive && k < m) {
-            LESS_NOISE(k == NOISY)
+        while (alive) {
+            if (g.spread > 0.0f && k == noisy) {
+                uvec word[4];
+#pragma unroll
+                for (int q = 0; q < STEP; ++q) {
+                    const int unit = SLOT(q) / (LANES / V);
+                    if (ALONE || q % 4 == 0)
+                        words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V) + none, word);
+                    d[q] = fma(g.spread, least_noise(word[ALONE || STEP < 4 ? unit % 4 : q % 4]), d[q]);
+                }
+                asked += noisy > 0;
+                STILL_BELOW
+            }
+            if (!alive || k >= m)
+                break;
 #pragma unroll
             for (int n = 0; n < CHECK; ++n) {
                 const int o = to[k + n];
@@ -392,22 +401,21 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                 }
             }
             k += CHECK;
-            ivec low = BITS(d[0]);
-#pragma unroll
-            for (int q = 1; q < STEP; ++q)
-                low = min(low, BITS(d[q]));
-            alive = least(low) < limit;
+            STILL_BELOW
         }
+        late += noisy > 0;
         looked += min(k, terms);
-        for (int q = 0; alive && q < STEP; ++q) {
-            if (least(BITS(d[q])) >= limit)
-                continue;
-            const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
-            int bits[V];
-            STORE(BITS(d[q]), bits);
-            for (int v = 0; v < V; ++v) {
-                const int p = end - g.cols + run % g.runs + (n % wide * V + v) * g.runs;
-                if (bits[v] < limit && p < end)
+        if (alive) {
+            int bits[STEP * V];
+#pragma unroll
+            for (int q = 0; q < STEP; ++q)
+                STORE(BITS(d[q]), bits + q * V);
+            for (int v = 0; v < STEP * V; ++v) {
+                if (bits[v] >= limit)
+                    continue;
+                const int n = min(SLOT(v / V), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
+                const int p = end - g.cols + run % g.runs + (n % wide * V + v % V) * g.runs;
+                if (p < end)
                     SURVIVES(p)
             }
         }

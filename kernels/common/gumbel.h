@@ -26,6 +26,13 @@ static inline vec minus_gumbel(const uvec bits)
     return LOG_SUM(vec, f, s);
 }
 
+// MOST_GUMBEL - G or less by up to 0.4, and not below 0: -G > log(1 - u), and the bits of a float say its logarithm, or less.
+static inline vec least_noise(const uvec bits)
+{
+    const vec rest = fma(WIDE(convert_float)(WIDE(as_int)(~bits >> 1)), (vec)0x1p-31f, (vec)0x1p-33f);
+    return fma(WIDE(convert_float)(WIDE(as_int)(rest)), (vec)0x1.62e43p-24f, (vec)-65.03f);
+}
+
 // Candidates fall into units of 16 in a row of the sample. Lane n of four units in a row takes the four words of a draw.
 #define LANES 16
 #define DRAW_OF(unit, lane) ((uint)((unit) / 4 * LANES + (lane)))
