@@ -39,12 +39,27 @@ static inline vec least_noise(const uvec bits)
 
 __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
+#if V == 1
+#define HALVES_OF HALVES
+#else
+#if V == 16
+#define PAIRS(x) as_ulong8(x)
+#elif V == 8
+#define PAIRS(x) as_ulong4(x)
+#else
+#define PAIRS(x) as_ulong2(x)
+#endif
+#define HALVES_OF(high, low, x, by) /* of every other number, and of those between them */                            \
+    high = WIDE(as_uint)((PAIRS(x) & 0xfffffffful) * (by) >> 32 | ((PAIRS(x) >> 32) * (by) & 0xffffffff00000000ul));  \
+    low = (x) * (uint)(by);
+#endif
+
 // The words of the draws `first`, `first` + 1, ... side by side.
 static inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
                             __private uvec *word)
 {
     uvec a = (uvec)(uint)place, b = (uvec)turn, c = (uvec)WHAT_OF(level, place, PURPOSE_GUMBEL), d = LOAD(lanes_) + first;
-    PHILOX(a, b, c, d, KEY_OF(seed), WIDE(ulong), WIDE(convert_ulong), WIDE(convert_uint))
+    PHILOX(uvec, a, b, c, d, KEY_OF(seed), HALVES_OF)
     word[0] = a;
     word[1] = b;
     word[2] = c;
