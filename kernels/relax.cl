@@ -67,7 +67,7 @@
 #define STEP 4 // vectors of candidates in registers together
 #endif
 #define CHECK 4    // neighbours between two looks at the bound
-#define NOISY 8    // neighbours before the noise of a draw is looked at, since it costs as much as many
+#define NOISY 8    // neighbours that are looked at before the noise of a draw, unless most blocks need it
 #define BUCKETS 8  // of confidence, the most certain neighbours first
 #define SLACK(terms) (1.0f + ((terms) + 8) * 0x1p-22f) // what a sum in another order may exceed this one by
 #define BITS(x) WIDE(as_int)(x)
@@ -333,8 +333,8 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
     volatile int none = 0; // read in the loop, it keeps compilers from drawing before it
-    int late = 0, asked = 0; // blocks that looked at neighbours first, and those of them that asked for noise
-    int slot = 0, n = 0, run = 0, line = 0; // slot n of a run, and the first candidate in its row
+    int late = 0, asked = 0;                // blocks that looked at neighbours first, and those of them that needed noise
+    int slot = 0, n = 0, run = 0, line = 0; // a slot, which is slot n of a run, and the first candidate in its row
     __global const float *begin = levels + at[0];
     for (int b = 0; b < slots; b += ITEMS * STEP) {
         __global const float *y[STEP];
@@ -364,16 +364,10 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
             }
         }
 #define ALONE (V < LANES && ITEMS == 1) // four slots of an item share no draw
-#define STILL_BELOW                                                                                                    \
-    {                                                                                                                  \
-        ivec low = BITS(d[0]);                                                                                         \
-        _Pragma("unroll") for (int q = 1; q < STEP; ++q) low = min(low, BITS(d[q]));                                   \
-        alive = least(low) < limit;                                                                                    \
-    }
-        const int noisy = m <= NOISY || 2 * asked > late ? 0 : NOISY;
-        int k = 0, alive = SLOT(0) < slots;
-        while (alive) {
-            if (g.spread > 0.0f && k == noisy) {
+        const int wait = m <= NOISY || 2 * asked > late ? 0 : NOISY;
+        int k = 0, alive = SLOT(0) < slots, noisy = g.spread > 0.0f ? wait : -1;
+        while (alive && (k < m || k == noisy)) {
+            if (k == noisy) {
                 uvec word[4];
 #pragma unroll
                 for (int q = 0; q < STEP; ++q) {
@@ -382,28 +376,31 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                         words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V) + none, word);
                     d[q] = fma(g.spread, least_noise(word[ALONE || STEP < 4 ? unit % 4 : q % 4]), d[q]);
                 }
-                asked += noisy > 0;
-                STILL_BELOW
-            }
-            if (!alive || k >= m)
-                break;
+                noisy = -1;
+            } else {
 #pragma unroll
-            for (int n = 0; n < CHECK; ++n) {
-                const int o = to[k + n];
+                for (int n = 0; n < CHECK; ++n) {
+                    const int o = to[k + n];
 #pragma unroll
-                for (int c = 0; c < C; ++c) {
-                    const vec uc = tu[(k + n) * CONFIDENCES + CONFIDENT(c)], xuc = txu[(k + n) * C + c];
+                    for (int c = 0; c < C; ++c) {
+                        const vec uc = tu[(k + n) * CONFIDENCES + CONFIDENT(c)], xuc = txu[(k + n) * C + c];
 #pragma unroll
-                    for (int q = 0; q < STEP; ++q) {
-                        const vec e = GAP(LOAD(y[q] + c * g.plane + o), uc, xuc);
-                        d[q] = fma(e, e, d[q]);
+                        for (int q = 0; q < STEP; ++q) {
+                            const vec e = GAP(LOAD(y[q] + c * g.plane + o), uc, xuc);
+                            d[q] = fma(e, e, d[q]);
+                        }
                     }
                 }
+                k += CHECK;
             }
-            k += CHECK;
-            STILL_BELOW
+            ivec low = BITS(d[0]);
+#pragma unroll
+            for (int q = 1; q < STEP; ++q)
+                low = min(low, BITS(d[q]));
+            alive = least(low) < limit;
         }
-        late += noisy > 0;
+        late += wait > 0;
+        asked += wait > 0 && noisy < 0;
         looked += min(k, terms);
         if (alive) {
             int bits[STEP * V];

@@ -26,7 +26,8 @@ static inline vec minus_gumbel(const uvec bits)
     return LOG_SUM(vec, f, s);
 }
 
-// MOST_GUMBEL - G or less by up to 0.4, and not below 0: -G > log(1 - u), and the bits of a float say its logarithm, or less.
+// At most MOST_GUMBEL - G, little less where G > 0, and at least 0, without a logarithm: -G > log(1 - u), and the bits of
+// a float are a piecewise linear function below its logarithm.
 static inline vec least_noise(const uvec bits)
 {
     const vec rest = fma(WIDE(convert_float)(WIDE(as_int)(~bits >> 1)), (vec)0x1p-31f, (vec)0x1p-33f);
