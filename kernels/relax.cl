@@ -332,30 +332,17 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs, slots = runs * wide;
     const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
-    volatile int none = 0; // read in the loop, it keeps compilers from drawing before it
-    int late = 0, asked = 0;                // blocks that looked at neighbours first, and those of them that needed noise
-    int slot = 0, n = 0, run = 0, line = 0; // a slot, which is slot n of a run, and the first candidate in its row
-    __global const float *begin = levels + at[0];
+    int late = 0, asked = 0; // blocks that looked at neighbours first, and those of them that needed noise
     for (int b = 0; b < slots; b += ITEMS * STEP) {
         __global const float *y[STEP];
         vec d[STEP];
-        const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;
-        const int limit = as_int(allowed) + (line < best_at); // of equals the first
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
-            const int next = min(SLOT(q), slots - 1);
-            n += next - slot;
-            slot = next;
-            if (n >= wide) { // a division takes as long as several neighbours
-                run += n / wide;
-                n %= wide;
-                line = run / g.runs * g.cols;
-                begin = levels + at[min(line + run % g.runs, g.candidates - 1)];
-            }
-            y[q] = begin + n * V;
+            const int n = min(SLOT(q), slots - 1), run = n / wide;
+            y[q] = levels + at[min(run / g.runs * g.cols + run % g.runs, g.candidates - 1)] + n % wide * V;
             d[q] = 0.0f; // and what costs nothing to look up
             if (g.runs == 1) {
-                const int p = line + n * V;
+                const int p = run * g.cols + n % wide * V;
                 for (int c = 0; c < WAVES; ++c) {
                     const vec e = ((float)phases[c * area_ + site] - LOAD(waves + c * listed + p)) * phase_weight;
                     d[q] = fma(e, e, d[q]);
@@ -363,56 +350,58 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                 d[q] = LOAD(penalty + p) + fmax(d[q] - tolerance, (vec)0.0f);
             }
         }
+        const float allowed = (best + most + (fabs(best) + most) * 0x1p-21f) * slack;
+        const int limit = as_int(allowed) + (b / wide / g.runs * g.cols < best_at); // of equals the first
 #define ALONE (V < LANES && ITEMS == 1) // four slots of an item share no draw
+#define LESS_NOISE(k_)                                                                                                 \
+    if (g.spread > 0.0f && k_)                                                                                         \
+    {                                                                                                                  \
+        uvec word[4];                                                                                                  \
+        _Pragma("unroll") for (int q = 0; q < STEP; ++q)                                                               \
+        {                                                                                                              \
+            const int unit = SLOT(q) / (LANES / V);                                                                    \
+            if (ALONE || q % 4 == 0)                                                                                   \
+                words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V), word);                \
+            d[q] = fma(g.spread, least_noise(word[ALONE || STEP < 4 ? unit % 4 : q % 4]), d[q]);                      \
+        }                                                                                                              \
+    }
+        int k = 0, alive = SLOT(0) < slots;
         const int wait = m <= NOISY || 2 * asked > late ? 0 : NOISY;
-        int k = 0, alive = SLOT(0) < slots, noisy = g.spread > 0.0f ? wait : -1;
-        while (alive && (k < m || k == noisy)) {
-            if (k == noisy) {
-                uvec word[4];
+        LESS_NOISE(!wait)
+        while (alive && k < m) {
+            LESS_NOISE(wait && k == wait)
 #pragma unroll
-                for (int q = 0; q < STEP; ++q) {
-                    const int unit = SLOT(q) / (LANES / V);
-                    if (ALONE || q % 4 == 0)
-                        words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V) + none, word);
-                    d[q] = fma(g.spread, least_noise(word[ALONE || STEP < 4 ? unit % 4 : q % 4]), d[q]);
-                }
-                noisy = -1;
-            } else {
+            for (int n = 0; n < CHECK; ++n) {
+                const int o = to[k + n];
 #pragma unroll
-                for (int n = 0; n < CHECK; ++n) {
-                    const int o = to[k + n];
+                for (int c = 0; c < C; ++c) {
+                    const vec uc = tu[(k + n) * CONFIDENCES + CONFIDENT(c)], xuc = txu[(k + n) * C + c];
 #pragma unroll
-                    for (int c = 0; c < C; ++c) {
-                        const vec uc = tu[(k + n) * CONFIDENCES + CONFIDENT(c)], xuc = txu[(k + n) * C + c];
-#pragma unroll
-                        for (int q = 0; q < STEP; ++q) {
-                            const vec e = GAP(LOAD(y[q] + c * g.plane + o), uc, xuc);
-                            d[q] = fma(e, e, d[q]);
-                        }
+                    for (int q = 0; q < STEP; ++q) {
+                        const vec e = GAP(LOAD(y[q] + c * g.plane + o), uc, xuc);
+                        d[q] = fma(e, e, d[q]);
                     }
                 }
-                k += CHECK;
             }
+            k += CHECK;
             ivec low = BITS(d[0]);
 #pragma unroll
             for (int q = 1; q < STEP; ++q)
                 low = min(low, BITS(d[q]));
             alive = least(low) < limit;
         }
-        late += wait > 0;
-        asked += wait > 0 && noisy < 0;
         looked += min(k, terms);
-        if (alive) {
-            int bits[STEP * V];
-#pragma unroll
-            for (int q = 0; q < STEP; ++q)
-                STORE(BITS(d[q]), bits + q * V);
-            for (int v = 0; v < STEP * V; ++v) {
-                if (bits[v] >= limit)
-                    continue;
-                const int n = min(SLOT(v / V), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
-                const int p = end - g.cols + run % g.runs + (n % wide * V + v % V) * g.runs;
-                if (p < end)
+        late += wait > 0;
+        asked += wait && k > wait;
+        for (int q = 0; alive && q < STEP; ++q) {
+            if (least(BITS(d[q])) >= limit)
+                continue;
+            const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
+            int bits[V];
+            STORE(BITS(d[q]), bits);
+            for (int v = 0; v < V; ++v) {
+                const int p = end - g.cols + run % g.runs + (n % wide * V + v) * g.runs;
+                if (bits[v] < limit && p < end)
                     SURVIVES(p)
             }
         }

@@ -55,9 +55,10 @@ __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 1
     low = (x) * (uint)(by);
 #endif
 
-// The words of the draws `first`, `first` + 1, ... side by side.
-static inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
-                            __private uvec *word)
+// The words of the draws `first`, `first` + 1, ... side by side. A call, since compilers would draw before a loop that
+// rarely does, or keep its sums in memory.
+static __attribute__((noinline)) void words_of(const ulong seed, const uint level, const uint turn, const ulong place,
+                                               const uint first, __private uvec *word)
 {
     uvec a = (uvec)(uint)place, b = (uvec)turn, c = (uvec)WHAT_OF(level, place, PURPOSE_GUMBEL), d = LOAD(lanes_) + first;
     PHILOX(uvec, a, b, c, d, KEY_OF(seed), HALVES_OF)
