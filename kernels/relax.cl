@@ -388,13 +388,13 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
 #pragma unroll
             for (int q = 1; q < STEP; ++q)
                 low = min(low, BITS(d[q]));
-            alive = least(low) < limit;
+            alive = LEAST(low) < limit;
         }
         looked += min(k, terms);
         late += wait > 0;
         asked += wait && k > wait;
         for (int q = 0; alive && q < STEP; ++q) {
-            if (least(BITS(d[q])) >= limit)
+            if (LEAST(BITS(d[q])) >= limit)
                 continue;
             const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
             int bits[V];

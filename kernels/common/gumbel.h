@@ -40,17 +40,14 @@ static inline vec least_noise(const uvec bits)
 
 __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
+#define PAIRS4(x) as_ulong2(x)
+#define PAIRS8(x) as_ulong4(x)
+#define PAIRS16(x) as_ulong8(x)
+#define PAIRS(x) JOIN(PAIRS, V)(x)
 #if V == 1
 #define HALVES_OF HALVES
-#else
-#if V == 16
-#define PAIRS(x) as_ulong8(x)
-#elif V == 8
-#define PAIRS(x) as_ulong4(x)
-#else
-#define PAIRS(x) as_ulong2(x)
-#endif
-#define HALVES_OF(high, low, x, by) /* of every other number, and of those between them */                            \
+#else // of every other number, and of those between them
+#define HALVES_OF(high, low, x, by)                                                                                    \
     high = WIDE(as_uint)((PAIRS(x) & 0xfffffffful) * (by) >> 32 | ((PAIRS(x) >> 32) * (by) & 0xffffffff00000000ul));  \
     low = (x) * (uint)(by);
 #endif

@@ -26,8 +26,7 @@
 #define HALVES(high, low, x, by)                                                                                       \
     {                                                                                                                  \
         const ulong both_ = (ulong)(x) * (by); /* PoCL's mul_hi is in halves */                                        \
-        high = (uint)(both_ >> 32);                                                                                    \
-        low = (uint)both_;                                                                                             \
+        high = (uint)(both_ >> 32), low = (uint)both_;                                                                 \
     }
 
 // What a draw is for; the same numbers stand in simdtex/random.py.

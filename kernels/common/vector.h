@@ -22,22 +22,11 @@ typedef WIDE(float) vec;
 typedef WIDE(int) ivec;
 
 // The least of V integers; PoCL's any() is a branch for each.
-static inline int least(const ivec a)
-{
-#if V == 1
-    return a;
-#else
-#if V == 16
-    const int8 half_ = min(a.lo, a.hi);
-    const int4 b = min(half_.lo, half_.hi);
-#elif V == 8
-    const int4 b = min(a.lo, a.hi);
-#else
-    const int4 b = a;
-#endif
-    const int2 c = min(b.lo, b.hi);
-    return min(c.x, c.y);
-#endif
-}
+#define LEAST1(a) (a)
+#define LEAST2(a) min((a).x, (a).y)
+#define LEAST4(a) LEAST2(min((a).lo, (a).hi))
+#define LEAST8(a) LEAST4(min((a).lo, (a).hi))
+#define LEAST16(a) LEAST8(min((a).lo, (a).hi))
+#define LEAST(a) JOIN(LEAST, V)(a)
 
 #endif
