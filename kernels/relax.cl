@@ -67,14 +67,10 @@
 #define STEP 4 // vectors of candidates in registers together
 #endif
 #define CHECK 4    // neighbours between two looks at the bound
-#define NOISY 8    // neighbours before the noise of a draw is looked at, since it costs as much as many
+#define NOISY 8    // neighbours that are looked at before the noise of a draw, unless most blocks need it
 #define BUCKETS 8  // of confidence, the most certain neighbours first
 #define SLACK(terms) (1.0f + ((terms) + 8) * 0x1p-22f) // what a sum in another order may exceed this one by
-#if V == 1
-#define BITS(x) as_int(x)
-#else
-#define BITS(x) JOIN(as_int, V)(x)
-#endif
+#define BITS(x) WIDE(as_int)(x)
 
 // Units of candidates to a run: common/gumbel.h.
 #define WIDTH(g) (((g).cols + (g).runs * LANES - 1) / ((g).runs * LANES))
@@ -336,6 +332,7 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     const int wide = WIDTH(g) * (LANES / V), runs = g.candidates / g.cols * g.runs, slots = runs * wide;
     const int blocks = (slots + STEP - 1) / STEP;
     ulong looked = 0;
+    int late = 0, asked = 0; // blocks that looked at neighbours first, and those of them that needed noise
     for (int b = 0; b < slots; b += ITEMS * STEP) {
         __global const float *y[STEP];
         vec d[STEP];
@@ -365,13 +362,14 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
             const int unit = SLOT(q) / (LANES / V);                                                                    \
             if (ALONE || q % 4 == 0)                                                                                   \
                 words_of(g.seed, g.level, turn, place, DRAW_OF(unit, SLOT(q) % (LANES / V) * V), word);                \
-            d[q] += g.spread * (MOST_GUMBEL + minus_gumbel(word[ALONE || STEP < 4 ? unit % 4 : q % 4]));               \
+            d[q] = fma(g.spread, least_noise(word[ALONE || STEP < 4 ? unit % 4 : q % 4]), d[q]);                      \
         }                                                                                                              \
     }
         int k = 0, alive = SLOT(0) < slots;
-        LESS_NOISE(m <= NOISY)
+        const int wait = m <= NOISY || 2 * asked > late ? 0 : NOISY;
+        LESS_NOISE(!wait)
         while (alive && k < m) {
-            LESS_NOISE(k == NOISY)
+            LESS_NOISE(wait && k == wait)
 #pragma unroll
             for (int n = 0; n < CHECK; ++n) {
                 const int o = to[k + n];
@@ -386,15 +384,17 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                 }
             }
             k += CHECK;
-            vec low = d[0];
+            ivec low = BITS(d[0]);
 #pragma unroll
             for (int q = 1; q < STEP; ++q)
-                low = fmin(low, d[q]);
-            alive = ANY(BITS(low) < limit);
+                low = min(low, BITS(d[q]));
+            alive = LEAST(low) < limit;
         }
         looked += min(k, terms);
+        late += wait > 0;
+        asked += wait && k > wait;
         for (int q = 0; alive && q < STEP; ++q) {
-            if (!ANY(BITS(d[q]) < limit))
+            if (LEAST(BITS(d[q])) >= limit)
                 continue;
             const int n = min(SLOT(q), slots - 1), run = n / wide, end = run / g.runs * g.cols + g.cols;
             int bits[V];

@@ -34,6 +34,11 @@ __kernel void gumbels(__global const uint *x, __global float *out)
     const int i = get_global_id(0);
     out[i] = minus_gumbel(x[i]);
 }
+__kernel void bounds(__global const uint *x, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = least_noise(x[i]);
+}
 __kernel void logs(__global const float *x, __global float *out)
 {
     const int i = get_global_id(0);
@@ -212,6 +217,14 @@ def test_gumbel_noise_is_as_close_as_stated_at_both_ends():
 def test_gumbel_noise_of_a_device_has_the_twins_bits(build):
     bits = words_of_all_sizes()
     assert_same_bits(build("gumbels", bits), minus_gumbel(bits))
+
+
+def test_the_bound_of_gumbel_noise_is_below_it_and_close_where_noise_is_positive(build):
+    bits = words_of_all_sizes()
+    found, noise = build("bounds", bits).astype(float), 23 + minus_gumbel(bits).astype(float)
+    assert (found >= 0).all()
+    assert (found < noise - 1e-4).all()
+    assert (found > noise - 1.2)[noise < 23].all()
 
 
 # -- simdtex/random.py: Philox4x32-10 against its authors' known answers, and what is made of its bits.

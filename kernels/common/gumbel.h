@@ -10,7 +10,6 @@
 
 #define MOST_GUMBEL 23.0f // G_p <= 33 log 2
 typedef WIDE(uint) uvec;
-typedef WIDE(int) ivec;
 
 // -G = log(-log((bits + 1/2) 2^-32)). Near u = 1, log u is computed from 1 - u.
 static inline vec minus_gumbel(const uvec bits)
@@ -27,18 +26,39 @@ static inline vec minus_gumbel(const uvec bits)
     return LOG_SUM(vec, f, s);
 }
 
+// At most MOST_GUMBEL - G, little less where G > 0, and at least 0, without a logarithm: -G > log(1 - u), and the bits of
+// a float are a piecewise linear function below its logarithm.
+static inline vec least_noise(const uvec bits)
+{
+    const vec rest = fma(WIDE(convert_float)(WIDE(as_int)(~bits >> 1)), (vec)0x1p-31f, (vec)0x1p-33f);
+    return fma(WIDE(convert_float)(WIDE(as_int)(rest)), (vec)0x1.62e43p-24f, (vec)-65.03f);
+}
+
 // Candidates fall into units of 16 in a row of the sample. Lane n of four units in a row takes the four words of a draw.
 #define LANES 16
 #define DRAW_OF(unit, lane) ((uint)((unit) / 4 * LANES + (lane)))
 
 __constant uint lanes_[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
-// The words of the draws `first`, `first` + 1, ... side by side.
-static inline void words_of(const ulong seed, const uint level, const uint turn, const ulong place, const uint first,
-                            __private uvec *word)
+#define PAIRS4(x) as_ulong2(x)
+#define PAIRS8(x) as_ulong4(x)
+#define PAIRS16(x) as_ulong8(x)
+#define PAIRS(x) JOIN(PAIRS, V)(x)
+#if V == 1
+#define HALVES_OF HALVES
+#else // of every other number, and of those between them
+#define HALVES_OF(high, low, x, by)                                                                                    \
+    high = WIDE(as_uint)((PAIRS(x) & 0xfffffffful) * (by) >> 32 | ((PAIRS(x) >> 32) * (by) & 0xffffffff00000000ul));  \
+    low = (x) * (uint)(by);
+#endif
+
+// The words of the draws `first`, `first` + 1, ... side by side. A call, since compilers would draw before a loop that
+// rarely does, or keep its sums in memory.
+static __attribute__((noinline)) void words_of(const ulong seed, const uint level, const uint turn, const ulong place,
+                                               const uint first, __private uvec *word)
 {
     uvec a = (uvec)(uint)place, b = (uvec)turn, c = (uvec)WHAT_OF(level, place, PURPOSE_GUMBEL), d = LOAD(lanes_) + first;
-    PHILOX(a, b, c, d, KEY_OF(seed), WIDE(ulong), WIDE(convert_ulong), WIDE(convert_uint))
+    PHILOX(uvec, a, b, c, d, KEY_OF(seed), HALVES_OF)
     word[0] = a;
     word[1] = b;
     word[2] = c;

@@ -6,20 +6,27 @@
 #ifndef SIMDTEX_PHILOX_H
 #define SIMDTEX_PHILOX_H
 
-// Ten rounds of words a, b, c, d, each a number or a vector of them; L, WIDEN and NARROW are their 64 bits.
-#define PHILOX(a, b, c, d, key, L, WIDEN, NARROW)                                                                      \
+// Ten rounds of words a, b, c, d of type T, a number or a vector of them; FULL gives both halves of the products.
+#define PHILOX(T, a, b, c, d, key, FULL)                                                                               \
     {                                                                                                                  \
         uint k0_ = (key).x, k1_ = (key).y;                                                                             \
         _Pragma("unroll") for (int round_ = 0; round_ < 10; ++round_)                                                  \
         {                                                                                                              \
-            const L first_ = WIDEN(a) * 0xD2511F53ul, second_ = WIDEN(c) * 0xCD9E8D57ul; /* PoCL's mul_hi is in halves */ \
-            a = NARROW(second_ >> 32) ^ b ^ k0_;                                                                       \
-            b = NARROW(second_ & 0xfffffffful);                                                                        \
-            c = NARROW(first_ >> 32) ^ d ^ k1_;                                                                        \
-            d = NARROW(first_ & 0xfffffffful);                                                                         \
+            T high_, low_, first_, second_;                                                                            \
+            FULL(high_, low_, a, 0xD2511F53ul)                                                                         \
+            FULL(first_, second_, c, 0xCD9E8D57ul)                                                                     \
+            a = first_ ^ b ^ k0_;                                                                                      \
+            b = second_;                                                                                               \
+            c = high_ ^ d ^ k1_;                                                                                       \
+            d = low_;                                                                                                  \
             k0_ += 0x9E3779B9u;                                                                                        \
             k1_ += 0xBB67AE85u;                                                                                        \
         }                                                                                                              \
+    }
+#define HALVES(high, low, x, by)                                                                                       \
+    {                                                                                                                  \
+        const ulong both_ = (ulong)(x) * (by); /* PoCL's mul_hi is in halves */                                        \
+        high = (uint)(both_ >> 32), low = (uint)both_;                                                                 \
     }
 
 // What a draw is for; the same numbers stand in simdtex/random.py.
@@ -34,7 +41,7 @@
 static inline uint4 philox(const uint4 counter, const uint2 key)
 {
     uint a = counter.x, b = counter.y, c = counter.z, d = counter.w;
-    PHILOX(a, b, c, d, key, ulong, convert_ulong, convert_uint)
+    PHILOX(uint, a, b, c, d, key, HALVES)
     return (uint4)(a, b, c, d);
 }
 

@@ -13,13 +13,20 @@
 #define WIDE(name) name
 #define LOAD(p) (*(p))
 #define STORE(x, p) (*(p) = (x))
-#define ANY(x) (x)
 #else
 #define WIDE(name) JOIN(name, V)
 #define LOAD(p) JOIN(vload, V)(0, p)
 #define STORE(x, p) JOIN(vstore, V)(x, 0, p)
-#define ANY(x) any(x)
 #endif
 typedef WIDE(float) vec;
+typedef WIDE(int) ivec;
+
+// The least of V integers; PoCL's any() is a branch for each.
+#define LEAST1(a) (a)
+#define LEAST2(a) min((a).x, (a).y)
+#define LEAST4(a) LEAST2(min((a).lo, (a).hi))
+#define LEAST8(a) LEAST4(min((a).lo, (a).hi))
+#define LEAST16(a) LEAST8(min((a).lo, (a).hi))
+#define LEAST(a) JOIN(LEAST, V)(a)
 
 #endif
