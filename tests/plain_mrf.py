@@ -432,7 +432,7 @@ def positions(Y, spacing, step, o):
                 every.append((n, i, j))
                 whole += [(n, i, j)] * ((i, j) in inside)
     reflect = o.edges == "reflect" or (o.edges == "auto" and (spacing > 1 or len(whole) < 0.75 * len(every)))
-    reflect = reflect or (o.edges == "whole" and spacing > 1 and len(whole) < 256)
+    reflect = reflect or (o.edges == "whole" and spacing > 1 and len(whole) < 1000)
     return [place for place in (every if reflect else whole) if sure(Y, place, spacing, o)]
 
 

@@ -28,7 +28,7 @@ UNSURE = 0.25
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
 
-FEW = 256
+FEW = 1000
 """Number of whole neighbourhoods below which a coarse level reflects the sample with ``edges="whole"``."""
 
 

@@ -212,7 +212,7 @@ class Options:
         "Take only candidates whose neighbourhood is inside the sample (whole), reflect the sample to take all "
         "(reflect), or reflect it at all levels but the finest (auto)",
         more="``auto`` reflects at the finest level too if fewer than three quarters of the positions have a whole "
-        "neighbourhood in the sample; ``whole`` reflects at coarse levels with fewer than 256 such positions.",
+        "neighbourhood in the sample; ``whole`` reflects at coarse levels with fewer than 1000 such positions.",
         symbol="equation (4)",
         paper="whole",
     )
