@@ -64,6 +64,7 @@ class MrfOptions(TypedDict, total=False):
     bandwidth: float
     xi: float
     free_sweeps: int
+    free_sites: Literal["all", "kept"]
     pixel: Literal["source", "density"]
     schedule: ScheduleName | Schedule
     array: str | None
