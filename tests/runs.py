@@ -292,7 +292,9 @@ RUNS = {
     "few-gibbs": textures(FEW | {"relaxation": "gibbs", "bandwidth": 0.5}, dtype=np.uint16),
     "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
     "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),
-    "few-whole": textures(FEW | {"order": 5, "edges": "whole", "phases": 64, "xi": -2.5}, masked=0.2, **F4),
+    "few-whole": textures(
+        FEW | {"order": 5, "edges": "whole", "phases": 64, "xi": -2.5, "free_sites": "kept"}, masked=0.2, **F4
+    ),
     "all-of-many": textures(BARE | {"order": 2, "levels": 1}, samples=((35, 31),), shape=(2, 3), **F4),
     # schedules
     **{

@@ -19,7 +19,7 @@ TEXTS = {
     *("host", "device", "size", "method", "preset", "relaxation", "pixel", "search", "edges", "boundary", "weights"),
     *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
     *("origin", "cell", "several", "outside", "columns", "categories", "variables"),
-    *("direction", "light", "mapping", "memory", "film", "phases"),
+    *("direction", "light", "mapping", "memory", "film", "phases", "free_sites"),
     *("names", "alphas", "betas", "lattice", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")

@@ -44,6 +44,8 @@ def test_what_is_taken_is_what_the_run_takes(reference, name):
     last = {one.level: (n, one.sweep) for n, one in enumerate(replay.sweeps)}
     for level, (n, final) in last.items():
         for back, sweep in ((final - 1, 1), (1, final - 1), (0, None)):
+            if back >= final:  # a level of one sweep
+                continue
             state = replay.at(n - max(0, back))
             site = tuple(int(rng.integers(side)) // 2 * 2 + 1 for side in state.temperature.shape)
             site = tuple(min(at, side - 1) for at, side in zip(site, state.temperature.shape, strict=True))
@@ -139,7 +141,7 @@ def test_a_density_is_the_lcpdf(relaxation):
             seen.append((progress.image(), progress.temperature(), progress.explain(4, 5)))
 
     sample = texture((14, 15))  # with levels near 0 and 255
-    options = {"preset": "paper", "relaxation": relaxation, "levels": 2, "order": 4, "edges": "whole"}
+    options = {"preset": "paper", "relaxation": relaxation, "levels": 2, "order": 4, "pixel": "density"}
     simdtex.synthesize(sample, (10, 11), **options, rng=1, callback=watch, device="reference")
     assert len(seen) > 2
     for image, t, why in seen:
@@ -179,12 +181,12 @@ def test_what_cannot_be_explained():
 
 
 def test_what_a_notebook_shows():
-    given, options = RUNS["paper"].inputs()
-    why = simdtex.explain(*given, (5, 6), **options, rng=SEED, device="reference")
-    assert why.table() == replayed("paper")[0].explain((5, 6)).table()
+    given, options = RUNS["paper-density"].inputs()
+    why = simdtex.explain(*given, (4, 5), **options, rng=SEED, device="reference")
+    assert why.table() == replayed("paper-density")[0].explain((4, 5)).table()
     lines = why.table().splitlines()
     assert repr(why) == f"<{lines[0]}>"
-    assert lines[0].startswith(f"Site (5, 6) of level 0, sweep {why.sweep}, draws from the LCPDF")
+    assert lines[0].startswith(f"Site (4, 5) of level 0, sweep {why.sweep}, draws from the LCPDF")
     marked = [line for line in lines if line.startswith("*")]
     assert len(marked) == 1
     assert marked[0].split()[1] == str(why.candidates.rank[why.taken])

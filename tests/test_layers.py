@@ -102,7 +102,7 @@ def test_candidates_and_their_neighbours_are_those_of_plain_loops(spacing, phase
     places = sample.places(offsets, spacing, phases, edges)
     step = max(1, spacing // phases)
     wanted = list(product(*(range(0, n, step) for n in shape)))
-    if edges == "whole":
+    if edges == "whole" and spacing == 1:  # at a coarse level they are too few
         wanted = [
             at for at in wanted if all(2 * spacing <= a < n - 2 * spacing for a, n in zip(at, shape, strict=True))
         ]
@@ -284,7 +284,7 @@ def test_candidates_of_several_volumes_are_those_of_each():
     sample = Sample(Pictures(tuple(one[..., None].astype(np.uint16) for one in volumes)), len(offsets), margin, step=2)
     for spacing, edges in product((1, 2), ("whole", "reflect")):
         places = sample.places(offsets, spacing, 1, edges).positions
-        inside = spacing if edges == "whole" else 0
+        inside = 1 if edges == "whole" and spacing == 1 else 0  # at a coarse level they are too few
         lines = [[range(inside + -inside % spacing, n - inside, spacing) for n in one.shape] for one in volumes]
         wanted = [(*at, k) for k, each in enumerate(lines) for at in product(*each)]
         found = sample.place(places)

@@ -196,7 +196,7 @@ def test_terrain_has_the_texture_of_each_corner():
         ([GRAVEL] * 4, 24, {}, "4 samples"),
         (GRAVEL[:30, :30], 128, {}, "40x40 known pixels"),
         (GRAVEL, 24, {"boundary": "open"}, "leave boundary out"),
-        (GRAVEL, 24, {"preset": "paper"}, 'give pixel="source"'),
+        (GRAVEL, 24, {"preset": "paper", "pixel": "density"}, 'give pixel="source"'),
         (np.where(np.indices((64, 64))[0] % 6 < 1, np.nan, GRAVEL), 32, {}, "known pixels"),
     ],
 )

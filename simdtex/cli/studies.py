@@ -183,7 +183,7 @@ def maspar(sample: Path, output: Path, size: str | None, film: str, **options: A
 
     names = [get(name.strip()).name for name in film.split(",")]
     material = read_material([sample])
-    shape: Any = output_shape(size or "64x64", material.pixels[0])
+    shape: Any = output_shape("64x64" if size is None else size, material.pixels[0])
     like = material.metadata and material.metadata.at()._replace(exif=None)
     check_output(output, material.pixels[0], like)
 

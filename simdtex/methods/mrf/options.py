@@ -297,7 +297,7 @@ class Options:
     free_sites: str = sampling(
         "all",
         Choice(("all", "kept")),
-        "Let free sweeps relax all sites of every level (all), or only, at the finest level, the sites kept from the "
+        "Relax all sites of every level in free sweeps (all), or only, at the finest level, the sites kept from the "
         "level above, some of which stand out otherwise (kept)",
         paper="kept",
         shown=(),
