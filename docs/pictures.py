@@ -160,8 +160,8 @@ def alpha():
 
 def paper():
     grass = data.grass()[:96, :96]
-    found = [simdtex.synthesize(grass, (192, 192), rng=1, **more) for more in ({"preset": "paper", "order": 8}, {})]
-    return [("the sample", grass), ("preset paper, order 8", found[0]), ("the defaults", found[1])]
+    found = [simdtex.synthesize(grass, (192, 192), rng=1, **more) for more in ({"preset": "paper", "order": 18}, {})]
+    return [("the sample", grass), ("preset paper, order 18", found[0]), ("the defaults", found[1])]
 
 
 # ---------------------------------------------------------------- pages for readers
@@ -256,11 +256,11 @@ def reservoir():
 
 
 def array():
-    """A frame of the film of schedules of the array, for brick, and the pictures that they make."""
+    """A frame of the film of schedules of the array, for gingham, and the pictures that they make."""
     names, frame = ("coloring", "checkerboard", "synchronous", "raster"), 57
-    how = {"order": 8, "pixel": "source", "levels": 6, "edges": "reflect", "rng": 1}
-    pictures = {name: schedules.develop(brick(64), (64, 64), name, **how) for name in names}
-    shown = {name: schedules.steps(name, Grid.of((64, 64)), 8, 1) for name in names}
+    sample = runpy.run_path(str(HERE.parent / "benchmarks" / "drawings.py"))["gingham"]()
+    pictures = {name: schedules.develop(sample, (64, 64), name, order=18, rng=1) for name in names}
+    shown = {name: schedules.steps(name, Grid.of((64, 64)), 18, 1) for name in names}
     with PIL.Image.open(io.BytesIO(schedules.film(shown, pictures))) as film:
         film.seek(frame)
         film.convert("RGB").save(HERE / "_static" / "array.png", optimize=True)

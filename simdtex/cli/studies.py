@@ -136,7 +136,7 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
 )
 @click.argument("sample", type=READ)
 @output_option("Write this picture.", WRITE)
-@size_option("64x64")
+@size_option("128x128")
 @option(
     "--array",
     default="16k",
@@ -172,8 +172,8 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
 def maspar(sample: Path, output: Path, size: str | None, film: str, **options: Any) -> Task:
     """Synthesise a picture by Algorithm 1 on an emulated MasPar MP-1, and print its times of 1998.
 
-    The output has the bytes of `simdtex synth --preset paper`. 64x64 pixels in colour from a sample of 64x64
-    take about 20 s of a core with order 8, and 75 s with order 18; the time grows with the pixels of both.
+    The output has the bytes of `simdtex synth --preset paper`. 128x128 pixels, one for each PE, take about 90 s
+    of a core from a sample of 138x138 in colour; the time grows with the pixels of both and with the order.
     """
     from simdtex.io import image
     from simdtex.jobs.array import synthesize
@@ -183,7 +183,7 @@ def maspar(sample: Path, output: Path, size: str | None, film: str, **options: A
 
     names = [get(name.strip()).name for name in film.split(",")]
     material = read_material([sample])
-    shape: Any = output_shape("64x64" if size is None else size, material.pixels[0])
+    shape: Any = output_shape("128x128" if size is None else size, material.pixels[0])
     like = material.metadata and material.metadata.at()._replace(exif=None)
     check_output(output, material.pixels[0], like)
 
