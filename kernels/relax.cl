@@ -182,19 +182,17 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
                           __global ushort *restrict new_temperature)
 {
 #if ITEMS > 1
+    const bool idle = false;
     const int s = first + (int)get_group_id(0);
     __local float lanes[ABREAST][17], bests[ABREAST]; // 17: items that read a row each use different banks
     __local int bests_at[ABREAST], kept;
     if (ITEM == 0)
         kept = 0;
 #else
-    int s = first + (int)get_global_id(0);
-#ifdef APART
-    s = min(s, S - 1); // an idle work-item would read at wild indices on Intel's runtime
-#else
-    if (s >= S)
-        return;
-#endif
+    // An idle work-item relaxes the last site, and writes nothing: if it returned here, Intel's runtime would read at wild
+    // indices for it.
+    const bool idle = first + (int)get_global_id(0) >= S;
+    const int s = idle ? S - 1 : first + (int)get_global_id(0);
 #endif
     const Lattice h = g.lattice;
     const int site = sites[s], i = site / h.cols, j = site - i * h.cols;
@@ -226,7 +224,7 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
 #endif
     }
     if (ITEM == 0)
-        raw[suggested] = number_of(index_of, source[site]);
+        raw[suggested] = idle ? -1 : number_of(index_of, source[site]); // which the item of the last site may be writing
     int many = suggested + 1;
 #ifndef EXACT
     const int draws = max(1, g.chance);
@@ -426,12 +424,9 @@ __kernel GROUP void relax(__global const int *restrict sites, const int first, c
     TOGETHER;
     looked = kept;
 #endif
-    if (ITEM > 0)
-        return;
-#elif defined(APART)
-    if (first + (int)get_global_id(0) >= S)
-        return;
 #endif
+    if (ITEM > 0 || idle)
+        return;
     const int out = PLACE(s, site), step = STRIDE(S, g);
     for (int c = 0; c < MADE; ++c) {
         int x = (int)levels[c * g.plane + at[best_at]];
