@@ -108,7 +108,7 @@ links:
 	$(call install,docs,[docs])
 	$(PY) -m sphinx -q -D plot_gallery=0 -b linkcheck docs docs/_build/links
 
-# MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others, a list of names those alone. No OpenCL: mutmut forks.
+# MUTANTS='simdtex.methods.pyramid.*' or 'simdtex.schedules.*' does others, a list of names those alone. No OpenCL: mutmut forks.
 MUTANTS ?= simdtex.methods.mrf.*
 mutants:
 	$(call install,mutants,[mutants])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes training images of sinuous channels that meet, part and now and then end.
 
-    python benchmarks/channels.py [--shape 256,256] [--seed 1,7] [--out simdtex/experiments/channels.png]
+    python benchmarks/channels.py [--shape 256,256] [--seed 1,7] [--out simdtex/jobs/simulation/channels.png]
 
 Writes an image for each seed, side by side. All arithmetic is in whole numbers, so that no platform's library decides
 on a pixel.

@@ -33,7 +33,7 @@ from skimage.feature import local_binary_pattern
 from skimage.filters import gabor_kernel
 
 import simdtex
-from simdtex.ops.classes import WEIGHTS, gaussian, potts, window
+from simdtex.jobs.classification.operations import WEIGHTS, gaussian, potts, window
 
 ASKED = 0.05  # the probability of calling a known texture unknown
 FIELDS = [(8, weight) for weight in (4, 7, 12, 20)]  # of the baselines; they get the best

@@ -17,9 +17,9 @@ import PIL.Image
 from skimage import data
 
 import simdtex
+from simdtex.figures.sheet import contact_sheet
+from simdtex.figures.tables import Table, print_table
 from simdtex.io.image import read
-from simdtex.report.sheet import contact_sheet
-from simdtex.report.tables import Table, print_table
 
 DOCS = Path(__file__).parent.parent / "docs"
 

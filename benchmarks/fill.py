@@ -29,7 +29,7 @@ from skimage import draw
 from skimage.restoration import inpaint_biharmonic
 
 import simdtex
-from simdtex.experiments.quality import as_planes, in_deviations, nearest
+from simdtex.jobs.studies.quality import as_planes, in_deviations, nearest
 
 PATCH = 7  # side of the patches, pixels
 APART = 8  # patches nearer to one another are not compared

@@ -17,11 +17,11 @@ from skimage import data
 from skimage.transform import resize
 
 import simdtex
-from simdtex.experiments.quality import seam
+from simdtex.figures.sheet import magnified, view
 from simdtex.io.image import example
+from simdtex.jobs.studies.quality import seam
 from simdtex.methods.multires.mend import mend
-from simdtex.model.stretched import Stretched
-from simdtex.report.sheet import magnified, view
+from simdtex.methods.pyramid.stretched import Stretched
 
 
 def reduced(picture, factor):

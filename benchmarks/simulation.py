@@ -32,9 +32,9 @@ from scipy import ndimage
 from scipy.spatial import KDTree
 
 import simdtex
-from simdtex.experiments.ensemble import channels as of_the_pages
-from simdtex.experiments.ensemble import connectivity, summary, variogram
 from simdtex.io import image as files
+from simdtex.jobs.simulation.ensemble import channels as of_the_pages
+from simdtex.jobs.simulation.ensemble import connectivity, summary, variogram
 from simdtex.random import as_seed
 
 SPECK = 16  # pixels of a body that is one, at most

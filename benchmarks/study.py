@@ -19,7 +19,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 import simdtex
-from simdtex.experiments.quality import as_pair, halved, in_deviations, nearest, spread
+from simdtex.jobs.studies.quality import as_pair, halved, in_deviations, nearest, spread
 
 FIGURES = {
     "mrf": ("plausibility", "coverage", "copying", "repeats", "salt", "contrast", "seam"),

@@ -23,7 +23,7 @@ import psutil
 from skimage import data
 
 import simdtex
-from simdtex import distributed
+from simdtex.jobs import tiles as distributed
 
 SAMPLE = data.brick()[:128, :128]
 

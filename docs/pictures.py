@@ -23,14 +23,14 @@ from skimage import data
 from skimage.transform import downscale_local_mean, resize
 
 import simdtex
+from simdtex.figures.sheet import contact_sheet, magnified
 from simdtex.io.image import write
-from simdtex.io.tilesets import glsl
-from simdtex.model.corners import numbers, plane
+from simdtex.jobs.studies import report as schedules
+from simdtex.jobs.tilesets.corners import numbers, plane
+from simdtex.jobs.tilesets.files import glsl
 from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.lattice import Grid
 from simdtex.model.source_map import apply_source_map
-from simdtex.report import schedules
-from simdtex.report.sheet import contact_sheet, magnified
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "benchmarks"))

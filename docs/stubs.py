@@ -10,7 +10,7 @@ from textwrap import fill
 
 import simdtex
 from simdtex.inputs import inputs, parameter_types
-from simdtex.jobs.synthesis import NOT_REPLAYED
+from simdtex.jobs.why.job import NOT_REPLAYED
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, table
 from simdtex.schedules import SCHEDULES
 
@@ -20,11 +20,11 @@ PAIR = "tuple[float, float]"
 PICTURE, TUPLE = "NDArray[Any]", "tuple[NDArray[Any], {}]"
 
 METHODS = {
-    "Mrf": "mrf",
-    "Multires": "multires",
-    "Pyramid": "pyramid",
-    "Solid": "pyramid.solid",
-    "Classifier": "classifier",
+    "Mrf": "methods.mrf",
+    "Multires": "methods.multires.options",
+    "Pyramid": "methods.pyramid.options",
+    "Solid": "methods.pyramid.solid",
+    "Classifier": "jobs.classification.options",
 }
 """The tables of options, by the name of their class here."""
 
@@ -75,7 +75,7 @@ ScheduleName = Literal[
 USED = """\
 from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine
-from simdtex.methods.mrf.replay import Replay
+from simdtex.jobs.why.replay import Replay
 from simdtex.model.explanation import Explanation
 from simdtex.run import Callback, OutputWithSource
 from simdtex.schedules import Schedule"""
@@ -95,8 +95,8 @@ def type_of(one):
 
 def options_of(name, method):
     """The class of the options of a method."""
-    found = table(import_module(f"simdtex.methods.{method}").Options)
-    known = table(import_module("simdtex.methods.pyramid").Options) if name == "Solid" else {}
+    found = table(import_module(f"simdtex.{method}").Options)
+    known = table(import_module("simdtex.methods.pyramid.options").Options) if name == "Solid" else {}
     lines = [f"class {name}Options({'PyramidOptions' if known else 'TypedDict'}, total=False):"]
     lines += [f"    preset: {type_of(PRESET)}"] if has_presets(found) and not known else []
     return lines + [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known]
@@ -138,7 +138,10 @@ def stub():
     public = {function for _, function, *_ in FUNCTIONS} | {"explain", "replay", "ensemble", "quality"}
     homes = {one: home for home, names in simdtex._NAMES.items() for one in names if one not in public}
     found = [f"from {home} import {one} as {one}" for one, home in homes.items()]
-    found += [f"from simdtex.experiments import {one} as {one}" for one in ("ensemble", "quality")]
+    found += [
+        f"from simdtex.jobs.{room} import {one} as {one}"
+        for room, one in (("simulation", "ensemble"), ("studies", "quality"))
+    ]
     found += [*USED.splitlines()]
     found.sort(key=lambda line: (line.split()[1], " as " in line, line))
     written = fill(str(list(SCHEDULES))[1:-1], 116).replace("\n", "\n    ")

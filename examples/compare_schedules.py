@@ -5,14 +5,14 @@ Comparison of schedules
 
 Run the same job under two built-in schedules and one that is defined here, on one level. The synchronous schedule
 relaxes neighbours together, against equation (14): it needs the fewest steps, and the most pixels flip back and forth.
-`simdtex.report.schedules.write_comparison` writes the whole report.
+`simdtex.jobs.studies.report.write_comparison` writes the whole report.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 from skimage import data
 
-from simdtex.experiments.comparison import compare
+from simdtex.jobs.studies.comparison import compare
 from simdtex.schedules import Partition
 
 

@@ -22,8 +22,8 @@ from fuzz.corpus import damaged, put
 from fuzz.lines import OTHERS, PLAIN, RUNS, Maker
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint
-from simdtex.cli import load
-from simdtex.cli import main as simdtex
+from simdtex.commands import load
+from simdtex.commands import main as simdtex
 
 KEEPING = ("synth", "multires", "pyramid", "fill", "extend", "mix", "solid", "simulate", "classify")
 """The jobs that keep a checkpoint."""

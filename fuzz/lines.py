@@ -8,8 +8,11 @@ from functools import cache
 import click
 
 from fuzz import corpus
-from simdtex.cli import load
-from simdtex.methods import classifier, mrf, multires, pyramid
+from simdtex.commands import load
+from simdtex.jobs.classification import options as classifier
+from simdtex.methods import mrf
+from simdtex.methods.multires import options as multires
+from simdtex.methods.pyramid import options as pyramid
 from simdtex.options import table
 
 LINES = {

@@ -15,9 +15,9 @@ import numpy as np
 
 import simdtex
 from fuzz.corpus import damaged, put
-from simdtex import distributed
-from simdtex.distributed import layout
-from simdtex.distributed.turns import context
+from simdtex.jobs import tiles as distributed
+from simdtex.jobs.tiles import layout
+from simdtex.jobs.tiles.turns import context
 
 SHAPE = 20, 21
 GREY = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]

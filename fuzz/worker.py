@@ -54,7 +54,7 @@ class Worker:
         import matplotlib.font_manager  # noqa: F401 - asks the system for its fonts, once
         import zarr  # noqa: F401
 
-        from simdtex.cli import main
+        from simdtex.commands import main
 
         self.main = main
         sys.addaudithook(self.hook)

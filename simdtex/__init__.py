@@ -5,22 +5,26 @@ from __future__ import annotations
 
 _NAMES = {
     "simdtex.checkpoint": ("Checkpoint",),
-    "simdtex.experiments": ("ensemble", "quality"),
     "simdtex.io.grids": ("read_grid", "write_grid"),
     "simdtex.io.hard_data": ("place_hard_data", "read_hard_data"),
-    "simdtex.jobs.classification": ("TextureClassifier", "classify"),
-    "simdtex.jobs.filling": ("extend", "fill"),
-    "simdtex.jobs.pyramids": ("mix", "synthesize_solid"),
-    "simdtex.jobs.simulation": ("estimate", "simulate"),
-    "simdtex.jobs.synthesis": ("explain", "lcpdf", "replay", "synthesize"),
-    "simdtex.jobs.tileset": ("tileset",),
+    "simdtex.jobs.classification.job": ("TextureClassifier", "classify"),
+    "simdtex.jobs.filling.job": ("extend", "fill"),
+    "simdtex.jobs.mixes.job": ("mix", "synthesize_solid"),
+    "simdtex.jobs.simulation": ("ensemble",),
+    "simdtex.jobs.simulation.job": ("estimate", "simulate"),
+    "simdtex.jobs.studies": ("quality",),
+    "simdtex.jobs.synthesis.job": ("explain", "lcpdf", "replay", "synthesize"),
+    "simdtex.jobs.tilesets.job": ("tileset",),
     "simdtex.live.widget": ("Live",),
     "simdtex.machine": ("open_machine",),
     "simdtex.machine.devices": ("DeviceError", "devices"),
-    "simdtex.model.show": ("show",),
+    "simdtex.figures.show": ("show",),
     "simdtex.run": ("Output", "Progress"),
 }
 """The public names by their modules, each of which is loaded at its first use, so that the command line starts fast."""
+
+_MODULES = ("ensemble", "quality")
+"""The public names that are modules."""
 
 _WORDS = {
     "fill": ("inpaint", "heal"),
@@ -42,7 +46,7 @@ def __getattr__(name: str) -> object:
     elif home:
         from importlib import import_module
 
-        found = import_module(f"{home}.{name}") if home == "simdtex.experiments" else getattr(import_module(home), name)
+        found = import_module(f"{home}.{name}") if name in _MODULES else getattr(import_module(home), name)
     else:
         from difflib import get_close_matches
 

@@ -12,24 +12,24 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint as Checkpoint
-from simdtex.experiments import ensemble as ensemble
-from simdtex.experiments import quality as quality
+from simdtex.figures.show import show as show
 from simdtex.io.grids import read_grid as read_grid
 from simdtex.io.grids import write_grid as write_grid
 from simdtex.io.hard_data import HardData
 from simdtex.io.hard_data import place_hard_data as place_hard_data
 from simdtex.io.hard_data import read_hard_data as read_hard_data
-from simdtex.jobs.classification import TextureClassifier as TextureClassifier
-from simdtex.jobs.synthesis import lcpdf as lcpdf
-from simdtex.jobs.tileset import tileset as tileset
+from simdtex.jobs.classification.job import TextureClassifier as TextureClassifier
+from simdtex.jobs.simulation import ensemble as ensemble
+from simdtex.jobs.studies import quality as quality
+from simdtex.jobs.synthesis.job import lcpdf as lcpdf
+from simdtex.jobs.tilesets.job import tileset as tileset
+from simdtex.jobs.why.replay import Replay
 from simdtex.live.widget import Live as Live
 from simdtex.machine import Machine
 from simdtex.machine import open_machine as open_machine
 from simdtex.machine.devices import DeviceError as DeviceError
 from simdtex.machine.devices import devices as devices
-from simdtex.methods.mrf.replay import Replay
 from simdtex.model.explanation import Explanation
-from simdtex.model.show import show as show
 from simdtex.run import Callback, OutputWithSource
 from simdtex.run import Output as Output
 from simdtex.run import Progress as Progress

@@ -22,7 +22,7 @@ def main() -> None:
 
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started us ignores it
             signal.signal(signal.SIGINT, leave)  # until a command begins: simdtex.cli.command
-        from simdtex.cli import main as command
+        from simdtex.commands import main as command
 
         command()
     except KeyboardInterrupt:  # of the signal before `leave` took it

@@ -28,7 +28,7 @@ from simdtex.io.files import Damaged, check_target, exclusive, read_checked, wri
 from simdtex.options import real
 from simdtex.random import as_seed
 
-FORMAT = 9
+FORMAT = 10
 """Format of the file; all other formats are rejected."""
 
 FIRST = 1.0

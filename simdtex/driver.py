@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -65,6 +65,7 @@ def drive(
     seed: int,
     callback: Callback | None = None,
     checkpointing: Checkpointing | None = None,
+    others: Sequence[Callable[[Any], Observer]] = (),
 ) -> tuple[NDArray[Any], Output]:
     """Run a plan to its end, and return its result.
 
@@ -77,6 +78,8 @@ def drive(
         Called with a `simdtex.run.Progress` after every part of a step.
     checkpointing : Checkpointing, optional
         The state to continue from, and the function that receives every later state.
+    others : sequence of callables
+        Each makes a further observer of the run, whose statistics the output has too.
 
     Returns
     -------
@@ -86,18 +89,22 @@ def drive(
     """
     began, worked = time.perf_counter(), machine.seconds
     run = plan.on(machine, seed)
-    observer = run.observer(callback)
+    observers = [run.observer(callback), *(make(run) for make in others)]
     checkpointing = checkpointing or Checkpointing()
     if checkpointing.found is None:
         state = run.begin()
     else:
         state = run.load(checkpointing.found["state"])
-        observer.load(checkpointing.found["observer"])
+        for observer, saved in zip(observers, checkpointing.found["observers"], strict=True):
+            observer.load(saved)
     while not run.ended(state):
-        state, info = run.step(state, observer.part)
-        observer.step(state, info)
-        checkpointing.offer(info, partial(_saved, run, state, observer))
-    image, output = run.result(state, observer)
+        state, info = run.step(state, observers[0].part)
+        for observer in observers:
+            observer.step(state, info)
+        checkpointing.offer(info, partial(_saved, run, state, observers))
+    image, output = run.result(state, observers[0])
+    for observer in observers:
+        output.statistics.update(observer.statistics())
     output.statistics.update(
         device=machine.name,
         seed=seed,
@@ -107,8 +114,8 @@ def drive(
     return image, output
 
 
-def _saved(run: Run, state: Any, observer: Observer) -> Tree:
-    return {"state": run.save(state), "observer": observer.save()}
+def _saved(run: Run, state: Any, observers: Sequence[Observer]) -> Tree:
+    return {"state": run.save(state), "observers": [observer.save() for observer in observers]}
 
 
 def execute(

@@ -719,19 +719,21 @@ TABLES_OF: dict[str, Any] = {
 }
 """The tables by job, which has the name of its command."""
 
-METHODS = {
-    "synth": ("mrf", "multires", "pyramid"),
-    "mix": ("pyramid",),
-    "solid": ("pyramid.solid",),
-    "classify": ("classifier",),
-    "estimate": (),
+MRF = {"mrf": "methods.mrf.options"}
+
+METHODS: dict[str, dict[str, str]] = {
+    "synth": {**MRF, "multires": "methods.multires.options", "pyramid": "methods.pyramid.options"},
+    "mix": {"pyramid": "methods.pyramid.options"},
+    "solid": {"pyramid.solid": "methods.pyramid.solid"},
+    "classify": {"classifier": "jobs.classification.options"},
+    "estimate": {},
 }
-"""The methods of a job, in `simdtex.methods`; any other has ``mrf``."""
+"""The methods of a job, and the modules of their options; any other has ``mrf``."""
 
 
 def options_of(job: str) -> dict[str, Any]:
     """Return the classes of options of a job's methods, by method."""
-    return {one: import_module(f"simdtex.methods.{one}").Options for one in METHODS.get(job, ("mrf",))}
+    return {one: import_module(f"simdtex.{home}").Options for one, home in METHODS.get(job, MRF).items()}
 
 
 def inputs(job: str) -> dict[str, Input]:

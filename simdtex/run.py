@@ -68,7 +68,7 @@ class Progress(Brief):
     `simdtex.classify`, after every step, has a picture of the labels so far: 1 is the first class, and 0 a pixel not
     yet compared.
 
-    `simdtex.distributed.synthesize`, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
+    `simdtex.jobs.tiles.synthesize`, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
     ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or ``"show"``, write the picture. ``sweep`` is that of
     the level, from 1; ``tile`` and ``tiles`` are the numbers of finished tiles and of all. The image has every n-th
     site of the level before the turn, about 1000 on a side. Reading it is slow.
@@ -236,6 +236,10 @@ class Observer:
         now = time.perf_counter()
         self.reports.append(counts | {"seconds": now - self._began})
         self._began = now
+
+    def statistics(self) -> dict[str, Any]:
+        """Return what the observer adds to the statistics of the output."""
+        return {}
 
     def save(self) -> dict[str, Any]:
         """Return everything received so far, as plain arrays and numbers."""

@@ -11,17 +11,17 @@ from tolerances import SIGNIFICANCE
 
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
+from simdtex.methods.mrf import lcpdf
 from simdtex.methods.mrf.algorithm import ignore
+from simdtex.methods.mrf.costs import Costs, Kinds, Phased, Scattered
+from simdtex.methods.mrf.neighbourhood import Confidences, Field
+from simdtex.methods.mrf.relax import AllCandidates, CandidateList, InPhase, Relaxation, in_phase
+from simdtex.methods.mrf.square import TAIL, square_of
 from simdtex.model.given import EXCLUDED
 from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
-from simdtex.ops import lcpdf
-from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
-from simdtex.ops.neighbourhood import Confidences, Field
-from simdtex.ops.relax import AllCandidates, CandidateList, InPhase, Relaxation, in_phase
-from simdtex.ops.square import TAIL, square_of
 from simdtex.schedules import Coloring, Setting
 
 REFERENCE = Reference()
@@ -380,13 +380,13 @@ def sweeps(run, state=None, watch=ignore):
 
 def analyse(machine, pixels, **options):
     """The analysis of a sample by options of ``multires``."""
-    from simdtex.methods.multires import Options, analysis
+    from simdtex.methods.multires.options import Options, analysis
 
     return analysis.analyse(machine, pixels, Options(**options))
 
 
 def ising(machine, size, temperatures, schedule, seed=1, callback=None, **settings):
     """Chains of the Ising model."""
-    from simdtex.experiments.ising import Experiment, ising
+    from simdtex.jobs.studies.ising import Experiment, ising
 
     return ising(machine, Experiment(size, temperatures, **settings), schedule, seed=seed, callback=callback)

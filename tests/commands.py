@@ -5,7 +5,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from simdtex.cli import main
+from simdtex.commands import main
 from simdtex.io import image
 
 

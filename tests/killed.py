@@ -17,8 +17,8 @@ import numpy as np
 from cases import REFERENCE
 from runs import RUNS, SEED, digest, outcome
 
-from simdtex import distributed
 from simdtex.checkpoint import Checkpoint
+from simdtex.jobs import tiles as distributed
 
 JOBS = ("more", "known", "multires", "pyramid", "solid", "fill", "extend", "mix", "classify", "soft", "volume", "tiles")
 """Runs of the table, and tiles in a store beside the checkpoint's file."""
@@ -78,7 +78,7 @@ def finished(job, longest, rng, left):
 
 def main(wanted, seed, names):
     if "tiles" in names:  # loaded once, and not by each child
-        from simdtex.distributed import cluster, turns  # noqa: F401
+        from simdtex.jobs.tiles import cluster, turns  # noqa: F401
     rng = np.random.default_rng(seed)
     counts = {"kills": 0, "runs": 0, "wrong": []}
     expected, took = {}, {}

@@ -19,7 +19,7 @@ from skimage import data
 
 import simdtex
 from simdtex import maspar
-from simdtex.jobs.simulation import realisation_seed
+from simdtex.jobs.simulation.job import realisation_seed
 
 PINNED = Path(__file__).with_name("digests.json")
 SEED = 2**40 + 3

@@ -7,9 +7,9 @@ import numpy as np
 
 from simdtex.io.image import check_sample
 from simdtex.machine import open_machine
+from simdtex.methods.pyramid.laplacian import folded
 from simdtex.methods.pyramid.pyramids import Transform
-from simdtex.model.stretched import Stretched
-from simdtex.ops.pyramids import folded
+from simdtex.methods.pyramid.stretched import Stretched
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from click.testing import CliRunner
 from scipy.ndimage import gaussian_filter
 
 import simdtex
-from simdtex.cli import main
-from simdtex.experiments import benchmark
-from simdtex.experiments.benchmark import FULL, QUICK, Case, Sizes
+from simdtex.commands import main
+from simdtex.figures.tables import benchmark_table
 from simdtex.io.image import example, write
+from simdtex.jobs.studies import benchmark
+from simdtex.jobs.studies.benchmark import FULL, QUICK, Case, Sizes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.reference import Reference
-from simdtex.report.tables import benchmark_table
 
 # -- Benchmarks: cases, how they are timed, and the table. No time is asserted.
 

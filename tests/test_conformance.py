@@ -155,8 +155,8 @@ def test_a_run_that_is_stopped_on_a_device_has_the_same_end(machine, reference, 
 )
 def test_tiles_have_the_bytes_of_the_whole(reference, tmp_path, name):
     zarr = pytest.importorskip("zarr")
-    from simdtex import distributed
-    from simdtex.distributed.turns import context
+    from simdtex.jobs import tiles as distributed
+    from simdtex.jobs.tiles.turns import context
 
     (image, source, *_), _ = reference(name)
     given, options = RUNS[name].inputs()

@@ -24,7 +24,7 @@ LISTINGS = {
         r"^\.\. code-block:: \w+\n   :caption: (.+)\n\n((?:(?:   .*)?\n)+)", PAGE, re.MULTILINE
     )
 }
-FILES = ("kernels/median.cl", "simdtex/ops/median.py", "tests/test_median.py", "look.py")
+FILES = ("kernels/median.cl", "simdtex/methods/mrf/median.py", "tests/test_median.py", "look.py")
 TABLE = "docs/concepts/index.rst"
 
 
@@ -42,7 +42,7 @@ def copy(tmp_path_factory):
         assert not (ROOT / name).exists(), f"{name} is in the repository, so the page needs another example"
         (root / name).write_text(LISTINGS[name], encoding="utf-8")
     table = (root / TABLE).read_text(encoding="utf-8")
-    last = "     - ``tests/test_pyramid_method.py``, ``tests/test_matching.py``\n"
+    last = "     - ``tests/methods/pyramid/test_pyramid_method.py``, ``tests/methods/pyramid/test_matching.py``\n"
     assert table.count(last) == 1
     row = "".join(f"   {line}\n" for line in LISTINGS[TABLE].splitlines())
     (root / TABLE).write_text(table.replace(last, last + row), encoding="utf-8")

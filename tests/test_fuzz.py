@@ -11,7 +11,7 @@ import pytest
 import fuzz.__main__ as driver
 from fuzz import KINDS, corpus, seeded, worker
 from fuzz.lines import LINES, RUNS, Maker, Try
-from simdtex.cli import COMMANDS as KNOWN
+from simdtex.commands import COMMANDS as KNOWN
 from simdtex.io import image
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuzzer runs on Linux")

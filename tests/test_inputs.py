@@ -11,11 +11,11 @@ import xarray
 from cases import assert_same_bits, texture
 
 import simdtex
-import simdtex.distributed
-from simdtex.experiments.ensemble import ENSEMBLE, checked
+import simdtex.jobs.tiles
 from simdtex.io import image, volume
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import check_inputs, check_samples, is_several
+from simdtex.jobs.simulation.ensemble import ENSEMBLE, checked
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import DataWarning
 
@@ -493,7 +493,7 @@ READERS = {
     "several": lambda one: simdtex.synthesize([one, one], (6, 7), **OPTIONS),
     "mask": lambda one: simdtex.synthesize(PHOTO, (6, 7), mask=one, **OPTIONS),
     "guide": lambda one: simdtex.synthesize(PHOTO, (6, 7), guide=(PHOTO, one), **OPTIONS),
-    "tiles": lambda one: simdtex.distributed.synthesize(one, (6, 7), "no.zarr", **OPTIONS),
+    "tiles": lambda one: simdtex.jobs.tiles.synthesize(one, (6, 7), "no.zarr", **OPTIONS),
     "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
     "fill": lambda one: simdtex.fill(one, HOLE, **OPTIONS),
     "hole": lambda one: simdtex.fill(PHOTO, one, **OPTIONS),

@@ -34,7 +34,7 @@ PUBLIC = {
 OTHERS = {"importlib.metadata", "PIL.TiffImagePlugin", "simdtex.maspar.accounting", "simdtex.methods.pyramid.algorithm"}
 """What other runs need."""
 COMMAND_LINE = """
-from simdtex.cli import main
+from simdtex.commands import main
 try:
     main({words})
 except SystemExit:
@@ -97,7 +97,7 @@ def test_a_whole_run_on_the_reference_needs_no_heavy_module(tmp_path):
 def test_a_library_of_an_extra_costs_a_sentence(tmp_path, monkeypatch, library, words, extra):
     monkeypatch.chdir(tmp_path)
     write("a.png", np.arange(256, dtype=np.uint8).reshape(16, 16))
-    for name in [name for name in sys.modules if name.startswith(("simdtex.report", library))]:
+    for name in [name for name in sys.modules if name.startswith(("simdtex.figures", library))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, library, None)
     said = CliRunner().invoke(cli.main, words)
@@ -162,7 +162,7 @@ def interrupted(tmp_path, way, module, size="64", before=None):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-@pytest.mark.parametrize(("way", "module"), [("module", "simdtex.cli"), ("module", "numpy"), ("script", "click")])
+@pytest.mark.parametrize(("way", "module"), [("module", "simdtex.commands"), ("module", "numpy"), ("script", "click")])
 def test_ctrl_c_during_imports_ends_with_one_line(tmp_path, way, module):
     result = interrupted(tmp_path, way, module)
     assert result.returncode == 130, result.stderr

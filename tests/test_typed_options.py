@@ -21,7 +21,9 @@ from simdtex.cli import inputs as readers
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import input_options
 from simdtex.jobs import inputs as checks
-from simdtex.methods import classifier, mrf, pyramid
+from simdtex.jobs.classification import options as classifier
+from simdtex.methods import mrf
+from simdtex.methods.pyramid import options as pyramid
 from simdtex.options import Number, documented, option, resolve
 
 ROOT = Path(simdtex.__file__).parents[1]
@@ -81,7 +83,7 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
 
         glitter: float = option(0.5, Number(0), "Make it glitter", paper=0.25, **how)
 
-    Options.__module__ = "simdtex.methods.pyramid"
+    Options.__module__ = "simdtex.methods.pyramid.options"
     monkeypatch.setattr(pyramid, "Options", Options)
     monkeypatch.setitem(page.TABLES, "pyramid", (Options, "mix"))
     given = [

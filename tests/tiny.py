@@ -32,7 +32,7 @@ MIXED = {"iterations": 1, "levels": 1, "rng": 1}
 
 def tiles(on):
     """A picture in tiles, with known pixels."""
-    from simdtex import distributed
+    from simdtex.jobs import tiles as distributed
 
     known = np.ma.MaskedArray(texture((12, 11)), np.indices((12, 11)).sum(0) % 3 > 0)
     with tempfile.TemporaryDirectory() as folder:

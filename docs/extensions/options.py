@@ -17,8 +17,8 @@ from textwrap import dedent, indent
 
 import click
 
-from simdtex.cli import load
 from simdtex.cli.command import entries_of
+from simdtex.commands import load
 from simdtex.options import UNSET, quoted, table
 
 
@@ -58,7 +58,7 @@ def paper_values(method):
     """The options of a method whose values in the paper are known."""
     rows = [".. list-table::", "   :header-rows: 1", "   :widths: 25 20 20 35", "", "   * - Option", "     - Default"]
     rows += ["     - In the paper", "     - Symbol, equation"]
-    for name, one in table(import_module(f"simdtex.methods.{method}").Options).items():
+    for name, one in table(import_module(f"simdtex.{method}").Options).items():
         if one.paper is not UNSET or one.symbol:
             paper = "" if one.paper is UNSET else f"``{quoted(one.paper)}``"
             default = "" if one.default is None else f"``{quoted(one.default)}``"

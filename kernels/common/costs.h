@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What candidate p costs a site, simdtex.ops.costs: the sum of these, in this order,
+// What candidate p costs a site, simdtex.methods.mrf.costs: the sum of these, in this order,
 //
 //   factor d_p                                        equation (12), less where it continues a neighbour: coherence.h
 //   penalty_p                                         for its use

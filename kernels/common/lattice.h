@@ -9,7 +9,7 @@
 #define AXES 2
 #endif
 
-// simdtex.model.lattice.LATTICE is the same; tests/test_level.py holds the one against the other.
+// simdtex.model.lattice.LATTICE is the same; tests/methods/mrf/test_level.py holds the one against the other.
 typedef struct {
     int layers, rows, cols;                      // sites; a picture has one layer
     int around_layers, around_rows, around_cols; // whether the axis wraps around

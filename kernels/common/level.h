@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What stays the same for all relaxations of a level. simdtex.ops.relax.LEVEL is the same; tests/test_level.py holds the
+// What stays the same for all relaxations of a level. simdtex.methods.mrf.relax.LEVEL is the same; tests/methods/mrf/test_level.py holds the
 // one against the other.
 #ifndef SIMDTEX_LEVEL_H
 #define SIMDTEX_LEVEL_H

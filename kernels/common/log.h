@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // log(x) of normal x > 0 with the same bits on every device: x = 2^k (1 + r) and a polynomial of degree 9 in r, every
-// step an fma. Absolute error below 1.2e-6 for x < 2^24, above 2^-34 (tests/test_arithmetic.py measures it).
+// step an fma. Absolute error below 1.2e-6 for x < 2^24, above 2^-34 (tests/machine/test_arithmetic.py measures it).
 #ifndef SIMDTEX_LOG_H
 #define SIMDTEX_LOG_H
 

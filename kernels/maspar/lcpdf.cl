@@ -17,7 +17,7 @@
 #define STEP 4 // vectors of candidates in registers together
 #define TOGETHER (STEP * V)
 
-// simdtex.ops.lcpdf.Window
+// simdtex.methods.mrf.lcpdf.Window
 #define WINDOW const float scale, TABLE(uint, noise), TABLE(float, gauss), const int radius, const int top
 
 // simdtex.maspar.instructions.Broadcast, a neighbourhood, and the best candidate so far

@@ -637,8 +637,8 @@ def check_source_map(path: Path, samples: Material, everywhere: bool) -> None:
 
 def _write_copies(path: Path, made: NDArray[Any]) -> None:
     """Write 3x3 copies of a picture, edge to edge, of at most `SHEET` pixels a side."""
+    from simdtex.figures.sheet import fitted, rgb
     from simdtex.io import image
-    from simdtex.report.sheet import fitted, rgb
 
     image.write(path, fitted(np.tile(rgb(made), (3, 3, 1)), SHEET))
 

@@ -82,7 +82,7 @@ def job(
             **own: Any,
         ) -> None:
             if report:
-                from simdtex.report.page import check_folder
+                from simdtex.figures.page import check_folder
 
                 check_folder(report)
             task = plan(**own)
@@ -116,7 +116,7 @@ def job(
                 if task.more:
                     task.more(made, output)
             if profile:
-                from simdtex.report.tables import print_profile
+                from simdtex.figures.tables import print_profile
 
                 print_profile(statistics)
 
@@ -193,8 +193,8 @@ def observed(make: Callable[..., Any], device: str | None) -> tuple[float, int]:
 
 def expected(device: str | None, *makes: Callable[..., Any]) -> str:
     """Return the levels and the memory of the last of several runs, and the expected time of all, in words."""
+    from simdtex.figures.tables import duration_text
     from simdtex.machine import memory, open_machine
-    from simdtex.report.tables import duration_text
 
     times, levels = zip(*(observed(make, device) for make in makes), strict=True)
     machine = open_machine(device)
@@ -248,13 +248,6 @@ def notes(output: Any) -> None:
         click.echo(found)
 
 
-def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) -> None:
-    """Write the page of a texture and its sample, and the command line."""
-    from simdtex.report.synthesis import write_synthesis
-
-    write_synthesis(folder, sample, made, output, command_line(), **how)
-
-
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Show a progress bar on a terminal; elsewhere print a line every two seconds, for each per cent at most.
@@ -283,7 +276,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
             click.echo(line, err=True)
 
     def duration(seconds: float) -> str:
-        from simdtex.report.tables import duration_text
+        from simdtex.figures.tables import duration_text
 
         return f"about {duration_text(seconds)}"
 
@@ -317,7 +310,7 @@ def watching(
     """Yield a callback that moves a progress bar and writes the stages into a folder, if there is one for them."""
     writer = None
     if stages:
-        from simdtex.report.sheet import StageWriter
+        from simdtex.figures.sheet import StageWriter
 
         writer = StageWriter(stages, limits=limits, resumed=lambda: bool(checkpoint and checkpoint.resumed))
     with progress_bar(quiet) as show:

@@ -26,6 +26,7 @@ from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of, plain_array
 from simdtex.io.places import ascending, located
 from simdtex.machine import Machine, memory
+from simdtex.maspar.accounting import accounting
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.light import Relit, Trend, trend, unevenness
@@ -74,7 +75,11 @@ class Work(NamedTuple):
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Run the job; its pictures have the light of the picture that they continue."""
-        run: Any = self.run if callable(self.run) else partial(drive, self.run)
+        run: Any = (
+            self.run
+            if callable(self.run)
+            else partial(drive, self.run, others=accounting(getattr(self.options, "array", None)))
+        )
         relit, seen = self.relit, callback
         if relit and callback:
 

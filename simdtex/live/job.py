@@ -19,14 +19,18 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.inputs import inputs
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
-from simdtex.jobs.classification import classify
-from simdtex.jobs.filling import HoleReplay, extend, fill
-from simdtex.jobs.synthesis import synthesize
+from simdtex.jobs.classification import options as classifier
+from simdtex.jobs.classification.job import classify
+from simdtex.jobs.classification.model import FEWEST_NEIGHBOURHOODS
+from simdtex.jobs.filling.job import extend, fill
+from simdtex.jobs.synthesis.job import synthesize
+from simdtex.jobs.why.holes import HoleReplay
+from simdtex.jobs.why.replay import Replay
 from simdtex.live import frames
 from simdtex.machine import Machine
-from simdtex.methods import classifier, mrf, multires, pyramid
-from simdtex.methods.classifier.model import FEWEST_NEIGHBOURHOODS
-from simdtex.methods.mrf.replay import Replay
+from simdtex.methods import mrf
+from simdtex.methods.multires import options as multires
+from simdtex.methods.pyramid import options as pyramid
 from simdtex.model.display import label_colours
 from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, one_of, real, shown, table, whole
 from simdtex.run import Output

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.image import to_display, write
+from simdtex.jobs.why.replay import Replay
 from simdtex.live import frames
 from simdtex.live.job import Job
 from simdtex.machine import Machine
-from simdtex.methods.mrf.replay import Replay
 from simdtex.model.display import write_labels
 from simdtex.model.explanation import Explanation
 from simdtex.model.light import sample_sentences
@@ -78,7 +78,7 @@ class Result:
 
     @cached_property
     def _fault_map(self) -> NDArray[np.uint8]:
-        from simdtex.experiments.quality import lattice_fault_map
+        from simdtex.jobs.studies.quality import lattice_fault_map
 
         found = lattice_fault_map(self.job.sample, self.image)
         return np.zeros(self.job.shape, np.uint8) if found is None else found.astype(np.uint8)
@@ -217,7 +217,7 @@ class Inside:
     def explain(self, row: Any, col: Any, **other: Any) -> dict[str, Any]:
         """Return an explanation of the shown value of an output pixel, as plain numbers.
 
-        ``other`` are ``order`` and ``trust`` of `simdtex.methods.mrf.replay.Replay.explain`. ``orders`` is the largest
+        ``other`` are ``order`` and ``trust`` of `simdtex.jobs.why.replay.Replay.explain`. ``orders`` is the largest
         order, 0 if no other one can be given.
         """
         for name, number, side in zip(("row", "column"), (row, col), self.job.shape, strict=True):

@@ -27,7 +27,7 @@ from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as websocket_server
 from websockets.typing import Data
 
-from simdtex.jobs.synthesis import synthesize
+from simdtex.jobs.synthesis.job import synthesize
 from simdtex.live import PAGE, script, style
 from simdtex.live.job import Message, Picture
 from simdtex.live.session import MAX_BYTES, Send, Session

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing, pack
 from simdtex.io.image import EXAMPLES, TISSUE, Image, example, read_bytes
-from simdtex.jobs.synthesis import synthesize
+from simdtex.jobs.synthesis.job import synthesize
 from simdtex.live import frames
 from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
 from simdtex.live.results import THUMBNAIL, Inside, Result, Results, film

@@ -16,5 +16,5 @@ def __getattr__(name: str) -> Any:
     if name == "synthesize":  # checks its input as other jobs do, and so is one of them
         from importlib import import_module
 
-        return import_module("simdtex.jobs.array").synthesize
+        return import_module("simdtex.maspar.job").synthesize
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,6 +8,8 @@ candidates of any run: one step of it is executed on an array without a machine,
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -15,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.maspar.algorithm import Level, Pass, Problem, Program
-from simdtex.maspar.array import MAPPINGS, ProcessorArray
+from simdtex.maspar.array import ProcessorArray
 from simdtex.maspar.machine import COSTS, MP1, Mask
 from simdtex.maspar.sites import Walk
+from simdtex.methods.mrf.lcpdf import Choice
+from simdtex.methods.mrf.level import Info, Lattices, State
+from simdtex.model.array import MAPPINGS, parse_array
 from simdtex.model.lattice import Grid
-from simdtex.ops.lcpdf import Choice
+from simdtex.run import Observer
 
 FLOP = 4
 """Operations for one neighbour and channel of equation (12): x_r u - y_r u, squared, added."""
@@ -92,3 +97,43 @@ class Account:
             "instructions": {kind: self.total[kind] for kind in COSTS},
             "model_seconds": sum(self.total[kind] * cost.seconds for kind, cost in COSTS.items()),
         }
+
+
+class Accounting(Observer):
+    """The observer that keeps the `Account` of a run on a processor array, which is named as in the option ``array``."""
+
+    def __init__(self, array: str, run: Lattices) -> None:
+        super().__init__(run, None)
+        self.account = Account(ProcessorArray(*parse_array(array)), run.offsets, run.sample.channels)
+        self._level, self._launches = -1, run.machine.launches
+
+    def step(self, state: State, info: Info) -> None:
+        """Count the cost of a sweep."""
+        if info.level != self._level:
+            self._begin(info.level)
+        for chosen in info.chosen:
+            for step in chosen.apart(self._run.machine):
+                self.account.step(step.sites)
+
+    def _begin(self, number: int) -> None:
+        level, self._level = self._run.level(number), number
+        self.account.begin(level.grid, level.proposal.slots, level.relaxation.choice)
+
+    def statistics(self) -> dict[str, Any]:
+        """Return the account, and the kernels that the machine has launched since the run began."""
+        return {"accounting": self.account.report() | {"launches": self._run.machine.launches - self._launches}}
+
+    def save(self) -> dict[str, Any]:
+        """Return the level and the totals."""
+        return {"level": self._level, "total": self.account.total}
+
+    def load(self, saved: dict[str, Any]) -> None:
+        """Continue from the totals that `save` returned."""
+        if saved["level"] >= 0:
+            self._begin(saved["level"])
+        self.account.total.update(saved["total"])
+
+
+def accounting(array: str | None) -> tuple[Callable[[Any], Observer], ...]:
+    """Return what makes the observer for the value of the option ``array``, see `simdtex.driver.drive`."""
+    return (partial(Accounting, array),) if array else ()

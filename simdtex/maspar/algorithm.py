@@ -7,7 +7,7 @@ the paper's. The program has the bytes of `simdtex.synthesize` with ``preset="pa
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import count
 from typing import NamedTuple
 
@@ -19,10 +19,9 @@ from simdtex.maspar import instructions
 from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import EXP, MP1, NOISE, PHILOX, Mask, Plural
 from simdtex.maspar.sites import Walk, coloring
+from simdtex.methods.mrf.lcpdf import Choice, Key, log_legal, turns
+from simdtex.methods.mrf.square import LANES
 from simdtex.model.lattice import Grid
-from simdtex.ops.ising import heat_bath_chances
-from simdtex.ops.lcpdf import Choice, Key, log_legal, turns
-from simdtex.ops.square import LANES
 
 
 class Level(NamedTuple):
@@ -196,6 +195,22 @@ class Pass:
             if self.shares:
                 mp1.count(broadcast=len(choice.window.noise), integer=PHILOX + len(choice.window.noise))
                 mp1.execute(instructions.lcpdf_step, program.state[c], choice.window, program.place, key, c)
+
+
+def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
+    """Return the probabilities of spin up, in units of 2**-32: (temperatures, N + 1, N + 1) uint32.
+
+    P(up) = 1 / (1 + exp(-2 S / T)), rounded, for a site with n neighbours on the lattice of which u are up, S = 2 u -
+    n, and temperatures in units of J / k_B. Probabilities that round to 1 are 1 - 2**-32.
+    """
+    from scipy.special import expit
+
+    members, up = np.indices((neighbours + 1, neighbours + 1))
+    field = 2.0 * (2 * up - members)
+    with np.errstate(over="ignore"):  # at a tiny temperature the probabilities are 0, 1/2 and 1
+        chance = expit(field / np.asarray(temperatures, np.float64)[:, None, None])
+    whole: NDArray[np.uint32] = np.minimum(np.rint(chance * 2.0**32), 2.0**32 - 1).astype(np.uint32)
+    return whole
 
 
 def ising(mp1: MP1, temperature: float, sweeps: int, seed: int, synchronous: bool = False) -> Plural:

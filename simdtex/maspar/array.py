@@ -7,7 +7,6 @@ on one layer; PEs without a site to relax are masked.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -15,26 +14,12 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.array import MAPPINGS
 from simdtex.model.lattice import Grid
-from simdtex.options import one_of, shown
-
-MAPPINGS = ("cut-and-stack", "hierarchical")
-
-PREFIX = "maspar-mp1-"
-ARRAYS = {
-    "maspar-mp1-1k": (32, 32),
-    "maspar-mp1-2k": (32, 64),
-    "maspar-mp1-4k": (64, 64),
-    "maspar-mp1-8k": (64, 128),
-    "maspar-mp1-16k": (128, 128),
-}
-"""Rows and columns of the models of the MP-1."""
+from simdtex.options import one_of
 
 DIRECTIONS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
 """The directions of the X-Net, (rows, columns)."""
-
-LARGEST = 2**22
-"""PEs of the largest array."""
 
 
 @dataclass(frozen=True)
@@ -147,32 +132,3 @@ def path(offsets: NDArray[np.int32]) -> list[tuple[int, int, int | None]]:
             at = (at[0] + step[0], at[1] + step[1])
             moves.append((step[0], step[1], free.pop(there) if at == there else None))
     return moves
-
-
-def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
-    """Return the processor array described by a text.
-
-    Parameters
-    ----------
-    text : str
-        ``"ROWSxCOLS"`` or a key of `ARRAYS`, which may be short as in ``"16k"``; either may be followed by
-        ``":cut-and-stack"`` or ``":hierarchical"``.
-    mapping : str
-        The mapping if the text names none.
-
-    Raises
-    ------
-    ValueError
-        The text names no array, or more than `LARGEST` PEs.
-    """
-    models = "|".join(name.removeprefix(PREFIX) for name in ARRAYS)
-    form = rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|(?:{PREFIX})?({models}))(?::(.*))?"
-    found = re.fullmatch(form, text if isinstance(text, str) else "")
-    if not found:
-        raise ValueError(
-            f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
-        )
-    rows, cols = ARRAYS[PREFIX + found[3]] if found[3] else (int(found[1]), int(found[2]))
-    if rows * cols > LARGEST:
-        raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
-    return ProcessorArray(rows, cols, mapping if found[4] is None else found[4])

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.maspar.array import Layout
-from simdtex.ops.arithmetic import fma32, minus_gumbel
-from simdtex.ops.lcpdf import Key, Window, spread, stepped, weighed, weights
-from simdtex.ops.relax import PAIRS
-from simdtex.ops.square import LANES
+from simdtex.methods.mrf.arithmetic import fma32, minus_gumbel
+from simdtex.methods.mrf.lcpdf import Key, Window, spread, stepped, weighed, weights
+from simdtex.methods.mrf.relax import PAIRS
+from simdtex.methods.mrf.square import LANES
 from simdtex.random import GUMBEL, below, draw4
 
 Array: TypeAlias = NDArray[Any]

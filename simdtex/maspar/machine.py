@@ -23,7 +23,7 @@ from simdtex.machine.interface import Array, Launcher, Machine
 from simdtex.maspar import instructions
 from simdtex.maspar.array import Layout, ProcessorArray
 from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, On
-from simdtex.ops.lcpdf import Key
+from simdtex.methods.mrf.lcpdf import Key
 
 FULL = 16384
 """PEs of the full MP-1, for which rates are published."""

@@ -2,9 +2,9 @@
 """The sites of a level on the array: their neighbourhoods, and their colours, equation (14).
 
 For the neighbourhood of every site at once all PEs shift one variable along a path through the offsets. A PE computes
-its colour, which is that of `simdtex.ops.sites`, from its row and column. Along the seam of a torus that cuts through
-the pattern, neighbours compare random keys: in each round the sites with the highest keys around take the lowest colour
-that is left.
+its colour, which is that of `simdtex.schedules.sites`, from its row and column. Along the seam of a torus that cuts
+through the pattern, neighbours compare random keys: in each round the sites with the highest keys around take the
+lowest colour that is left.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.maspar.array import DIRECTIONS, path
 from simdtex.maspar.machine import MP1, Mask, Plural
+from simdtex.methods.mrf.lcpdf import Key
 from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice
-from simdtex.ops.lcpdf import Key
 
 BITS = 64
 """Colours in a word of taken colours."""

@@ -2,9 +2,9 @@
 """Sites with given values, which do not change, and soft data: the probability of categories and pictures at sites.
 
 A given site, hard data or the known part of a picture, has the temperature 0 from the start and never relaxes. At a
-coarse level, a datum between the sites is compared at its own position (`simdtex.ops.costs`). A guide's value between
-the sites moves to the nearest site without a value, for that level only; of several values for a site, the nearest, and
-of equally near ones the first, row by row.
+coarse level, a datum between the sites is compared at its own position (`simdtex.methods.mrf.costs`). A guide's value
+between the sites moves to the nearest site without a value, for that level only; of several values for a site, the
+nearest, and of equally near ones the first, row by row.
 
 A probability p of a kind (a category, or a training image) whose share of the sample's pixels is q costs its candidates
 

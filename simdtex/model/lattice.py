@@ -76,7 +76,7 @@ class Grid:
         The place in the whole lattice of the first site of a window. None: this is the whole lattice.
     tile : (int, int), optional
         Rows and columns of tiles. Neighbours in another tile are then read from an older picture, which lies below the
-        picture in the same array (`simdtex.ops.snapshot`).
+        picture in the same array (`simdtex.methods.mrf.snapshot`).
     key : (int, int, int)
         The number of the picture's first pixel in a larger output, the columns of that, 0: those of the picture, and
         its pixels along a pixel of the picture.

@@ -514,7 +514,7 @@ class Sample:
         return found
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
-        """Return the pixels (rows, cols, C) of ``source``, plus the differences from `simdtex.ops.finish`.
+        """Return the pixels (rows, cols, C) of ``source``, plus the differences from `simdtex.methods.mrf.finish`.
 
         ``source`` (rows, cols) are pixel indices; ``by`` (C, rows, cols) are working levels of 8-bit samples, and
         `FINE`-ths of a working level of others.

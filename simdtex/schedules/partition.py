@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Array, Machine
 from simdtex.model.lattice import Grid, Sublattice, coloring_of_layers
-from simdtex.ops.sites import Plan, by_color, coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Lists, Setting
+from simdtex.schedules.sites import Plan, by_color, coloring, lattice_plan
 
 
 class State(NamedTuple):
@@ -52,7 +52,7 @@ class Partition:
         return State()
 
     def lists(self, setting: Setting) -> Lists:
-        """Return all sites, group after group, and the bounds of the groups (`simdtex.ops.sites.by_color`)."""
+        """Return all sites, group after group, and the bounds of the groups (`simdtex.schedules.sites.by_color`)."""
         machine, grid, offsets, order, seed, _ = setting
         group = self.groups(machine, grid, offsets, order, seed)
         if isinstance(group, np.ndarray) and not self.windows:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.model.lattice import Grid
-from simdtex.ops.sites import luby
 from simdtex.schedules.schedule import Active, Info, Setting
+from simdtex.schedules.sites import luby
 
 
 class State(NamedTuple):

@@ -3,7 +3,7 @@
 
 `Run.begin`, `Run.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. The schedule
 first chooses the sites of a step of 6.2.2, which do not depend on one another; a device then relaxes all of them in one
-launch (`simdtex.ops.relax`). The observer (record.py) keeps progress, counts and stages.
+launch (`simdtex.methods.mrf.relax`). The observer (record.py) keeps progress, counts and stages.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.checkpoint import like
+from simdtex.methods.mrf.commit import commit
+from simdtex.methods.mrf.finish import finish
 from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, with_penalty
+from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.record import Record, output
+from simdtex.methods.mrf.relax import Relaxation, relax, relax_out_of_place
+from simdtex.methods.mrf.snapshot import snapshot
+from simdtex.methods.mrf.start import start
+from simdtex.methods.mrf.use import use, use_penalty
 from simdtex.model.lattice import Grid
-from simdtex.ops.commit import commit
-from simdtex.ops.finish import finish
-from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Relaxation, relax, relax_out_of_place
-from simdtex.ops.sites import survey
-from simdtex.ops.snapshot import snapshot
-from simdtex.ops.start import start
-from simdtex.ops.use import use, use_penalty
 from simdtex.run import Callback, Output
+from simdtex.schedules.sites import survey
 
 AT_ONCE = 2**20
 """Sites that are finished together."""
@@ -203,7 +203,7 @@ def with_snapshot(level: Level, field: Field) -> Field:
 def finished_picture(
     run: Lattices, grid: Grid, field: Field, known: NDArray[np.bool_] | None, seen: NDArray[np.int32], first: int = 0
 ) -> NDArray[Any]:
-    """Return the picture in the sample's type, with the finish (`simdtex.ops.finish`) if the options have one.
+    """Return the picture in the sample's type, with the finish (`simdtex.methods.mrf.finish`) if the options have one.
 
     ``grid`` is the finest level or a window of it, ``field`` its sites, and ``known`` (H, W) its known sites; ``seen``
     (rows, cols) are the sources on the host, of all rows or of some rows from ``first`` on.

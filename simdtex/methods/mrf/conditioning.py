@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
-from simdtex.methods.mrf.input import Input
+from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.problem import Input
 from simdtex.model.given import NO_STAND_IN, Stand, between, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
-from simdtex.ops.neighbourhood import Confidences, Field
 
 
 def heaviest(options: Options, neighbours: int) -> float:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
+from simdtex.methods.mrf import lcpdf
+from simdtex.methods.mrf.costs import Costs, Scattered
+from simdtex.methods.mrf.neighbourhood import Field
+from simdtex.methods.mrf.relax import AllCandidates, Relaxation
+from simdtex.methods.mrf.square import TAIL, square_of
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Places, Sample
-from simdtex.ops import lcpdf
-from simdtex.ops.costs import Costs, Scattered
-from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import AllCandidates, Relaxation
-from simdtex.ops.square import TAIL, square_of
 
 AT_ONCE = 4096
 """The most sites whose tables are made together."""

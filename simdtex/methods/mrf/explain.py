@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.methods.mrf import lcpdf
+from simdtex.methods.mrf.costs import continuing
 from simdtex.methods.mrf.level import Lattices, with_penalty
+from simdtex.methods.mrf.neighbourhood import Field, near
+from simdtex.methods.mrf.relax import SUGGESTING, AllCandidates, Relaxation, relax_out_of_place
 from simdtex.model.explanation import Explanation, Neighbours, Ranked
 from simdtex.model.lattice import MOST_ORDER, gathered, neighbourhood_offsets
-from simdtex.ops import lcpdf
-from simdtex.ops.costs import continuing
-from simdtex.ops.neighbourhood import Field, near
-from simdtex.ops.relax import SUGGESTING, AllCandidates, Relaxation, relax_out_of_place
 from simdtex.options import real, whole
 
 MOST = 100

@@ -14,22 +14,31 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
+from simdtex.methods.mrf import lcpdf
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
-from simdtex.methods.mrf.input import Input
+from simdtex.methods.mrf.costs import Costs, Kinds, Phased, Scattered
+from simdtex.methods.mrf.lcpdf import Choice
+from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.options import Options, largest_order
+from simdtex.methods.mrf.problem import Input
+from simdtex.methods.mrf.relax import (
+    EXHAUSTIVE,
+    IN_PHASE,
+    AllCandidates,
+    CandidateList,
+    InPhase,
+    Relaxation,
+    alike,
+    in_phase,
+)
+from simdtex.methods.mrf.square import TAIL, square_of
+from simdtex.methods.mrf.use import STEPS, FairUse, Regions
 from simdtex.model.given import nearest_data
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places
-from simdtex.ops import lcpdf
-from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
-from simdtex.ops.lcpdf import Choice
-from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import EXHAUSTIVE, IN_PHASE, AllCandidates, CandidateList, InPhase, Relaxation, alike, in_phase
-from simdtex.ops.sites import among, stretches
-from simdtex.ops.square import TAIL, square_of
-from simdtex.ops.use import STEPS, FairUse, Regions
 from simdtex.schedules import Setting
 from simdtex.schedules.schedule import Lists
+from simdtex.schedules.sites import among, stretches
 
 WHOLE = 256
 """Number of candidates of a coarsest level up to which neighbourhoods cover much of the sample's layout."""
@@ -63,7 +72,7 @@ class State(NamedTuple):
         t in units of 1/1024.
     penalty : (n + regions x kinds,) float32 array
         Penalties during the next sweep, of each candidate of the level and of each kind in each region
-        (`simdtex.ops.use.use_penalty`).
+        (`simdtex.methods.mrf.use.use_penalty`).
     schedule : tuple of arrays and numbers
         The schedule's own state.
     level : int
@@ -414,13 +423,13 @@ class Level:
     setting : simdtex.schedules.Setting
         The input of its schedule.
     schedule : simdtex.schedules.Schedule
-    relaxation : simdtex.ops.relax.Relaxation
+    relaxation : simdtex.methods.mrf.relax.Relaxation
         The relaxation of its sites, except for the penalty of each candidate, which changes with every sweep.
     rate : float
         lambda N C sigma^2: the cost of a candidate whose surroundings are used twice as often as their share.
-    fair_use : simdtex.ops.use.FairUse
+    fair_use : simdtex.methods.mrf.use.FairUse
         The positions of the candidates, and the fair use of each.
-    regions : simdtex.ops.use.Regions, optional
+    regions : simdtex.methods.mrf.use.Regions, optional
         The shares of categories that are asked.
     in_place : bool
         Whether sites of a step may be written while other sites of it are read: no two are neighbours.

@@ -11,7 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.maspar.array import ARRAYS, parse_array
+from simdtex.model.array import ARRAYS, parse_array
 from simdtex.model.lattice import MOST_ORDER
 from simdtex.model.pictures import CATEGORIES, Pictures, few
 from simdtex.model.regularity import LATTICES, parse_lattice

@@ -15,9 +15,10 @@ from simdtex import schedules
 from simdtex.machine import Machine, memory
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.conditioning import centre_known, heaviest
-from simdtex.methods.mrf.input import Input
+from simdtex.methods.mrf.finish import gaussian_offsets
 from simdtex.methods.mrf.level import number_of_levels
 from simdtex.methods.mrf.options import Options, of_palette
+from simdtex.methods.mrf.problem import Input
 from simdtex.model.given import Given, Soft, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
@@ -25,7 +26,6 @@ from simdtex.model.pictures import CATEGORIES as MOST
 from simdtex.model.pictures import NothingUsable, Pictures
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import Sample
-from simdtex.ops.finish import gaussian_offsets
 from simdtex.options import within_32_bits
 
 LABELS = 64

@@ -1,53 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The observer of a run of Algorithm 1: progress, counts, stages, and the cost of the run on a processor array."""
+"""The observer of a run of Algorithm 1: progress, counts, and stages."""
 
 from __future__ import annotations
 
 import time
 from functools import partial
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.reference import Reference
-from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.explain import Moment, explained
 from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
+from simdtex.methods.mrf.neighbourhood import Field
+from simdtex.methods.mrf.relax import CandidateList, most_listed
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid
 from simdtex.model.source_map import effective_use
-from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import CandidateList, most_listed
 from simdtex.run import Callback, Observer, OutputWithSource, Progress, Stage
-
-if TYPE_CHECKING:
-    from simdtex.maspar.accounting import Account
 
 STEP, LISTED = 200_000, 16
 """What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
 
 
 class Record(Observer):
-    """The observer of a run: it reports every part of a sweep, and keeps counts and the stage of every level.
-
-    ``launches`` is the number of kernels that the machine had launched before the run.
-    """
+    """The observer of a run: it reports every part of a sweep, and keeps counts and the stage of every level."""
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
         super().__init__(run, callback)
-        options = run.options
-        self.account: Account | None = None
-        if options.array:
-            from simdtex.maspar.accounting import Account  # loads the emulator
-
-            self.account = Account(parse_array(options.array), run.offsets, run.sample.channels)
-        self.launches = run.machine.launches
         self._expected = expected_work(run)
         self._fraction = 0.0
         self._first_left = 0.0  # of the current level
-        self._slots, self._listed = 0, False  # candidates that a relaxation evaluates; whether they are listed
+        self._listed = False  # whether the candidates of a relaxation are listed
         self._done = 0  # relaxed sites of the current sweep
         self._ended = True  # the next part begins a sweep
         self._skipped = self._evaluations = 0  # the latter of the level before the run was resumed
@@ -110,12 +96,8 @@ class Record(Observer):
         self._fraction = max(self._fraction, fraction_done(self._expected, level, cooled, free))
 
     def step(self, state: State, info: Info) -> None:
-        """Count the cost of a sweep on a processor array; at the end of a level, keep its picture."""
+        """Keep the picture of a level at its end."""
         machine = self._run.machine
-        if self.account:
-            for chosen in info.chosen:
-                for step in chosen.apart(machine):
-                    self.account.step(step.sites)
         if info.ended:
             level, report = self._run.level(info.level), self.reports[-1]
             self.stages.append(Stage(level.number, picture(self._run.of(level.number), level.grid, state.field)))
@@ -137,21 +119,18 @@ class Record(Observer):
         """Start the report of a level."""
         self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
         self._evaluations = 0
-        self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, CandidateList)
+        self._listed = isinstance(level.proposal, CandidateList)
         grid, candidates = level.grid, level.proposal.candidates.size
         names = ("layers", "rows", "cols")[-len(grid.shape) :]
         sizes = {"level": level.number, **dict(zip(names, grid.shape, strict=True)), "candidates": candidates}
         counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
         work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
         self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
-        if self.account:
-            self.account.begin(grid, self._slots, level.relaxation.choice)
 
     def save(self) -> dict[str, Any]:
         """Return everything received so far, as plain arrays and numbers."""
         return super().save() | {
-            **{"account": self.account and self.account.total, "fraction": self._fraction},
-            **{"slots": self._slots, "listed": self._listed, "first_left": self._first_left},
+            **{"fraction": self._fraction, "listed": self._listed, "first_left": self._first_left},
             **{"evaluations": self._evaluated(), "skipped": self._run.machine.spared - self._skipped},
         }
 
@@ -159,21 +138,14 @@ class Record(Observer):
         """Continue from the tree that `save` returned."""
         super().load(saved)
         self._fraction, self._first_left = saved["fraction"], saved["first_left"]
-        self._slots, self._listed = saved["slots"], saved["listed"]
+        self._listed = saved["listed"]
         self._skipped, self._evaluations = self._run.machine.spared - saved["skipped"], saved["evaluations"]
-        if self.account and self.reports:
-            number = self.reports[-1]["level"]
-            self.account.begin(self._run.grid(number), self._slots, self._run.of(number).choice(number))
-            self.account.total.update(saved["account"])
 
 
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> OutputWithSource:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
     place, t = run.sample.place(source), run.grid(0).latest(run.machine.get(state.temperature))
     statistics = known_before(run) | {"levels": record.reports, "use": None}
-    if record.account:
-        launches = run.machine.launches - record.launches
-        statistics["accounting"] = record.account.report() | {"launches": launches}
     taken = place[..., 0] >= 0
     if place.shape[-1] == 2 and taken.any():  # of one picture
         statistics["use"] = effective_use(place[taken][None], run.sample.pictures.pixels[0].shape).as_dict()
@@ -219,7 +191,6 @@ def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
     work = {}
     for number in range(whole.levels):
         run, grid = whole.of(number), whole.grid(number)
-        options = run.options
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
         each = run.places(number).positions.size

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.multires import Options
 from simdtex.methods.multires.analysis import (
     Analysis,
     analyse,
@@ -29,9 +28,10 @@ from simdtex.methods.multires.analysis import (
     read_sources,
     structure_of,
 )
+from simdtex.methods.multires.candidates import Sampled, candidates
+from simdtex.methods.multires.options import Options
+from simdtex.methods.pyramid.laplacian import laplacian_collapse
 from simdtex.model.source_map import effective_use
-from simdtex.ops.candidates import Sampled, candidates
-from simdtex.ops.pyramids import laplacian_collapse
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Observer, Output, OutputWithSource, Progress, Stage, paced
 
@@ -71,7 +71,7 @@ class State(NamedTuple):
     """The state between two launches.
 
     ``level``, the current level; ``done``, its number of sampled pixels; ``source`` and ``counts`` of all levels, as in
-    `simdtex.ops.candidates.Sampled`; ``picture``, G of the level above.
+    `simdtex.methods.multires.candidates.Sampled`; ``picture``, G of the level above.
     """
 
     level: int

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.multires import Options
+from simdtex.methods.multires.candidates import Sampled, Structure
 from simdtex.methods.multires.mend import mend
-from simdtex.model.stretched import Stretched
-from simdtex.ops.candidates import Sampled, Structure
-from simdtex.ops.pyramids import FILTER_SIDE, bank, filters, half, laplacian_band, laplacian_reduce
+from simdtex.methods.multires.options import Options
+from simdtex.methods.pyramid.laplacian import FILTER_SIDE, bank, filters, half, laplacian_band, laplacian_reduce
+from simdtex.methods.pyramid.stretched import Stretched
 
 _log = logging.getLogger(__name__)
 

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.pyramid import Options
+from simdtex.methods.pyramid.laplacian import noise
 from simdtex.methods.pyramid.matcher import Histograms, Matcher, Wanted, histograms
+from simdtex.methods.pyramid.matching import match_ranks
+from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import Decorrelated, Palette, decorrelated, palette
 from simdtex.methods.pyramid.pyramids import Transform, most_levels
-from simdtex.model.stretched import Stretched
-from simdtex.ops.matching import match_ranks
-from simdtex.ops.pyramids import noise
+from simdtex.methods.pyramid.stretched import Stretched
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Observer, Output, Progress
 

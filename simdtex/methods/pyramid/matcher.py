@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
-from simdtex.methods.pyramid import Options
+from simdtex.methods.pyramid.laplacian import noise
+from simdtex.methods.pyramid.matching import distance, inverse_cdf, match_lookup, ranking, sort
+from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.pyramids import Transform
-from simdtex.ops.matching import distance, inverse_cdf, match_lookup, ranking, sort
-from simdtex.ops.pyramids import noise
 
 Sorted = NDArray[np.int32]
 """(bands, m): the values of each band in ascending order."""

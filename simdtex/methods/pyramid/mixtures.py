@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
-from simdtex.methods.pyramid import Options
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.matcher import Histograms, Sorted, averaged, histograms, spliced
+from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
-from simdtex.model.stretched import Stretched
+from simdtex.methods.pyramid.stretched import Stretched
 from simdtex.options import real, whole
 
 

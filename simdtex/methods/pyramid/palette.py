@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.model.stretched import TOP
+from simdtex.methods.pyramid.stretched import TOP
 
 FINE = 2**14
 """Directions of axes are multiples of 2**-14, so that the last bit of a linear algebra library does not matter."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
-from simdtex.ops.pyramids import fold, laplacian_band, laplacian_collapse, laplacian_reduce, unfold
-from simdtex.ops.steerable import filters, steerable_join, steerable_split
+from simdtex.methods.pyramid.laplacian import fold, laplacian_band, laplacian_collapse, laplacian_reduce, unfold
+from simdtex.methods.pyramid.steerable import filters, steerable_join, steerable_split
 
 __all__ = ["Transform", "most_levels"]
 
@@ -70,8 +70,8 @@ class Transform:
         list of (bands, planes, rows, cols) int32 arrays of the machine
             Steerable: the high-pass residue H0, the oriented bands B_i of every level, finest first, the low-pass
             residue. Laplacian: b^0, b^1, ... and the low-pass residue. A level has half the rows and columns of the
-            one below, rounded up. On a torus an odd number is kept, in the order of `simdtex.ops.pyramids`, so that
-            there is no seam.
+            one below, rounded up. On a torus an odd number is kept, in the order of
+            `simdtex.methods.pyramid.laplacian`, so that there is no seam.
         """
         if not self._steerable:
             return self._make_laplacian(picture)

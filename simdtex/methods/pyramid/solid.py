@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Solid textures: section 4 of Heeger and Bergen (1995).
 
-The program is `simdtex.methods.pyramid.Run`; only the pyramids differ. The 3-D Laplacian pyramid of a block is matched
-with a 2-D Laplacian pyramid of the sample, and the steerable pyramids of all slices with that of the sample.
+The program is that of `simdtex.methods.pyramid.algorithm`; only the pyramids differ. The 3-D Laplacian pyramid of a
+block is matched with a 2-D Laplacian pyramid of the sample, and the steerable pyramids of all slices with that of the
+sample.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods import pyramid
+from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid.algorithm import (
     VALUES,
     Run,
@@ -28,7 +29,7 @@ from simdtex.methods.pyramid.algorithm import (
     transform,
 )
 from simdtex.methods.pyramid.matcher import Matcher, Wanted
-from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
+from simdtex.methods.pyramid.operations_solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
 from simdtex.options import Choice, documented, option, within_32_bits
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: BSD-3-Clause
-"""Studies of the methods: schedules compared, the Ising model, series of thresholds, figures of quality."""

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The model of a classifier: exemplars of its classes, their distances from their own class, and the drift of these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from simdtex import random
+from simdtex.jobs.classification.operations import (
+    LOGS,
+    SIXTEENTHS,
+    Exemplars,
+    exemplars,
+    features,
+    gaussian,
+    stacked,
+    window,
+)
+from simdtex.jobs.classification.options import Options
+from simdtex.jobs.classification.patterns import NEAR, OWN, Discriminant, patterns, roots
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.scale import Scale
+
+SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
+"""Standard deviations of the Gaussians that smooth the levels, pixels."""
+
+LEAST_SAMPLE_SIDE = 32
+"""The least side of a sample at level 0, pixels; each further level doubles it."""
+
+TEMPERATURE = 0.5
+"""Evidence is the mean logarithm of squared distances divided by this."""
+
+FEWEST_NEIGHBOURHOODS = 16
+"""The fewest neighbourhoods of a class at a level."""
+
+BANDS = 14
+"""The most bands of a picture."""
+
+VALUES = 258
+"""The most values of a raw neighbourhood, 0 to 255 each: sums of their products are then below 2**24 and exact."""
+
+CLASSES = 254
+"""The most classes: labels are bytes, and 0 is unknown."""
+
+BOX = 128
+"""The most rows and columns of a part of a sample that is compared with the other parts."""
+
+UNITS = 2**18
+"""Units in 1 of evidence, and of votes."""
+
+MEANS = 16
+"""Units of a mean logarithm over a window in one unit of its logarithms."""
+
+RAW = 0.35
+"""Share of raw neighbourhoods in the evidence; those with compressed contrast have the rest."""
+
+FINER = (1.0, 0.3, 0.09, 0.027, 0.0081)
+"""Weights of the evidence of levels, the finest first."""
+
+FLOOR = 1e-4
+"""The least variance of a measure."""
+
+
+class Expert(NamedTuple):
+    """A comparison of neighbourhoods: ``offsets`` (N, 2) int32 in pixels of a level, whether contrast is compressed.
+
+    ``reach`` is the farthest offset, in pixels, and ``factor`` the evidence, in `UNITS`, of one unit of its logarithms.
+    """
+
+    level: int
+    contrast: bool
+    offsets: NDArray[np.int32]
+    reach: int
+    factor: int
+
+
+def experts_of(options: Options, levels: int) -> list[Expert]:
+    """Return the experts of ``levels`` levels: raw and contrast-compressed neighbourhoods at each, the finest first.
+
+    An expert has the weight of its level, in `FINER`, times the share of its kind; the weights add up to
+    1 / `TEMPERATURE`.
+    """
+    total = sum(FINER[:levels])
+    found = []
+    for level in range(levels):
+        for contrast, order, share in ((False, options.order, RAW), (True, 2 * options.order, 1 - RAW)):
+            near = neighbourhood_offsets(order) * 2**level
+            offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
+            factor = round(UNITS / LOGS * FINER[level] * share / total / TEMPERATURE)
+            found.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
+    return found
+
+
+class Region(NamedTuple):
+    """Sites of a picture in one class.
+
+    ``pixels`` (rows, cols, B); ``sites`` (rows, cols) bool; ``whole``: whether neighbourhoods must lie within the
+    sites, or only their centres; ``judged``: whether the sites only show how the class differs from its exemplars.
+    """
+
+    pixels: NDArray[Any]
+    sites: Mask
+    whole: bool = True
+    judged: bool = False
+
+
+@dataclass(frozen=True)
+class Null:
+    """The differences of a class from itself: mean and variance (M,) of each of M measures over a window."""
+
+    mean: NDArray[np.float64]
+    variance: NDArray[np.float64]
+
+    def distance(self, measures: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean of squared differences of measures (M, n), each relative to its variance."""
+        total = np.zeros(measures.shape[1])
+        for value, mean, variance in zip(measures, self.mean, self.variance, strict=True):
+            total += (value - mean) ** 2 / variance
+        return total / len(measures)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A trained classifier, without any machine.
+
+    ``exemplars``, one for each expert, with all classes, in NumPy; ``offsets`` (classes,) int64, added to the evidence
+    of each class; ``discriminant`` of patterns; ``nulls``, one for each class; ``freedom``, the degrees of freedom of
+    their variances; ``own`` (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the
+    numbers of exemplars.
+    """
+
+    scale: Scale
+    experts: list[Expert]
+    exemplars: list[Exemplars]
+    offsets: NDArray[np.int64]
+    discriminant: Discriminant
+    nulls: list[Null]
+    freedom: int
+    own: NDArray[np.float64]
+    counts: list[int]
+
+
+def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
+    """Return the levels of a picture (rows, cols, B) on a machine, each (B, rows, cols) uint16 in sixteenths of 0..255.
+
+    Level 0 is the picture, and all further levels are smoothed by `SMOOTHING`, mirrored beyond the border.
+    """
+    planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
+    found = [machine.put(planes.astype(np.uint16))]
+    for level in range(1, levels):
+        found.append(machine.put(blurred(planes, gaussian(SMOOTHING[level])).astype(np.uint16)))
+    return found
+
+
+def measured(means: NDArray[np.int64], patterned: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the measures of windows, (M, n): mean logarithms (E, n), and roots of the frequencies of patterns."""
+    return np.concatenate([means / float(MEANS * LOGS), roots(patterned / float(MEANS))])
+
+
+def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Return planes (..., rows, cols) averaged over the window of `gaussian`, mirrored beyond the border."""
+    smooth = planes.astype(np.float64)  # exact for integers below 2**34 in magnitude
+    for axis in (-2, -1):
+        smooth = ndimage.correlate1d(smooth, taps.astype(np.float64), axis, mode="mirror")
+    return smooth.astype(np.int64) + UNITS // 2 >> 18
+
+
+def learn(
+    machine: Machine, classes: Sequence[Sequence[Region]], names: Sequence[str], options: Options, seed: int
+) -> Model:
+    """Return the model of classes, each given by regions of pictures of one type.
+
+    Raises ValueError if a neighbourhood has too many values, or a class fewer than `FEWEST_NEIGHBOURHOODS` of them.
+    """
+    regions = [region for one in classes for region in one]
+    bands = regions[0].pixels.shape[-1]
+    if (values := bands * len(experts_of(options, 1)[0].offsets)) > VALUES:
+        few = f"give a smaller order, so that there are {VALUES} at most"
+        raise ValueError(f"order={options.order} with {bands} bands compares {values} values; {few}")
+    scale = Scale(Pictures(tuple(region.pixels for region in regions)), 512)  # values of up to 12 bits
+    levels = _levels_of(options, classes, names)
+    experts = experts_of(options, levels)
+    taught = [_Class(machine, scale, experts, one) for one in classes]
+    drawn = [[one.draw(machine, e, options.exemplars, seed, c) for e in experts] for c, one in enumerate(taught)]
+    selves = [one.judge(machine, experts, options, seed, c) for c, one in enumerate(taught)]
+    own = np.array([one.mean for one in selves])
+    counts = [min(map(len, one)) for one in drawn]
+    offsets = []
+    for c, count in enumerate(counts):
+        typical = sum(expert.factor * options.typical * own[c, e] * LOGS for e, expert in enumerate(experts))
+        fewer = 2 * np.log(count / max(counts)) * LOGS  # equation (6) divides by the number of neighbourhoods
+        shift = sum(expert.factor * fewer / (len(expert.offsets) * bands) for expert in experts)
+        offsets.append(round(typical - shift))
+    nulls, freedom = _nulls(selves)
+    pooled = [stacked([one[e] for one in drawn]) for e in range(len(experts))]
+    discriminant = Discriminant.of([one.patterns for one in selves], [one.parts[:, len(experts) :] for one in selves])
+    return Model(scale, experts, pooled, np.array(offsets, np.int64), discriminant, nulls, freedom, own, counts)
+
+
+def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
+    """Return the number of levels at which all classes have enough sites; raise if it is 0."""
+    regions = [region for one in classes for region in one]
+    side = min(min(region.sites.shape) for region in regions)
+    most = max(1, sum(side >= LEAST_SAMPLE_SIDE << level for level in range(options.levels)))
+    for levels in range(most, 0, -1):
+        reach = experts_of(options, levels)[-1].reach
+        counts = [sum(int(_centres(region, reach).sum()) for region in one if not region.judged) for one in classes]
+        if min(counts) >= FEWEST_NEIGHBOURHOODS:
+            return levels
+    few = int(np.argmin(counts))
+    raise ValueError(
+        f"class {names[few]!r} has {counts[few]} whole neighbourhoods of {2 * reach + 1}x{2 * reach + 1} "
+        f"pixels, and {FEWEST_NEIGHBOURHOODS} are needed; give a larger sample of it"
+    )
+
+
+def _centres(region: Region, reach: int) -> Mask:
+    """Return the sites whose neighbourhoods of ``reach`` pixels are whole."""
+    rows, cols = region.sites.shape
+    inside = np.zeros((rows, cols), bool)
+    inside[reach : rows - reach, reach : cols - reach] = True
+    if not region.whole or region.sites.all():
+        return inside & region.sites
+    return np.asarray(inside & ndimage.minimum_filter(region.sites, 2 * reach + 1, mode="nearest"))
+
+
+def _cropped(region: Region, margin: int) -> Region:
+    """Return the part of a region with its sites and ``margin`` pixels around them."""
+    (sides,) = ndimage.find_objects(region.sites.astype(np.uint8))
+    box = tuple(slice(max(0, side.start - margin), side.stop + margin) for side in sides)
+    return region._replace(pixels=region.pixels[box], sites=region.sites[box])
+
+
+class _Part(NamedTuple):
+    """A part of a class to compare with the rest: the number of its region, and its sites there."""
+
+    region: int
+    sites: Mask
+
+
+class OwnDistances(NamedTuple):
+    """The distances of the parts of a class from the rest of it.
+
+    ``mean`` (E,) of the logarithms in natural units; ``windows`` (M, n), the measures of windows; ``parts`` (parts, M),
+    those of each part; ``patterns`` (P, n), roots of the frequencies of patterns in small windows.
+    """
+
+    mean: NDArray[np.float64]
+    windows: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    patterns: NDArray[np.float64]
+
+
+class _Class:
+    """The regions of a class on a machine."""
+
+    def __init__(self, machine: Machine, scale: Scale, experts: list[Expert], regions: Sequence[Region]) -> None:
+        margin = experts[-1].reach + len(gaussian(SMOOTHING[experts[-1].level] or 1)) // 2
+        self.regions = [_cropped(region, margin) for region in regions]
+        self._levels = [prepared(machine, scale, region.pixels, experts[-1].level + 1) for region in self.regions]
+
+    def draw(
+        self, machine: Machine, expert: Expert, most: int, seed: int, number: int, without: _Part | None = None
+    ) -> NDArray[np.float32]:
+        """Return random neighbourhoods of the class, (n, K), outside of the part ``without``."""
+        masks = []
+        for place, region in enumerate(self.regions):
+            mask = _centres(region, expert.reach) & (not region.judged)
+            masks.append(mask & ~without.sites if without and without.region == place else mask)
+        pool = np.concatenate([mask.ravel() for mask in masks])
+        sites = np.flatnonzero(pool)
+        if len(sites) < TOO_FEW and without:  # a small region, whose rest is too small
+            return self.draw(machine, expert, most, seed, number)
+        if len(sites) > most:
+            words = random.draw4(seed, expert.level, number, sites, random.SEARCH)[0]
+            sites = np.sort(sites[np.argsort(words, kind="stable")[:most]])
+        found, first = [], 0
+        for mask, levels in zip(masks, self._levels, strict=True):
+            own = sites[(sites >= first) & (sites < first + mask.size)] - first
+            first += mask.size
+            if own.size:
+                found.append(self._features(machine, levels, expert, own).T)
+        return np.concatenate(found)
+
+    def _features(
+        self, machine: Machine, levels: list[Array], expert: Expert, sites: NDArray[np.intp]
+    ) -> NDArray[np.float32]:
+        placed, offsets = machine.put(sites.astype(np.int32)), machine.put(expert.offsets)
+        return np.asarray(machine.get(features(machine, levels[expert.level], placed, offsets, expert.contrast)))
+
+    def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> OwnDistances:
+        """Return the distances of the parts of the class from the rest of it, for each expert, and their measures."""
+        taps = gaussian(options.window)
+        windows, parts, own, near = [], [], [], []
+        for place, region in enumerate(self.regions):
+            logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
+            judged = np.zeros(region.sites.shape, bool)
+            levels = [np.asarray(machine.get(one)) for one in self._levels[place]]
+            patterned = patterns(levels, slice(None))
+            for sites in _quarters(region.sites):
+                part = _Part(place, sites)
+                shown = np.flatnonzero(_boxed(sites))
+                for e, expert in enumerate(experts):
+                    rest = self.draw(machine, expert, options.exemplars, seed, number, part)
+                    values = machine.put(self._features(machine, self._levels[place], expert, shown))
+                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked([rest]).on(machine)))[0]
+                judged.reshape(-1)[shown] = True
+                sums = [
+                    MEANS * planes.reshape(len(planes), -1)[:, shown].sum(1, keepdims=True, dtype=np.int64)
+                    for planes in (logs, patterned)
+                ]
+                parts.append(measured(*(one // len(shown) for one in sums))[:, 0])
+                own.append(sums[0][:, 0] / (MEANS * len(shown) * LOGS))
+            windows.append(measured(*(windowed(machine, one, judged, taps, judged)[0] for one in (logs, patterned))))
+            near.append(roots(windowed(machine, patterned, judged, NEAR, judged)[0] / float(MEANS)))
+        return OwnDistances(np.array(own).mean(0), np.concatenate(windows, 1), np.array(parts), np.concatenate(near, 1))
+
+
+TOO_FEW = 8
+"""The fewest neighbourhoods for a comparison with a part."""
+
+
+def _quarters(sites: Mask) -> list[Mask]:
+    """Return sites in four nearly equal parts, divided by a row and by columns: above and below, left and right."""
+    row, col = np.nonzero(sites)
+    middle = np.median(row)
+    found = []
+    for half in (row <= middle, row > middle):
+        if not half.any():
+            continue
+        centre = np.median(col[half])
+        for side in (half & (col <= centre), half & (col > centre)):
+            if side.any():
+                part = np.zeros_like(sites)
+                part[row[side], col[side]] = True
+                found.append(part)
+    return found
+
+
+def _boxed(sites: Mask) -> Mask:
+    """Return the sites within a box of `BOX` x `BOX` pixels around their middle."""
+    row, col = np.nonzero(sites)
+    top, left = (max(0, int(np.median(axis)) - BOX // 2) for axis in (row, col))
+    found = np.zeros_like(sites)
+    found[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
+    return found
+
+
+def windowed(
+    machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32], at: Mask
+) -> tuple[NDArray[np.int64], Mask]:
+    """Return the mean of planes (P, rows, cols) over the sites in each window, and whether it has any.
+
+    The windows are around the n sites ``at``; the means are in 1 / `MEANS` of the planes' units, (P, n).
+    """
+    labels, weights = machine.put(sites.astype(np.uint8)), machine.put(taps)
+    ones = machine.put(np.ones(len(logs), np.int32))
+    counts = machine.get(window(machine, labels, machine.put(np.ones(1, np.int32)), weights))[0, at].astype(np.int64)
+    sums = machine.get(window(machine, labels, ones, weights, machine.put(logs)))[:, at].astype(np.int64)
+    return (MEANS * sums + counts // 2) // np.maximum(counts, 1), counts > 0
+
+
+def _nulls(selves: Sequence[OwnDistances]) -> tuple[list[Null], int]:
+    """Return the distribution of each class, and the degrees of freedom of their variances.
+
+    The variance is that of the class between windows, with a share of the mean of all classes, plus the drift between
+    parts of a sample, which is pooled because a class has few parts.
+    """
+    within = [_spread(one.windows)[1] for one in selves]
+    pooled: NDArray[np.float64] = np.add.accumulate(within)[-1] / len(within)
+    several = [one.parts.T for one in selves if len(one.parts) > 1]
+    drift = sum((_spread(parts)[1] for parts in several), np.zeros_like(pooled)) / max(1, len(several))
+    nulls = [
+        Null(_spread(one.windows)[0], OWN * own + (1 - OWN) * pooled + drift + FLOOR)
+        for one, own in zip(selves, within, strict=True)
+    ]
+    return nulls, max(1, sum(parts.shape[1] - 1 for parts in several))
+
+
+def _spread(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean and the variance of values (M, n), with the same order of summation on every machine."""
+    n = values.shape[1]
+    mean = np.array([np.add.accumulate(line)[-1] for line in values]) / n
+    squares = np.array([np.add.accumulate((line - m) ** 2)[-1] for line, m in zip(values, mean, strict=True)])
+    return mean, squares / max(1, n - 1)

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex mix`` and ``solid``: pyramid matching, which no other command loads."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from simdtex.cli.command import EITHER, OUTPUTS, READ, WRITE
+from simdtex.cli.inputs import channels, last_iteration, output_shape, read_inputs, read_material, size_text
+from simdtex.cli.job import Task, job
+from simdtex.cli.options import PROFILE, given, input_options, option, output_option, size_option, stages_option
+
+
+@job(
+    ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
+    ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
+    usual="output size palette pattern average low high seed dry_run device quiet",
+)
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
+@output_option("Write this picture.", WRITE)
+@size_option("twice the first sample", base="the first sample")
+@input_options("mix")
+@stages_option("every iteration")
+@PROFILE
+def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
+    """Mix the textures SAMPLE... into one picture.
+
+    Options name a sample by its path as in the command, or by its number from 1. The method is Heeger and Bergen's
+    (1995).
+    """
+    from simdtex.io import image
+    from simdtex.jobs.mixes.job import mix
+
+    material = read_material(samples)
+    chosen = read_inputs("mix", options, material)
+    pixels, metadata = material.pixels, material.metadata and material.metadata.at()._replace(exif=None)
+    shape = output_shape(size, pixels[0])
+    chosen["channel_axis"] = -1 if any(one.ndim > 2 for one in pixels) else None
+    image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)), metadata=metadata)
+    return Task(
+        partial(mix, pixels, shape, **given(options | chosen)),
+        f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
+        str(output),
+        [lambda made, run: image.write(output, made, metadata)],
+        material.limits,
+        lambda made, output: click.echo(last_iteration(output.statistics)),
+    )
+
+
+@job(
+    ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
+    ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
+    usual="outputs size picture seed iterations pyramid dry_run device quiet",
+)
+@click.argument("sample", type=READ)
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    type=EITHER,
+    help="Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.",
+)
+@click.option(
+    "--size",
+    default="128",
+    show_default=True,
+    metavar="DEPTHxHEIGHTxWIDTH",
+    help="Make a block of this many slices, rows and columns; one number makes a cube.",
+)
+@option(
+    "--view",
+    "picture",
+    group=OUTPUTS,
+    type=WRITE,
+    metavar="PNG",
+    help="Write a picture of the block and of its three middle slices.",
+)
+@stages_option("the middle slice of every iteration")
+@PROFILE
+def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
+    """Make a solid block whose slices have the texture of SAMPLE.
+
+    The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
+    """
+    from simdtex.figures.sheet import view
+    from simdtex.io import image, volume
+    from simdtex.jobs.mixes.job import synthesize_solid
+
+    shape: Any = image.parse_sides(size, "DEPTHxHEIGHTxWIDTH")
+    material = read_material([sample])
+    pixels = material.pixels[0]
+    writers: list[Any] = []
+    for output in outputs:
+        volume.check_writable(output, pixels.dtype, channels(pixels))
+        writers.append(lambda block, run, output=output: volume.write(output, block))
+    if picture:
+        image.check_writable(picture, suffixes=(".png",))
+        writers.append(lambda block, run: view(np.asarray(block), picture))
+    return Task(
+        partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
+        f"{'x'.join(map(str, shape))} from {size_text(pixels)}",
+        ", ".join(str(path) for path in (*outputs, picture) if path),
+        writers,
+        material.limits,
+        lambda made, output: click.echo(last_iteration(output.statistics)),
+    )

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex synth``, ``extend``, ``tile`` and ``fill``: textures, also in tiles; and ``resume``."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.command import ENTER
+from simdtex.cli.inputs import (
+    Folder,
+    arranged,
+    last_iteration,
+    output_shape,
+    read_also,
+    read_inputs,
+    read_lead,
+    take_reading,
+)
+from simdtex.cli.job import Task, command_line, job, notes
+from simdtex.cli.options import (
+    PREVIEW,
+    PROFILE,
+    given,
+    input_options,
+    material_options,
+    output_option,
+    report_option,
+    size_option,
+    stages_option,
+)
+from simdtex.jobs.tiles.command import check_tiles, synthesize_in_tiles, tiles_options
+
+
+@job(
+    ("synth gravel.png -o more.png", "Make a texture of twice the size that tiles."),
+    ("synth brick -o more --size 2x", "Make more of a material: all maps in the folder brick, arranged alike."),
+    ("synth gravel.png -o more.png --size 1024x512 --preview", "Set the size, and see 3x3 copies in more-3x3.png."),
+    ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
+    usual="output size seed method order also guide preview report dry_run device quiet",
+)
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
+@output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
+@size_option("that of --known or of the output guide, else twice the first sample")
+@input_options("synth")
+@material_options
+@PREVIEW
+@tiles_options
+@stages_option("every level, sweep or iteration")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
+@PROFILE
+def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str, **options: Any) -> Task | None:
+    """Synthesise a picture of any size with the texture of SAMPLE.
+
+    The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
+    """
+    from simdtex.io.decode import NOTHING
+    from simdtex.io.hard_data import HardData
+    from simdtex.jobs.synthesis.job import synthesize
+
+    context = click.get_current_context()
+    check_tiles(context)
+    how = take_reading(options)
+    target, material = read_lead(samples, output, options, how)
+    if method == "pyramid" and (options["source_map"] or options["also"] or isinstance(target, Folder)):
+        remedy = "give one picture, and leave --source-map and --also out"
+        raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
+    pixels = material.pixels[0]
+    data = read_inputs("synth", options, material, how)
+    place = options.pop("geo", None)  # of the known pixels; a new picture was taken nowhere else
+    known, guide = data["known"], data["guide"]
+    shape = output_shape(size, pixels, known, guide and guide[1])
+    if isinstance(known, HardData) and not known.from_top:
+        data["known"] = known.upside_down(shape[0])
+    if context.params["report"] and (material.several or known is not None or not material.known):
+        raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
+    if options["tiles"] is not None:
+        others = read_also(options["also"], material, files=False)
+        left_out = ("tiles", "workers", "also", "source_map", "preview")
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
+        return None
+    like = (material.metadata or NOTHING).at(place and NOTHING._replace(geo=place))._replace(exif=None)
+    foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
+    writers = arranged(target, material, like, options, kept=known is not None, foreign=foreign)
+
+    def more(made: Any, output: Any) -> None:
+        statistics = output.statistics
+        if method == "multires":
+            counts = " ".join(f"{level['candidates']:.3g}" for level in statistics["levels"][1:])
+            click.echo(f"candidates per level, coarse to fine: {counts}")
+        elif method == "pyramid":
+            click.echo(last_iteration(statistics))
+        notes(output)
+        if options["array"]:
+            from simdtex.figures.tables import print_accounting
+
+            print_accounting(statistics["accounting"])
+
+    height, width = material.sizes[0]
+    by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
+    return Task(
+        partial(synthesize, material.array, shape, method=method, **data | given(options)),
+        f"{shape[1]}x{shape[0]} from {by}",
+        str(target),
+        writers,
+        material.limits,
+        more,
+        partial(write_page, pixels),
+    )
+
+
+def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) -> None:
+    """Write the page of a texture and its sample, and the command line."""
+    from simdtex.jobs.synthesis.report import write_synthesis
+
+    write_synthesis(folder, sample, made, output, command_line(), **how)

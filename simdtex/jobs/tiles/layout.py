@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The layout of an output in tiles: their sizes, their halos, and the cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.jobs.tiles.windows import Tile
+from simdtex.methods.mrf.finish import gaussian_offsets
+from simdtex.methods.mrf.plan import Plan
+from simdtex.model.lattice import Grid
+from simdtex.options import whole
+from simdtex.schedules.schedule import Windowed
+
+CHUNK = 512
+"""The largest side of a chunk in the store, sites, if the tile's side has such a divisor."""
+
+TILES = 2**22
+"""The most tiles of a level, since one process counts them."""
+
+TASKS = 2**14
+"""The most tasks of a turn, since one process distributes them and reads their notes."""
+
+PROCESS = 2**30
+"""Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
+
+Once they are compiled it is 400 MiB (``benchmarks/tiles.py``)."""
+
+SITE = 110, 12
+"""Bytes of a worker for each site of a window, and for each channel of a site (measured; see the docs)."""
+
+PIXEL = 400, 40
+"""The same for each pixel of the sample with its margin."""
+
+Maps = dict[str, list[NDArray[Any]]]
+"""Further maps of the material by name: (rows, cols[, channels]), one for each picture of the sample."""
+
+Arrays = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""The axes after rows and columns, and the types, of arrays of the output, by name."""
+
+
+@dataclass(frozen=True)
+class LevelLayout:
+    """A level in tiles of ``side`` x ``side`` sites; the last row and column of tiles may be smaller.
+
+    ``number`` 0 is the finest level. A sweep of a tile also reads ``halo`` sites around it: the number of groups of the
+    schedule times the radius of the neighbourhood.
+    """
+
+    number: int
+    rows: int
+    cols: int
+    side: int
+    halo: int
+    torus: bool
+
+    @property
+    def down(self) -> int:
+        """Number of tiles from top to bottom."""
+        return ceil(self.rows / self.side)
+
+    @property
+    def across(self) -> int:
+        """Number of tiles from left to right."""
+        return ceil(self.cols / self.side)
+
+    @property
+    def count(self) -> int:
+        """Number of tiles."""
+        return self.down * self.across
+
+    @property
+    def together(self) -> int:
+        """Number of tiles of a task; the last task may have fewer."""
+        return ceil(self.count / TASKS)
+
+    @property
+    def tasks(self) -> int:
+        """Number of tasks of a turn."""
+        return ceil(self.count / self.together)
+
+    def task(self, number: int) -> range:
+        """Return the numbers of the tiles of a task."""
+        return range(number * self.together, min(self.count, (number + 1) * self.together))
+
+    @property
+    def lattice(self) -> Grid:
+        """The lattice of the whole level."""
+        return Grid((self.rows, self.cols), self.torus)
+
+    def tile(self, number: int) -> Tile:
+        """Return a tile by its number, row by row."""
+        i, j = divmod(number, self.across)
+        top, left = i * self.side, j * self.side
+        return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
+
+    @property
+    def chunk(self) -> int:
+        """Side of a chunk in the store, sites; no two tiles share a chunk."""
+        fitting = [n for n in range(CHUNK // 4, CHUNK + 1) if self.side % n == 0]
+        return max(fitting, default=self.side)
+
+    @property
+    def window(self) -> int:
+        """Number of sites of the largest window."""
+        sides = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
+        down, across = sides if self.count > 1 else (self.rows, self.cols)
+        return down * across
+
+    @property
+    def redundant(self) -> float:
+        """Repeated relaxations of a tile that touches no edge, divided by its required ones.
+
+        A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
+        """
+        if self.count == 1:
+            return 0.0
+        rows, cols = (min(self.side, n) for n in (self.rows, self.cols))
+        down, across = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
+        return (down if down == self.rows else (rows + down) // 2) * across / (rows * cols) - 1
+
+
+@dataclass(frozen=True)
+class Layout:
+    """An output in tiles.
+
+    Attributes
+    ----------
+    levels : tuple of LevelLayout
+        The finest first.
+    channels : int
+        Number of channels of the sites' values.
+    memory : int
+        The most bytes that a worker needs, whatever the size of the output.
+    disk : int
+        The most bytes that the store needs, uncompressed: two states of the finest level, one of each
+        other level, and the output with its source map and further maps.
+    """
+
+    levels: tuple[LevelLayout, ...]
+    channels: int
+    memory: int
+    disk: int
+
+    def lines(self) -> list[str]:
+        """Return a line of text for each level, and one for memory and disk."""
+        found = [
+            f"level {one.number}: {one.cols}x{one.rows} sites in {one.count} tile{'s' * (one.count > 1)} of "
+            f"{min(one.side, one.cols)}x{min(one.side, one.rows)}"
+            + (f", halo {one.halo}, {100 * one.redundant:.1f} % redundant work" if one.count > 1 else "")
+            for one in reversed(self.levels)
+        ]
+        memory, disk = (size / 2**20 for size in (self.memory, self.disk))
+        return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
+
+
+def further(plan: Plan, source: bool, maps: Maps) -> Arrays:
+    """Return the arrays of the output in addition to the picture: the source map if ``source``, and ``maps``."""
+    found: Arrays = {"source": ((2 + (len(plan.sample.boxes) > 1),), np.dtype(np.int32))} if source else {}
+    return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in maps.items()}
+
+
+def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Layout:
+    """Return the layout of an output in tiles of at most ``tile`` sites on a side, with ``more`` arrays.
+
+    Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
+    """
+    whole("tiles", tile, 1)
+    options, schedule = plan.options, plan.schedule
+    if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
+        given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
+        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or leave tiles out")
+    count = ceil(plan.shape[0] / tile) * ceil(plan.shape[1] / tile)
+    if count > TILES:
+        raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
+    levels = tuple(_level(plan, seed, number, tile) for number in range(plan.levels))
+    sample, channels, sd = plan.sample, plan.sample.working.shape[0], plan.options.finish or 0
+    shown = tile + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
+    window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
+    each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
+    memory = PROCESS + window * each + sample.rows * sample.cols * pixel
+    arrays = [((sample.shown,), sample.pixels.dtype), *(more or {}).values()]
+    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in arrays)
+    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + shown_bytes))
+    return Layout(levels, channels, memory, disk)
+
+
+def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
+    """Return the layout of a level; each step of a sweep reaches the radius of the neighbourhood farther."""
+    lattice, torus = Grid.of(plan.shape, 2**number), plan.options.boundary == "torus"
+    assert isinstance(plan.schedule, Windowed)
+    steps = plan.schedule.count(Grid(lattice.shape, torus), plan.options.neighbourhood, seed)
+    return LevelLayout(number, lattice.rows, lattice.cols, side, steps * int(plan.offsets.max()), torus)

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex tileset``: corner tiles for games."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.cli.command import ENTER, FOLDER
+from simdtex.cli.inputs import SHEET, Also, Folder, Material, Reading, channels, output_shape, read_lead, read_material
+from simdtex.cli.job import Task, job, notes
+from simdtex.cli.options import MAP, PROFILE, given, input_options, output_option, size_option
+
+PLANE = 8
+"""Rows and columns of tiles of the plane that shows a set."""
+
+
+@job(
+    ("tileset gravel.png -o tiles --size 128", "Make 16 tiles for planes of any size without a period."),
+    ("tileset grass.png sand.png -o terrain", "Make tiles of grass and sand, which meet within the tiles."),
+    ("tileset brick -o tiles", "Make tiles of all maps in the folder brick, arranged alike."),
+    usual="output size colours seed order light roles dry_run device quiet",
+)
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
+@output_option("Write this folder: pictures, and the set for Tiled, Godot and GLSL.", FOLDER)
+@size_option("256", of="tiles")
+@input_options("tileset")
+@MAP
+@PROFILE
+def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
+    """Make a set of corner tiles with the texture of SAMPLE, for a game.
+
+    Tiles fit wherever the colours of their corners agree, so that a plane of them has no period. Two or three samples,
+    such as grass and sand, are the colours. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
+    """
+    from simdtex.io.files import earlier_files
+    from simdtex.jobs.tilesets.job import tileset
+    from simdtex.model.source_map import NORMALS
+
+    how = Reading(palette=bool(options["categorical"]))
+    roles = options.pop("roles")
+    leads = [read_lead([path], output, {"roles": roles}, how) for path in samples]
+    lead = leads[0][1] if len(leads) == 1 else read_material([one.paths[0] for _, one in leads], how)
+    folders = [one for one, _ in leads if isinstance(one, Folder)]
+    maps = read_maps(folders, lead)
+    shape = output_shape("256" if size is None else size, lead.pixels[0])
+    normals = bool(folders) and folders[0].found.files[folders[0].lead] in NORMALS
+    colours = options.pop("colours") or max(2, len(samples))
+    names = [path.stem for path in lead.paths] if len(samples) > 1 else [f"{n}" for n in range(colours)]
+    if len({*names}) < len(names):
+        names = [f"{name} {n}" for n, name in enumerate(names, 1)]
+    corners = ["".join(map(str, place)) for place in np.ndindex(*[colours] * 4)]
+    own = {f"{one.out.stem}{which}{one.out.suffix}" for one in maps for which in ("", *(f"-{c}" for c in corners))}
+    own |= {"tiles.tsx", "tiles.tres", "tiles.glsl", "plane.tmx", "plane.png"}
+    earlier_files(output, "the tiles", own.__contains__)
+    return Task(
+        partial(tileset, lead.array, shape, colours=colours, channel_axis=lead.channel_axis, **given(options)),
+        f"{colours**4} tiles of {shape[1]}x{shape[0]}",
+        str(output),
+        [partial(write, output, maps, names, normals, shape)],
+        lead.limits,
+        lambda made, run: notes(run),
+    )
+
+
+def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
+    """Return the maps of all samples by role, and the name of each in the output; ``lead`` is the first.
+
+    ``folders`` are those of the samples that have several maps.
+    """
+    from simdtex.io.image import suitable_suffix
+
+    if folders and len(folders) < len(lead.paths):
+        raise ValueError(f"{folders[0].lead} is a map of a material and not all samples are; give one kind of sample")
+    found = [lead]
+    for folder in folders:
+        for has, lacks in ((folders[0], folder), (folder, folders[0])):
+            if role := min({*has.found.files.values()} - {*lacks.found.files.values()}, default=""):
+                raise ValueError(f"{lacks.lead.parent} has no {role} map and {has.lead.parent} has one; add or move it")
+    for path, role in sorted(folders[0].found.files.items()) if folders else ():
+        if path == folders[0].lead:
+            continue
+        those = [path]
+        for other in folders[1:]:
+            those.append(next(one for one, known in other.found.files.items() if known == role))
+        found.append(read_material(those))
+        if found[-1].sizes != lead.sizes:
+            raise ValueError(f"{path} has another size than {lead.paths[0].name}; scale it, or move it elsewhere")
+    maps = []
+    for one in found:
+        plain = bool(one.metadata and one.metadata.plain)
+        suffix = suitable_suffix(one.pixels[0].dtype, channels(one.pixels[0]), plain=plain)
+        one = one._replace(metadata=one.metadata and one.metadata.at())
+        maps.append(Also(one, Path("-".join(path.stem for path in one.paths) + suffix)))
+    return maps
+
+
+def write(
+    output: Path,
+    maps: list[Also],
+    names: list[str],
+    normals: bool,
+    shape: tuple[int, ...],
+    made: NDArray[Any],
+    run: Any,
+) -> None:
+    """Write a set into a folder: the packed pictures and the tiles of all maps, and what other programs read."""
+    from simdtex.figures.sheet import fitted, rgb
+    from simdtex.io import image
+    from simdtex.io.files import atomic_folder
+    from simdtex.jobs.tilesets import files as tilesets
+    from simdtex.jobs.tilesets.corners import corners_of, laid, numbers, plane, torus
+    from simdtex.model.source_map import unit_normals
+
+    (rows, cols), colours = shape, len(names)
+    grid = corners_of(torus(colours))
+    if normals and made.ndim == 3:
+        made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
+    corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))
+    with atomic_folder(output) as folder:
+        for number, one in enumerate(maps):
+            packed = one.carried(run.source) if number else made
+            image.write(folder / one.out, packed, one.maps.metadata)
+            for row, col in np.ndindex(grid.shape[:2]):
+                which = "".join(map(str, grid[row, col]))
+                tile = packed[row * rows : (row + 1) * rows, col * cols : (col + 1) * cols]
+                image.write(folder / f"{one.out.stem}-{which}{one.out.suffix}", tile, one.maps.metadata)
+        shown = image.coloured(plane(made, corners, colours), maps[0].maps.metadata and maps[0].maps.metadata.palette)
+        image.write(folder / "plane.png", fitted(rgb(shown), SHEET))
+        about = maps[0].out.name, (rows, cols), names, grid
+        texts = {"tiles.tsx": tilesets.tiled_set(*about), "tiles.tres": tilesets.godot_set(*about)}
+        texts["plane.tmx"] = tilesets.tiled_map("tiles.tsx", (rows, cols), laid(corners, colours))
+        for name, text in {**texts, "tiles.glsl": tilesets.glsl(numbers(colours))}.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,448 @@
+"""`simdtex.simulate`: every realisation is its own seed's, honours the data, and the array tells what it is of."""
+
+import json
+import sys
+import threading
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+
+import simdtex
+from simdtex.io.hard_data import place_hard_data, read_hard_data
+from simdtex.jobs.simulation.ensemble import channels
+from simdtex.jobs.simulation.job import realisation_seed
+
+xarray = pytest.importorskip("xarray")
+
+SHAPE = (12, 14)
+OWN = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "xi": -8.0}
+OWN |= {"phases": 4, "free_sweeps": 3}
+"""The defaults of a simulation that differ from those of a texture; and few sweeps."""
+QUICK = {"order": 2, "xi": -8.0, "device": "reference", "rng": 5, "jobs": 1}
+TRAINING = texture((16, 20))
+CATEGORIES = (TRAINING > 90).astype(np.uint8) * 3 + (TRAINING > 170) * np.uint8(4)
+
+
+def simulate(training=TRAINING, n=2, **options):
+    return simdtex.simulate(training, n, **({"shape": SHAPE} | QUICK | options))
+
+
+def holed(dtype=np.float32, shape=SHAPE, channels=None):
+    """Values of the training image here and there, NaN elsewhere."""
+    rng = np.random.default_rng(3)
+    source = texture((16, 20), channels, dtype)[: shape[0], : shape[1]]
+    found = source.astype(np.float64 if dtype != np.float32 else dtype)
+    found[rng.random(shape) < 0.9] = np.nan
+    return found
+
+
+def test_a_realisation_depends_on_its_number_alone():
+    four = simulate(n=4)
+    assert len({one.tobytes() for one in four.values}) == 4
+    for k in range(4):
+        assert_same_bits(simulate(n=1, first=k).values[0], four.values[k])
+    assert_same_bits(simulate(n=2, first=2).values, four.values[2:])
+
+
+@pytest.mark.parametrize("jobs", [2, 9, None])
+def test_how_many_at_a_time_makes_no_difference(jobs):
+    one, many = simulate(n=3), simulate(n=3, jobs=jobs)
+    assert_same_bits(one.values, many.values)
+    assert one.attrs == many.attrs
+    assert np.array_equal(one.seed, many.seed)
+
+
+def test_a_realisation_is_what_synthesize_gives_with_its_seed():
+    data = holed()
+    options = {"order": 2, "device": "reference"}
+    found = simulate(texture((16, 20), dtype=np.float32), known=data)
+    for seed, values in zip(found.seed.values, found.values, strict=True):
+        own = simdtex.synthesize(
+            texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **OWN, **options
+        )
+        assert_same_bits(values, own)
+
+
+def test_seeds_are_apart_and_stay_what_they_are():
+    seeds = [realisation_seed(seed, number) for seed in (0, 1, 2**64 - 1) for number in range(50)]
+    assert len(set(seeds)) == 150
+    assert all(0 <= seed < 2**64 for seed in seeds)
+    # written down once: files of realisations name these seeds
+    assert [realisation_seed(1, number) for number in (0, 1)] == [8431846347943309920, 4042681867674859579]
+    assert simulate(first=3).seed.values.tolist() == [realisation_seed(5, 3), realisation_seed(5, 4)]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
+    data = holed(dtype)
+    known = ~np.isnan(data)
+    found = simulate(texture((16, 20), dtype=dtype), n=3, known=data)
+    assert found.dtype == dtype
+    for one in found.values:
+        assert_same_bits(one[known], data[known].astype(dtype))
+
+
+def test_the_size_is_that_of_the_data_or_of_the_training_image():
+    training = texture((16, 20), dtype=np.float32)
+    assert simulate(training, n=1, shape=None, known=holed()).shape == (1, *SHAPE)
+    assert simulate(training, n=1, shape=None).shape == (1, 16, 20)
+    assert simulate(n=1, shape=(np.int64(7), 9)).shape == (1, 7, 9)
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_a_table_of_several_variables(tmp_path, axis):
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,a,b\n3,4,0.5,0.25\n7,2,,0.75\n")
+    training = np.moveaxis(texture((16, 20), 2, np.float32), -1, axis)
+    found = simulate(training, n=2, known=path, channel_axis=axis)
+    placed = place_hard_data(read_hard_data(path), SHAPE, np.float32)
+    for one in found.values:
+        assert_same_bits(one[~placed.mask], placed.data[~placed.mask])
+    same = simulate(training, n=2, known=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
+    assert_same_bits(found.values, same.values)
+    assert (
+        simulate(training, n=1, known=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+    )
+
+
+def smooth(shape, seed):
+    """A Gaussian random field that wraps around."""
+    waves = np.meshgrid(*(np.fft.fftfreq(n) for n in shape), indexing="ij")
+    noise = np.fft.fftn(np.random.default_rng(seed).normal(size=shape))
+    field = np.fft.ifftn(noise * np.exp(-450 * sum(w**2 for w in waves))).real
+    return (field / field.std()).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("search", "sample", "shape", "share"),
+    [
+        ("coherent", (64, 64), (48, 48), 0.03),
+        pytest.param("exact", (80, 80), (64, 64), 0.03, marks=pytest.mark.slow),
+        ("coherent", (10, 24, 24), (6, 16, 16), 0.1),
+    ],
+)
+def test_a_variable_known_alone_decides_on_the_others(search, sample, shape, share):
+    """Facies are where porosity is positive; it is known in few cells, and the facies there must agree."""
+    porosity, truth = smooth(sample, 1), smooth(shape, 2)
+    truth = np.clip(truth, porosity.min(), porosity.max())
+    there = np.random.default_rng(3).random(shape) < 0.03
+    known = np.stack([np.where(there, truth, np.nan), np.full(shape, np.nan)], -1)
+    training = np.stack([porosity, porosity > 0], -1).astype(np.float32)
+    how = {"channel_axis": -1, "categorical": (1,), "search": search, "rng": 1}
+    found = simdtex.simulate(training, 1, shape=shape, known=known, **how).values[0]
+    assert np.array_equal(found[there, 0], truth[there])
+    assert ((found[there, 1] > 0) != (truth[there] > 0)).mean() <= share
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32, np.float64])
+def test_dimensions_coordinates_and_type(dtype):
+    found = simulate(texture((16, 20), dtype=dtype), n=2, first=4)
+    assert found.dtype == dtype and found.name == "simulation"
+    assert dict(found.sizes) == {"realisation": 2, "y": 12, "x": 14}
+    assert found.dims == ("realisation", "y", "x")
+    assert found.realisation.values.tolist() == [4, 5]
+    assert np.array_equal(found.y, np.arange(12)) and np.array_equal(found.x, np.arange(14))
+    assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
+
+
+def test_coordinates_on_the_ground():
+    found = simulate(origin=(1005, 2010.5), cell=(10, 21), n=1)
+    assert np.array_equal(found.x, 1005 + 10 * np.arange(14)) and np.array_equal(found.y, 2010.5 + 21 * np.arange(12))
+    assert (found.attrs["cell_x"], found.attrs["cell_y"]) == (10, 21) and "z" not in found.coords
+    assert_same_bits(found.values, simulate(n=1).values)
+    found = simulate(origin=(1, 2, 3), n=1)
+    assert (found.x[0], found.y[0], found.z) == (1, 2, 3) and found.x[1] == 2 and found.attrs["cell_z"] == 1
+    assert simulate(n=1).x.dtype.kind == "i", "columns, if nothing is said of the ground"
+
+
+def test_data_on_the_ground(tmp_path):
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,value\n1035,2094.5,20\n1074,2053,30\n1065,2051,33\n")
+    found = simulate(known=path, origin=(1005, 2010.5), cell=(10, 21), several="mean")
+    assert (found.values[:, 4, 3] == 20).all() and (found.values[:, 2, [6, 7]] == [33, 30]).all()
+    rows = [(3, 4, 20), (7, 2, 30), (6, 2, 33)]
+    assert_same_bits(found.values, simulate(known=place_hard_data(rows, SHAPE, np.uint8)).values)
+    with pytest.raises(ValueError, match=r"line 2 of the hard data is at x 1035\.0, y 2094\.5, outside"):
+        simulate(known=path)
+    path.write_text("x,y,value\n3,4,20\n3,4,30\n3,4,31\n")
+    assert (simulate(known=path, several="mean").values[:, 4, 3] == 27).all()
+    assert (simulate(known=path, several="most").values[:, 4, 3] == 20).all()
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_several_variables_are_the_last_dimension(axis):
+    training = np.moveaxis(texture((16, 20), 3), -1, axis)
+    found = simulate(training, n=2, channel_axis=axis)
+    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 3)
+    own = simdtex.synthesize(
+        training, SHAPE, channel_axis=axis, rng=int(found.seed[1]), order=2, device="reference", **OWN
+    )
+    assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
+
+
+def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guide_tells_others():
+    training = np.random.default_rng(1).choice(3, (16, 20), p=(0.6, 0.3, 0.1)).astype(np.uint8)
+    shares = np.bincount(training.ravel())
+    usual, told = (simulate(training, categorical=True, **how) for how in ({}, {"proportions": shares.tolist()}))
+    assert np.array_equal(usual, told) and usual.attrs == told.attrs
+    assert np.array_equal(usual, simulate(training, categorical=True, proportions=(shares * 2**20).tolist())), "counts"
+    even = simulate(training, categorical=True, proportions=(1, 1, 1))
+    assert not np.array_equal(usual, even)
+    for how in ({"probabilities": np.full((3, *SHAPE), 1 / 3)}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
+        found = simulate(training, n=1, categorical=True, **how)
+        assert json.loads(found.attrs["options"])["proportions"] is None
+    several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
+    assert json.loads(several.attrs["options"])["proportions"] is None
+
+
+def test_attributes_tell_how():
+    found = simulate(n=1, levels=1)
+    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
+    assert (found.attrs["seed"], found.attrs["version"]) == (5, simdtex.__version__)
+    assert found.attrs["device"].startswith("reference")
+    options = json.loads(found.attrs["options"])
+    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 1.0)
+    assert len(found.attrs["training_image"]) == 64
+
+
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")
+def test_what_is_returned_is_written_by_xarray_itself(tmp_path):
+    found = simulate(n=2, rng=2**64 - 1, order=np.int64(2), levels=1)
+    found.to_netcdf(tmp_path / "t.nc")
+    found.to_zarr(tmp_path / "t.zarr")
+    for name in ("t.nc", "t.zarr"):
+        with xarray.open_dataarray(tmp_path / name) as back:
+            assert back.identical(found)
+            assert back.dtype == found.dtype and json.loads(back.attrs["options"])["order"] == 2
+
+
+DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")
+FLOATS = texture((16, 20), dtype=np.float32)
+
+
+def digests(**change):
+    arguments = {
+        "training": FLOATS,
+        "known": holed(),
+        "guide": (texture((16, 20), seed=7), texture(SHAPE, seed=8)),
+        "mask": np.arange(20) < np.full((16, 1), 14),
+        "region": ~np.isnan(holed()) | (np.arange(14) < 9),
+        "image_map": np.zeros(SHAPE),
+        "rotation": np.zeros(SHAPE),
+        "scale": np.ones(SHAPE),
+    } | change
+    kind = {"categorical": True} if "probabilities" in change else {}
+    attrs = simulate(n=1, levels=1, free_sweeps=0, **kind, **arguments).attrs
+    return {name: attrs.get(name) for name in DIGESTS}
+
+
+def with_value(array, value, at=(2, 3)):
+    found = array.copy()
+    found[at] = value
+    return found
+
+
+CHANGES = {
+    "training_image": [
+        {"training": with_value(FLOATS, FLOATS[0, 0])},
+        {"training": with_value(FLOATS, np.nan)},
+        {"training": FLOATS.astype(np.float64)},
+    ],
+    "hard_data": [{"known": with_value(holed(), 0.5)}, {"known": None}],
+    "guide": [{"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}, {"guide": None}],
+    "region": [{"region": np.ones(SHAPE, bool)}, {"region": None}],
+    "image_map": [{"image_map": np.ones((1, *SHAPE))}, {"image_map": None}],
+    "rotation": [{"rotation": np.full(SHAPE, 5.0)}, {"rotation": None}],
+    "scale": [{"scale": np.full(SHAPE, 2.0)}, {"scale": None}],
+    "mask": [{"mask": np.arange(20) < np.full((16, 1), 15)}, {"mask": None}],
+}
+
+
+@pytest.mark.parametrize(("name", "number"), [(name, k) for name in CHANGES for k in range(len(CHANGES[name]))])
+def test_a_digest_changes_with_its_array_and_with_nothing_else(name, number):
+    before, after = digests(), digests(**CHANGES[name][number])
+    assert all(before[one] for one in CHANGES) and after[name] != before[name]
+    # hard data are of the training image's type
+    kept = [other for other in DIGESTS if other != name and not (number == 2 and other == "hard_data")]
+    assert [after[other] for other in kept] == [before[other] for other in kept]
+
+
+def test_an_unknown_pixel_is_not_what_it_is_completed_with():
+    holey = with_value(FLOATS, np.nan)
+    near = [with_value(FLOATS, FLOATS[i, j]) for i, j in ((1, 3), (3, 3), (2, 2), (2, 4))]
+    found = digests(training=holey)["training_image"]
+    assert found not in [digests(training=one)["training_image"] for one in near]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("axis", [None, 0])
+def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
+    seen, shares = [], []
+
+    def look(progress):
+        shares.append(progress.fraction)
+        if progress.stage:
+            seen.append((progress, progress.image()))
+        else:
+            assert progress.image().ndim == 2 + (axis is not None)
+
+    training = TRAINING if axis is None else np.moveaxis(texture((16, 20), 2), -1, 0)
+    found = simulate(training, n=3, first=2, jobs=jobs, channel_axis=axis, callback=look)
+    assert [one.finished for one, _ in seen] == [1, 2, 3]
+    assert len(shares) > 9 and shares == sorted(shares) and (0 < shares[0] < 1 / 3, shares[-1]) == (True, 1.0)
+    assert sorted(one.realisation for one, _ in seen) == [2, 3, 4]
+    assert {one.realisations for one, _ in seen} == {3}
+    assert {one.stage for one, _ in seen} == {f"realisation000{number}" for number in (2, 3, 4)}
+    assert seen[0][0].doing == "1 of 3 realisations finished"
+    for one, picture in seen:
+        assert np.array_equal(picture, found.sel(realisation=one.realisation).values)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_an_error_in_one_realisation_ends_all(jobs, error):
+    before, calls = set(threading.enumerate()), []
+
+    def stop(progress):
+        calls.append(progress.finished)
+        raise error("enough")
+
+    with pytest.raises(error, match="enough"):
+        simulate(n=40, jobs=jobs, callback=stop)
+    assert len(calls) <= 3 * jobs
+    assert set(threading.enumerate()) <= before
+
+
+def test_without_xarray_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ValueError, match=r"xarray is not installed; pip install 'simdtex\[simulate\]'"):
+        simulate()
+
+
+def test_cells_outside_of_the_region_take_no_part():
+    region = np.ones(SHAPE, bool)
+    region[:4, :6] = region[7, 3:] = False
+    known = region & (holed() > 0)
+    data, outside = np.where(known, 1.0, np.nan), np.repeat(~region[None], 2, 0)
+    for training, missing in ((FLOATS, np.nan), (TRAINING, 255)):
+        found = simulate(training, region=region, known=data, source=True)
+        values, row = found.simulation.values, found.source_row.values
+        assert np.array_equal(found.region, region) and found.region.dims == ("y", "x")
+        assert np.array_equal(np.isnan(values) if np.isnan(missing) else values == missing, outside)
+        assert np.array_equal(row < 0, outside | known)
+        assert found.attrs.get("missing") == (None if np.isnan(missing) else missing)
+        assert np.array_equal(np.isnan(found.simulation.where(found.region)), outside)
+    other = simulate(FLOATS, region=region).attrs
+    assert "hard_data" not in other and "region" in other
+
+
+def test_a_narrow_region_is_simulated_to_its_end():
+    region = np.zeros(SHAPE, bool)
+    region[5, 3:9] = region[2, 2] = True
+    found = simulate(CATEGORIES, region=region, categorical=True, levels=2)
+    assert np.isin(found.values[:, region], CATEGORIES).all() and (found.values[:, ~region] == 255).all()
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_the_source_map_of_every_realisation(several):
+    training = np.arange(16 * 20, dtype=np.int32).reshape(16, 20)
+    data = holed()
+    options = {"known": np.where(data > 0, 7, np.nan), "finish": 0.0}
+    found = simulate([training, -training] if several else training, source=True, **options)
+    assert set(found.data_vars) == {"simulation", "source_row", "source_column"} | (
+        {"source_image"} if several else set()
+    )
+    assert found.attrs == found.simulation.attrs and found.source_row.dims == ("realisation", "y", "x")
+    taken, known = (found.source_row >= 0).values, data > 0
+    assert np.array_equal(taken, ~known | np.zeros((2, 1, 1), bool))
+    signs = np.where(found.source_image == 1, -1, 1)[taken] if several else 1
+    assert (signs * training[found.source_row.values[taken], found.source_column.values[taken]]).tolist() == (
+        found.simulation.values[taken].tolist()
+    )
+    alone = simulate([training, -training] if several else training, **options)
+    assert alone.identical(found.simulation)
+
+
+def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):
+    path, whole = tmp_path / "run.ckpt", simulate(n=3, source=True)
+
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(n=3, source=True, jobs=1, checkpoint=path, callback=stop)
+    with pytest.raises(ValueError, match="source"):
+        simulate(n=3, checkpoint=path)
+    with pytest.raises(ValueError, match="region"):
+        simulate(n=3, source=True, checkpoint=path, region=np.arange(14) < np.full((12, 1), 9))
+    xarray.testing.assert_identical(simulate(n=3, source=True, checkpoint=path), whole)
+
+
+def test_the_size_is_that_of_a_map():
+    assert simulate(n=1, shape=None, rotation=np.zeros((7, 9))).shape == (1, 7, 9)
+    assert simulate(n=1, shape=None, image_map=np.ones((1, 7, 9))).shape == (1, 7, 9)
+
+
+def test_a_table_of_probabilities(tmp_path):
+    path = tmp_path / "soft.csv"
+    path.write_text("x,y,none,some,more\n3,4,0,0,1\n7,2,1,0,0\n5,5,,,\n")
+    found = simulate(CATEGORIES, categorical=True, probabilities=path)
+    assert (found.values[:, 4, 3] == 7).all() and (found.values[:, 2, 7] == 0).all()
+    table = np.full((3, *SHAPE), np.nan)
+    table[:, 4, 3], table[:, 2, 7] = [0, 0, 1], [1, 0, 0]
+    same = simulate(CATEGORIES, categorical=True, probabilities=table)
+    assert_same_bits(found.values, same.values)
+    assert_same_bits(
+        simulate(CATEGORIES, categorical=True, probabilities=np.ma.masked_invalid(table)).values, same.values
+    )
+
+
+NOTHING = np.full(SHAPE, np.nan)
+THIRDS = np.full((3, *SHAPE), 1 / 3)
+NAMED = {"training": CATEGORIES, "categorical": True}
+BAD = {
+    "no categories": ({"probabilities": THIRDS}, ValueError, "are of categories; give categorical=True"),
+    "too few": (NAMED | {"probabilities": THIRDS[:2]}, ValueError, "2x12x14 .* the 3 categories 0, 3, 7; give"),
+    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, ValueError, "is 3x5x14 and has to be 3x12x14"),
+    "no sum": (NAMED | {"probabilities": THIRDS * 2}, ValueError, "row 0, column 0 are 0.6.*add up to 1"),
+    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, ValueError, "of 0 or more that add up"),
+    "no table": (NAMED | {"probabilities": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
+    "words": ({"rotation": np.full(SHAPE, "a")}, TypeError, "rotation holds .* convert it to integers or real floats"),
+    "scale": ({"scale": np.full(SHAPE, 3.0)}, ValueError, "scale has 3 to 3; give factors of 0.5 to 2"),
+    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, ValueError, "rotation has infinite values"),
+    "no such image": ({"image_map": np.ones(SHAPE)}, ValueError, "image_map has 1 and there is 1 training image;"),
+    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, ValueError, "weights below 0, or 0 alone"),
+    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, ValueError, "leave shares out"),
+    "no region": ({"region": np.zeros(SHAPE, bool)}, ValueError, "region is False everywhere"),
+    "numbers": ({"region": np.ones(SHAPE)}, TypeError, "region holds float64 values; give True and False"),
+    "region's size": ({"region": np.ones((3, 4), bool)}, ValueError, "region is 3x4 and the output 12x14"),
+    "data outside": (
+        {"region": np.arange(14) < np.full((12, 1), 3), "known": np.where(NOTHING < 0, 0, 20 + 0 * np.indices(SHAPE)[0])
+         * np.where(np.indices(SHAPE)[1] == 5, 1, np.nan)}, ValueError, "row 0, column 5, outside region; leave"),
+    "no missing value": (
+        {"training": TRAINING > 90, "region": np.arange(14) < np.full((12, 1), 3)}, ValueError, "as int16"),
+    "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
+    "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
+    "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),
+    "an unknown category": (
+        {"training": CATEGORIES, "categorical": True, "known": with_value(NOTHING, 1.0)}, ValueError, "1"),
+    "a cell of no size": ({"cell": (1, 0)}, ValueError, "give sizes above 0"),
+    "an origin of one number": ({"origin": (1,)}, ValueError, "origin is .*; give"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_refused_with_a_remedy(case):
+    change, error, words = BAD[case]
+    with pytest.raises(error, match=words) as caught:
+        simulate(**change)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_shares_near_the_border_are_those_inside():
+    """Sites near the border have fewer neighbours, and there a cost of a category weighs more."""
+    found = simdtex.simulate(channels()[0][:128, :128], 8, shape=(64, 64), categorical=True, rng=1).values.mean(0)
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 0).mean()) < 0.06
+    assert abs(found[12:-12, 12:-12].mean() - np.delete(found, np.s_[6:-6], 1).mean()) < 0.06

@@ -1,0 +1,166 @@
+"""Tiles by real workers: processes of this machine, and a scheduler and workers that talk over TCP."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+from skimage import data
+
+import simdtex
+from simdtex.jobs import tiles as distributed
+from simdtex.machine.devices import DeviceError
+
+dask_distributed = pytest.importorskip("distributed")
+
+SAMPLE = np.stack([texture((40, 41), seed=k) for k in (1, 2, 3)], -1)
+OPTIONS = {"order": 2, "xi": -4.0, "rng": 5, "channel_axis": -1}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return simdtex.synthesize(SAMPLE, (90, 101), device="reference", **OPTIONS)
+
+
+@pytest.mark.slow
+def test_workers_of_this_machine_open_their_own_devices(tmp_path, whole, any_device):
+    path = tmp_path / "out.zarr"
+    ours = distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, workers=2, device=any_device.index, **OPTIONS)
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_worker_is_killed_and_another_joins_late(tmp_path, whole):
+    seen = []
+
+    def callback(progress):
+        seen.append(progress.tile)
+        if len(seen) == 12:
+            os.kill(first, signal.SIGKILL)  # in the middle of a tile, as likely as not
+        if len(seen) == 16:
+            cluster.scale(3)
+
+    with (
+        dask_distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        dask_distributed.Client(cluster) as client,
+    ):
+        first = min(client.run(os.getpid).values())
+        ours = distributed.synthesize(
+            *(SAMPLE, (90, 101), tmp_path / "out.zarr"),
+            tiles=30,
+            workers=client,
+            device="reference",
+            callback=callback,
+            **OPTIONS,
+        )
+    assert len(seen) > 40
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_client_that_ends_leaves_a_store_to_go_on_with(tmp_path, whole):
+    class Stop(Exception):
+        pass
+
+    def stop(progress):
+        if progress.phase == "sweep" and progress.level == 0 and progress.tile == 2:
+            raise Stop
+
+    path = tmp_path / "out.zarr"
+    with pytest.raises(Stop):
+        distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, device="reference", callback=stop, **OPTIONS)
+    ours = distributed.resume(path, workers=1, device="reference")
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_run_without_workers_says_what_it_waits_for(tmp_path, whole, monkeypatch):
+    monkeypatch.setattr("simdtex.jobs.tiles.cluster.WAIT", 0.5)
+    said = []
+
+    def callback(progress):
+        if progress.phase == "sweep" and progress.level == 0 and not said:
+            cluster.scale(0)
+
+    def note(sentence):
+        said.append(sentence)
+        cluster.scale(1)
+
+    with (
+        dask_distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        dask_distributed.Client(cluster) as client,
+    ):
+        given = {"workers": client, "device": "reference", "callback": callback, "note": note}
+        ours = distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+        where = cluster.scheduler_address
+    assert said == [f"all workers of {where} are gone and the run waits for one; start one with: dask worker {where}"]
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_ends_is_said(tmp_path, whole):
+    """The scheduler and its worker are processes of their own, as on a cluster."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    program = [sys.executable, "-m"]
+    words = [*program, "distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard"]
+    one = [*program, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with (
+        subprocess.Popen(words, stderr=subprocess.DEVNULL) as scheduler,
+        subprocess.Popen(one, stderr=subprocess.DEVNULL) as worker,
+    ):
+
+        def callback(progress):
+            if progress.phase == "sweep" and progress.level == 0:
+                scheduler.kill()
+
+        given = {"workers": address, "device": "reference", "callback": callback}
+        try:
+            with pytest.raises(DeviceError, match=f"the scheduler {address} is gone; start it and its workers again, "):
+                distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+        finally:
+            scheduler.kill()
+            worker.kill()
+    ours = distributed.resume(tmp_path / "out.zarr", device="reference")
+    assert_same_bits(ours.compute(), whole)
+
+
+def test_an_open_machine_is_refused_for_workers(tmp_path):
+    with pytest.raises(TypeError, match="each worker opens its own device"):
+        distributed.synthesize(
+            SAMPLE, (20, 20), tmp_path / "a.zarr", workers=1, device=simdtex.open_machine("reference"), channel_axis=-1
+        )
+
+
+def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
+    """A client that failed to connect would else be the default one, on which the next `compute` waits for ever."""
+    with pytest.raises(ValueError, match="no scheduler answers at nonsense://a") as caught:
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "a.zarr", workers="nonsense://a", channel_axis=-1)
+    assert caught.value.__cause__ is not None  # which holds the client
+    with pytest.raises(ValueError, match="No clients found"):
+        dask_distributed.default_client()
+
+
+PEAK = """
+import sys
+from simdtex.jobs import tiles as distributed
+from skimage import data
+distributed.synthesize(data.brick()[:128, :128], (1024, 1024), sys.argv[1], tiles=512, rng=1, device=sys.argv[2])
+with open("/proc/self/status") as file:  # ru_maxrss would count the process that started this one
+    print(1024 * int(next(line for line in file if line.startswith("VmHWM")).split()[1]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is Linux's")
+def test_a_process_takes_no_more_memory_than_the_plan_says(tmp_path, cl_device):
+    plan = distributed.plan(data.brick()[:128, :128], (1024, 1024), tiles=512)
+    command = [sys.executable, "-c", PEAK, str(tmp_path / "o.zarr"), str(cl_device.index)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert plan.memory / 4 < int(done.stdout) < plan.memory

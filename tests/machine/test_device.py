@@ -1,0 +1,401 @@
+"""The listing, the check and the choice of devices, also with broken platforms."""
+
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from simdtex.live.command import render
+from simdtex.machine import devices
+from simdtex.machine import devices as device
+from simdtex.machine.devices import DeviceError, DeviceInfo
+
+
+def fake(index, name, platform="Acme OpenCL", kind="cpu", usable=True, **more):
+    reason = "" if usable else "it does not build"
+    return DeviceInfo(index, platform, name, kind, usable=usable, reason=reason, **more)
+
+
+LISTING = [
+    fake(0, "Turbo 4090", kind="gpu", usable=False),
+    fake(1, "Slow 10", kind="gpu"),
+    fake(2, "pthread-epyc", "Portable Computing Language", version="OpenCL 3.0 PoCL HSTR"),
+    fake(3, "pthread-epyc", "Portable Computing Language", usable=False),
+    fake(4, "reference", "NumPy", "reference"),
+]
+
+
+@pytest.fixture(autouse=True)
+def no_variable(monkeypatch):
+    monkeypatch.delenv(device.VARIABLE, raising=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "index"),
+    [
+        (None, 1),  # the first usable
+        ("slow", 1),
+        ("SLOW 10", 1),
+        ("pocl", 2),  # by the version; of two matches the only usable one
+        ("portable", 2),
+        ("pthread-epyc", 2),
+        ("2", 2),
+        (" 2 ", 2),
+        ("10", 1),  # no such index, so part of a name
+        ("4", 4),
+        ("refer", 4),
+    ],
+)
+def test_choose(text, index):
+    assert device.choose(text, LISTING) is LISTING[index]
+
+
+def test_choose_prefers_the_whole_name_then_the_platform():
+    listing = [fake(0, "Ultra"), fake(1, "Ultra Max"), fake(2, "cpu-Intel(R) Xeon", "PoCL"), fake(3, "Xeon", "Intel")]
+    for text, index in (("ultra", 0), ("ultra max (acme opencl)", 1), (str(listing[2]), 2), ("intel", 3)):
+        assert device.choose(text, listing) is listing[index]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nonesuch", '"nonesuch"; choose one of: 1 = Slow 10 (Acme OpenCL), 2 = '),
+        ("99", 'No device matches "99"; choose one of: 1 = '),
+        ("-1", "choose one of"),
+        ("", "choose one of"),
+        ("turbo", "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of: 1 = Slow 10"),
+        ("0", "it does not build); choose one of: 1 = Slow 10"),
+        ("e", "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 ="),
+    ],
+)
+def test_a_failed_choice_lists_the_devices(text, words):
+    with pytest.raises(DeviceError) as caught:
+        device.choose(text, LISTING)
+    assert words in str(caught.value)
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, ValueError)
+
+
+def test_a_device_that_is_refused_is_not_offered():
+    """The listing is not probed, and only the devices that match are."""
+    listing = [replace(info, usable=False, reason="not probed") for info in LISTING[:3]]
+    with pytest.raises(DeviceError, match=r"choose one of: 1 = [^=]*, 2 = [^=]*$"):
+        device.choose("turbo", listing, lambda info: replace(info, reason="it does not build"))
+
+
+def test_choose_probes_no_further_than_needed():
+    probed = []
+
+    def check(info):
+        probed.append(info.index)
+        return info
+
+    device.choose(None, LISTING, check)
+    assert probed == [0, 1]
+    probed.clear()
+    device.choose("slow", LISTING, check)
+    assert probed == [1]
+
+
+def test_nothing_usable_says_what_to_install():
+    with pytest.raises(DeviceError) as caught:
+        device.choose(None, [LISTING[0], LISTING[4]])
+    message = str(caught.value)
+    assert "Turbo 4090: it does not build" in message
+    remedies = ("pip install simdtex[cpu]", "apt install pocl-opencl-icd", "driver of your GPU", 'device="reference"')
+    assert all(words in message for words in remedies)
+
+
+def test_simulators_and_single_threads_come_last():
+    infos = [
+        fake(0, "", "Hollow"),
+        fake(0, "Oclgrind Simulator", "Oclgrind", "gpu"),
+        fake(0, "llvmpipe (LLVM 15)", "rusticl"),
+        fake(0, "board", kind="accelerator"),
+        fake(0, "basic-epyc", "Portable Computing Language"),
+        fake(0, "pthread-epyc", "Portable Computing Language"),
+        fake(0, "Turbo", kind="gpu"),
+    ]
+    names = [info.name for info in sorted(infos, key=device._preference)]
+    assert names == ["Turbo", "pthread-epyc", "basic-epyc", "board", "Oclgrind Simulator", "llvmpipe (LLVM 15)", ""]
+
+
+def handle(name, bits, units, unified):
+    """A device of a runtime; 2 is a CPU, 4 a GPU."""
+    texts = {"name": name, "version": "OpenCL 3.0", "driver_version": "1"}
+    sizes = {"type": bits, "max_compute_units": units, "global_mem_size": 2**30, "max_mem_alloc_size": 2**28}
+    return SimpleNamespace(**texts, **sizes, host_unified_memory=unified)
+
+
+def test_a_gpu_with_its_own_memory_and_more_units_comes_first(platforms):
+    one = [handle("cores", 2, 256, True), handle("on the board", 4, 96, True), handle("half", 4, 40, False)]
+    two = [handle("whole", 4, 80, False), handle("other cores", 2, 300, True)]
+    platforms(*(SimpleNamespace(name=name, get_devices=lambda of=of: of) for name, of in (("A", one), ("B", two))))
+    listing = device.devices(probe=False)
+    names = ["whole", "half", "on the board", "cores", "other cores", "reference"]
+    assert [info.name for info in listing] == names
+    assert [info.integrated for info in listing] == [False, False, True, False, False, False]
+    assert listing[0].largest == 2**28
+
+
+# find
+
+
+def test_find_reads_the_variable_only_when_nothing_is_asked(monkeypatch):
+    monkeypatch.setattr(device, "devices", lambda probe: list(LISTING))
+    monkeypatch.setattr(device, "probe", lambda info: info)
+    assert device.find().index == 1
+    monkeypatch.setenv(device.VARIABLE, "portable")
+    assert device.find().index == 2
+    assert device.find("slow").index == 1
+    assert device.find(2).index == 2
+    monkeypatch.setenv(device.VARIABLE, "")
+    assert device.find().index == 1
+    monkeypatch.setenv(device.VARIABLE, "Reference")
+    assert device.find().kind == "reference"
+    monkeypatch.setenv(device.VARIABLE, "nonesuch")
+    with pytest.raises(DeviceError, match="nonesuch"):
+        device.find()
+
+
+def test_find_reference_asks_no_runtime(monkeypatch):
+    monkeypatch.setattr(device, "devices", lambda probe: pytest.fail("a runtime was asked"))
+    found = device.find("reference")
+    assert found.usable
+    assert found.handle is None
+
+
+def test_find_takes_a_line_of_the_listing():
+    assert device.find(LISTING[1]) is LISTING[1]
+    with pytest.raises(DeviceError, match="it does not build"):
+        device.find(LISTING[0])
+
+
+def test_ensure_accepts_a_simulator_only_by_name(monkeypatch):
+    simulator = fake(0, "Oclgrind")
+    monkeypatch.setattr(device, "find", lambda: simulator)
+    assert device.main() == 1
+    monkeypatch.setenv(device.VARIABLE, "oclgrind")
+    assert device.main() == 0
+
+
+class Broken:
+    """A platform or device of which every attribute raises."""
+
+    def __getattr__(self, name):
+        raise RuntimeError(f"broken {name}\nlog:\nerror: unknown target CPU")
+
+
+class NoDevices(SimpleNamespace):
+    def get_devices(self):
+        raise RuntimeError("CL_OUT_OF_HOST_MEMORY")
+
+
+@pytest.fixture
+def platforms(monkeypatch):
+    """Set the platforms of the loader."""
+    device._enumerate.cache_clear()
+    yield lambda *found: monkeypatch.setattr(devices, "platforms", lambda: list(found))
+    device._enumerate.cache_clear()
+
+
+def test_a_reason_keeps_the_error_of_a_long_message():
+    name = "clBuildProgram failed: BUILD_PROGRAM_FAILURE"
+    message = f"{name} - {name} - {name}\n\nCompilation started\n1438:3:16: error: a parameter is missing\nfailed\n"
+    assert devices.one_line(ValueError(message)) == f"{name} - 1438:3:16: error: a parameter is missing"
+    assert devices.one_line(ValueError()) == "ValueError"
+
+
+def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
+    working = any_device.handle.platform
+    hollow = SimpleNamespace(name=" Hollow\0", get_devices=list)
+    platforms(Broken(), NoDevices(name="Sick"), hollow, working)
+    listing = device.devices(probe=False)
+    broken = [info for info in listing if not info.name]
+    assert [info.platform for info in broken] == ["Hollow", "Sick", "platform 0"]
+    assert broken[0].reason == "the platform reports no device"
+    assert broken[1].reason == "CL_OUT_OF_HOST_MEMORY"
+    assert broken[2].reason == "broken name - error: unknown target CPU"
+    assert [info.index for info in listing] == list(range(len(listing)))
+    assert listing[-1].kind == "reference"
+    assert device.find().usable
+    assert device.find().kind != "reference"
+
+
+def test_a_device_without_properties_is_passed_over(any_device, platforms):
+    sick = SimpleNamespace(name="AAA", get_devices=lambda: [Broken()])
+    platforms(sick, any_device.handle.platform)
+    line = next(info for info in device.devices(probe=False) if info.platform == "AAA")
+    assert (line.name, line.usable, line.reason) == ("", False, "broken type - error: unknown target CPU")
+    assert not device.probe(line).usable
+    assert device.find().name == any_device.name
+
+
+def test_a_device_that_cannot_build_has_a_reason(any_device, monkeypatch):
+    monkeypatch.setattr(devices, "_SOURCE", "__kernel void probe(nonsense)")
+    devices.failure.cache_clear()
+    try:
+        line = device.probe(any_device)
+        assert not line.usable
+        assert "rror" in line.reason and "\n" not in line.reason
+    finally:
+        devices.failure.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "reason"),
+    [
+        ("fma(x, x, -(1.0f + 0x1p-11f))", "0.0f", "fma rounds twice"),
+        ("x * x - (1.0f + 0x1p-11f)", "fma(x, x, -(1.0f + 0x1p-11f))", "a product and a sum are contracted to an fma"),
+        ("y * y", "0.0f", "denormal numbers become 0"),
+        ("mul_hi(b[i], b[i])", "(ulong)mul_hi((uint)b[i], (uint)b[i])", "mul_hi of 64-bit integers is wrong"),
+    ],
+)
+def test_a_device_with_wrong_bits_is_not_usable(any_device, monkeypatch, right, wrong, reason):
+    assert right in devices._SOURCE
+    monkeypatch.setattr(devices, "_SOURCE", devices._SOURCE.replace(right, wrong))
+    devices.failure.cache_clear()
+    try:
+        assert device.probe(any_device).reason == f"a tiny program gave wrong bits: {reason}"
+    finally:
+        devices.failure.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("print('noise\\nsimdtex-probe:', flush=True)", ""),
+        ("print('simdtex-probe:it does not build')", "it does not build"),
+        ("import os; os.abort()", "crashed on a tiny program (SIGABRT)"),
+        ("raise SystemExit(7)", "crashed on a tiny program (exit code 7)"),
+        ("import time; time.sleep(60)", "did not finish within 2 seconds"),
+    ],
+)
+def test_a_runtime_that_crashes_or_hangs_is_a_reason(monkeypatch, code, reason):
+    run = subprocess.run
+    monkeypatch.setattr(devices, "_SECONDS", 2.0)
+    monkeypatch.setattr(devices.subprocess, "run", lambda words, **how: run([words[0], "-c", code], **how))
+    (answer,) = devices.failures([0])
+    assert answer.endswith(reason) if reason else answer == ""
+
+
+def run_with_icds(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *args],
+        env={**os.environ, "OCL_ICD_VENDORS": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+SAY = """
+from simdtex.machine import devices as device
+try:
+    print(device.find().kind)
+except device.DeviceError as error:
+    print(error)
+print(device.find("reference").kind)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the loader reads .icd files on Linux only")
+def test_an_icd_that_names_no_library(tmp_path):
+    (tmp_path / "broken.icd").write_text("/nonexistent/libbroken.so\n")
+    alone = run_with_icds(tmp_path, "-c", SAY)
+    assert alone.returncode == 0, alone.stderr
+    assert alone.stdout.startswith("No usable OpenCL device was found: install")
+    assert alone.stdout.endswith("\nreference\n")
+    assert run_with_icds(tmp_path, "-m", "simdtex.machine.devices", "--ensure").returncode == 1
+    pocl = Path("/etc/OpenCL/vendors/pocl.icd")
+    if pocl.exists():
+        (tmp_path / "pocl.icd").write_text(pocl.read_text())
+        beside = run_with_icds(tmp_path, "-c", SAY)
+        assert beside.stdout == "cpu\nreference\n"
+        assert run_with_icds(tmp_path, "-m", "simdtex.machine.devices", "--ensure").returncode == 0
+
+
+# The Intel CPU runtime of the package index
+
+
+@pytest.fixture
+def intel(monkeypatch, tmp_path):
+    """Pretend that the runtime is installed in this environment."""
+    library = tmp_path / "lib" / "libintelocl.so"
+    library.parent.mkdir()
+    library.touch()
+    monkeypatch.setattr(devices.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(devices.sys, "platform", "linux")
+    for name in devices._ICD_VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    return library
+
+
+def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
+    conda = tmp_path / "etc" / "OpenCL" / "vendors"
+    conda.mkdir(parents=True)
+    (conda / "named.icd").write_text("libnamed.so.1\n")
+    (conda / "intel-cpu.icd").write_text("/wrong/place/libintelocl.so\n")
+    (conda / "text.icd").write_bytes(b"\xff\xfe\xff")
+    assert devices.intel_library() == intel
+    with devices._icd_folder():
+        folder = Path(os.environ["OCL_ICD_VENDORS"])
+        lines = [icd.read_text().strip() for icd in folder.iterdir()]
+        assert str(intel) in lines
+        assert "libnamed.so.1" in lines
+        assert not any("wrong" in line for line in lines)
+    assert "OCL_ICD_VENDORS" not in os.environ
+    assert not folder.exists()
+
+
+def test_a_folder_that_the_user_has_set_is_used(intel, monkeypatch):
+    monkeypatch.setenv("OCL_ICD_VENDORS", "/my/own")
+    with devices._icd_folder():
+        assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
+
+
+def test_every_usable_device_is_in_the_isolated_listing(cl_device):
+    line = device.devices()[cl_device.index]
+    assert replace(line, handle=None) == replace(cl_device, handle=None)
+    assert line.compute_units > 0
+    assert line.memory > 0
+    assert line.version.startswith("OpenCL ")
+    assert device.find(cl_device.index) == cl_device
+
+
+def test_render(capsys):
+    listing = [*LISTING[:3], fake(3, "Oclgrind [bold]"), fake(4, "", "Hollow", usable=False)]
+    render(listing)
+    lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    assert lines[0].split() == ["index", "platform", "device", "kind", "OpenCL", "units", "memory", "usable"]
+    assert lines[1].endswith("no: it does not build")
+    assert lines[2].split()[:2] == ["*", "1"]
+    assert lines[4].endswith("yes (simulator)")
+    assert "[bold]" in lines[4]
+    assert lines[5].split()[1:4] == ["Hollow", "-", "-"]
+    assert lines[-1] == "Chosen by default: Slow 10 (Acme OpenCL)"
+
+
+def test_threads_list_the_platforms_one_after_another(intel, monkeypatch):
+    import pyopencl
+
+    seen = []
+
+    def get_platforms():
+        seen.append(os.environ["OCL_ICD_VENDORS"])
+        time.sleep(0.02)
+        return []
+
+    monkeypatch.setattr(pyopencl, "get_platforms", get_platforms)
+    with ThreadPoolExecutor(6) as pool:
+        assert list(pool.map(lambda _: devices.platforms(), range(6))) == [[]] * 6
+    assert len(set(seen)) == 6, "each has its own folder"
+    assert "OCL_ICD_VENDORS" not in os.environ

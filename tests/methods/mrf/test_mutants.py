@@ -1,0 +1,354 @@
+"""What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
+
+from copy import deepcopy
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cases import REFERENCE, laid_out, sweeps, texture
+
+import simdtex
+from simdtex.checkpoint import Checkpointing
+from simdtex.driver import drive
+from simdtex.machine import memory
+from simdtex.methods import mrf
+from simdtex.methods.mrf import level as level_of_a_run
+from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.plan import check_guide
+from simdtex.methods.mrf.record import Record, expected_work
+from simdtex.methods.mrf.relax import AllCandidates, CandidateList
+from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.pictures import Pictures
+from simdtex.model.sample import Sample
+
+
+def test_the_mode_of_a_density_is_of_all_candidates():
+    words = 'the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"'
+    with pytest.raises(ValueError, match=f"^{words}$"):
+        mrf.Options(pixel="density", search="coherent")
+
+
+def test_options_resolve():
+    def resolved(**given):
+        found = mrf.Options(**given).resolved(Pictures((np.arange(17).reshape(1, 17, 1),)))
+        return found.search, found.finish
+
+    assert resolved() == ("coherent", 1.5)
+    assert resolved(relaxation="gibbs") == ("exact", 1.5)
+    assert resolved(relaxation="gibbs", pixel="density") == ("exact", 0.0)
+    assert resolved(pixel="density") == ("exact", 0.0)
+    assert resolved(search="exact", finish=0.5) == ("exact", 0.5)
+    assert resolved(search="coherent", relaxation="gibbs", finish=0) == ("coherent", 0)
+    assert resolved(relaxation="gibbs", pixel="density", finish=0.5) == ("exact", 0.5)
+
+
+def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
+    late = np.zeros((300, 300, 2), np.uint8)
+    late[299, 284:, 1] = np.arange(16)  # in its last few pixels, and one of them is the 0 of all others
+    for changed, finish in ((16, 0.0), (17, 1.5)):
+        late[0, 0] = (7, 0) if changed == 17 else 0
+        assert mrf.Options().resolved(Pictures((late,))).finish == finish
+    assert mrf.Options(finish=1.5).resolved(Pictures((late[1:],))).finish == 1.5
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype", "labels"),
+    [(16, np.uint8, True), (17, np.uint8, False), (16, np.uint16, True), (4, np.float32, False), (16, np.int64, True)],
+)
+def test_few_integers_of_a_guide_are_labels(values, dtype, labels):
+    own = np.arange(values, dtype=dtype).reshape(1, -1, 1)
+    assert check_guide(((own,), own[:, :3]), mrf.Options()).labels is labels
+    assert check_guide(((own,), own[:, :3].astype(np.float64)), mrf.Options()).labels is False
+
+
+def test_labels_that_the_sample_lacks_are_named():
+    own = np.arange(0, 24, 2).reshape(1, -1, 1)
+    with pytest.raises(ValueError, match=r"the label 3 .* has 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, \.\.\.; give labels"):
+        check_guide(((own,), own[:, :3] + 3), mrf.Options())
+
+
+def test_a_neighbourhood_that_does_not_fit():
+    check_fit((3, 9), 1, 1)
+    for sample, radius, order, words in [
+        ((9, 4), 2, 8, "order 8 does not fit the sample of 9 rows x 4 columns; the largest order that fits is 3"),
+        ((5, 7), 3, 9, "order 9 does not fit the sample of 5 rows x 7 columns; the largest order that fits is 8"),
+        ((3, 3), 2, 4, "order 4 does not fit the sample of 3 rows x 3 columns; the largest order that fits is 3"),
+        ((2, 8), 1, 1, "order 1 does not fit the sample of 2 rows x 8 columns; give at least 3x3 pixels"),
+    ]:
+        with pytest.raises(ValueError, match=f"^a neighbourhood of {words}$"):
+            check_fit(sample, radius, order)
+
+
+@pytest.mark.parametrize(
+    ("sample", "shape", "given", "expected"),
+    [
+        ((16, 16), (64, 64), {"order": 1}, 2),  # 8 x 8 candidates are 64
+        ((8, 16), (64, 64), {"order": 1}, 2),  # 4 x 8 candidates are enough down to 8 pixels from site to site
+        ((7, 17), (64, 64), {"order": 1}, 1),
+        ((8, 16), (64, 64), {"order": 1, "overview": 33}, 2),
+        ((8, 15), (64, 64), {"order": 1, "overview": 28}, 2),
+        ((8, 15), (64, 64), {"order": 1, "overview": 29}, 1),
+        ((48, 48), (512, 512), {"order": 1, "overview": 256}, 4),
+        ((256, 257), (512, 512), {"order": 1, "overview": 256}, 5),
+        ((255, 257), (512, 512), {"order": 1, "overview": 256}, 4),
+        ((15, 16), (64, 64), {"order": 1, "phases": 64}, 2),
+        ((64, 64), (5, 64), {"order": 1}, 2),
+        ((64, 64), (4, 64), {"order": 1}, 1),
+        ((64, 64), (64, 9), {"order": 1}, 3),
+        ((64, 64), (64, 8), {"order": 1}, 2),
+        ((64, 64), (64, 64), {"order": 1, "overview": 32}, 4),
+        ((64, 64), (64, 64), {"order": 1, "overview": 1}, 6),  # down to 2x2 sites
+        ((64, 64), (64, 65), {"order": 1, "overview": 1, "edges": "whole"}, 6),
+        ((16, 16), (8, 16), {"order": 1, "levels": 4}, 4),
+        ((9, 9), (64, 64), {"order": 1, "levels": 5, "edges": "whole"}, "give at most 4"),
+        ((16, 16), (8, 16), {"order": 1, "levels": 5}, "give at most 4"),
+        ((12, 12), (64, 64), {"order": 1, "levels": 3, "edges": "whole", "phases": 64}, 3),
+    ],
+)
+def test_how_many_levels(sample, shape, given, expected):
+    options = mrf.Options(**{"overview": 64} | given)
+    offsets = neighbourhood_offsets(options.order)
+    if isinstance(expected, int):
+        assert number_of_levels([sample], offsets, shape, options) == expected
+    else:
+        words = f"levels={options.levels} is too many for this sample, output and order; {expected}"
+        with pytest.raises(ValueError, match=f"^{words}$"):
+            number_of_levels([sample], offsets, shape, options)
+
+
+def prepared(machine=REFERENCE, **given):
+    options = {"order": 2, "levels": 3, "phases": 64, "edges": "reflect"} | given
+    return laid_out(machine, texture((24, 25), seed=3)[..., None], (20, 23), mrf.Options(**options), 5)
+
+
+def test_the_coarsest_level_has_fewer_decimations_if_it_has_many_candidates(monkeypatch):
+    assert [prepared().places(number).step for number in range(3)] == [1, 1, 1]
+    monkeypatch.setattr(level_of_a_run, "ALL", 4 * (24 * 25 // 4**2))
+    assert [prepared().places(number).step for number in range(3)] == [1, 1, 2]
+
+
+def test_which_sites_are_active():
+    level = prepared().level(1)
+    temperature = np.zeros((10, 12), np.uint16)
+    temperature[1, 2], temperature[9, 11] = 1, 1024
+    active, free = Active(level, temperature, False), Active(level, temperature, True)
+    assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
+    assert active.numbers().tolist() == [14, 119]
+    assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
+    assert free.numbers().tolist() == list(range(120))
+
+
+def test_the_memory_that_is_asked_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(memory, "require", lambda machine, device, host, remedy: asked.append((device, host)))
+    prepared()
+    prepared(schedule="block", levels=1, structure=0)
+    laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
+    laid_out(REFERENCE, texture((24, 25), 1, np.float64), (20, 23), mrf.Options(order=2, levels=1, structure=0), 5)
+    coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
+    each = 14, 80  # for every channel and pixel of the sample; the structure channel is one
+    assert asked == [
+        (460 * (12 + 10) + coarse * (2 * each[0] + each[1]), 460 * (84 + 2 * 11) + 64 * coarse),
+        (460 * (12 + 16) + fine * (each[0] + each[1]), 460 * (100 + 11) + 64 * fine),
+        (460 * (12 + 14) + fine * (4 * each[0] + each[1]), 460 * (84 + 4 * 11) + 64 * fine),
+        (460 * (12 + 8) + fine * (each[0] + each[1]), 460 * (84 + 22) + 64 * fine),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("most", "expected"),
+    [
+        (4, [([[0, 3]], 1, False), ([[3, 5], [9, 10]], 3, False), ([[20, 24]], 4, False), ([[24, 26]], 4, True)]),
+        (6, [([[0, 3], [3, 5], [9, 10]], 3, False), ([[20, 26]], 4, True)]),
+        (5, [([[0, 3], [3, 5]], 2, False), ([[9, 10]], 3, False), ([[20, 25]], 4, False), ([[25, 26]], 4, True)]),
+        (99, [([[0, 3], [3, 5], [9, 10], [20, 26]], 4, True)]),
+    ],
+)
+def test_as_many_steps_as_may_be_go_together(most, expected):
+    found = list(parts(np.array([[0, 3], [3, 5], [9, 10], [20, 26]]), most))
+    assert [(here.tolist(), begun, last) for here, begun, last in found] == expected
+    assert all(here.dtype == np.int64 for here, _, _ in found)
+
+
+def test_an_empty_step_is_a_part():
+    [(ranges, begun, last)] = parts(np.array([[3, 3]]), 4)
+    assert (ranges.tolist(), begun, last) == ([[3, 3]], 1, True)
+
+
+def test_a_site_always_cools():
+    assert [prepared(xi=xi).level(0).relaxation.xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
+
+
+def test_a_window_of_a_level():
+    run = prepared()
+    whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
+    assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
+    assert (window.evaluations.shape, window.evaluations.dtype, window.evaluations.any()) == ((4, 5), np.int32, False)
+    assert whole.evaluations.shape == run.grid(1).shape
+
+
+def test_a_level_with_few_candidates_evaluates_them_all(monkeypatch):
+    for most, kind in ((599, CandidateList), (600, AllCandidates)):
+        monkeypatch.setattr("simdtex.methods.mrf.level.EXHAUSTIVE", most)
+        assert type(prepared(search="coherent").level(0).proposal) is kind
+
+
+def test_a_saved_state_shares_no_memory_with_the_run():
+    run = prepared(free_sweeps=0)
+    _, state, _ = next(sweeps(run))
+    saved = run.save(state)
+    assert not any(np.shares_memory(saved[name], plane) for name, plane in state.field._asdict().items())
+
+
+def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
+    run, told, work = prepared(schedule="synchronous", search="exact"), [], []
+    run.level(2)
+    monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
+    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 3) * 7, 5)):  # 7 sites at once
+        monkeypatch.setattr(REFERENCE, "scratch", scratch)
+        run.step(run.begin(), lambda *seen: told.append(seen[-1]))
+        sites = [30] if pieces == 1 else [7, 7, 7, 7, 2]
+        assert [part.sites for part in told] == sites
+        assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
+        assert [part.last for part in told] == [False] * (pieces - 1) + [True]
+        assert sum(work) == 30 * 2 * 600 * 8 * 2  # channels, one of them that of the structure
+        told.clear()
+        work.clear()
+
+
+def test_a_step_may_have_no_sites():
+    few = {"order": 1, "levels": 1, "schedule": "random-subset:0.1"}
+    _, output = simdtex.synthesize(texture((7, 8)), (2, 2), rng=3, device=REFERENCE, full_output=True, **few)
+    assert not output.temperature.any()
+
+
+def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
+    pixels = texture((24, 25), 3, np.uint16)
+    run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=64, levels=1), 5)
+    neighbours = len(neighbourhood_offsets(64))
+    assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
+
+
+def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
+    plan, kept = prepared(search="coherent", schedule="luby", array="8x8").plan, []
+
+    def driven(found, keep=lambda info, tree, now=False: None):
+        image, output = drive(plan, REFERENCE, 5, checkpointing=Checkpointing(found, keep))
+        levels = [report | {"seconds": None} for report in output.statistics["levels"]]
+        counts = output.statistics["accounting"] | {"launches": None}
+        return image.tolist(), [stage.level for stage in output.stages], levels, counts
+
+    whole = driven(None, lambda info, tree, now=False: kept.append((info, deepcopy(tree()))))
+    assert [info.level for info, _ in kept if not info.sweep] == [1, 0]  # the steps that enter a level
+    assert [report["skipped"] for report in whole[2]] == [0, 0, 0]
+    assert all(driven(found) == whole for _, found in kept[::9])
+
+
+def test_how_far_a_run_is():
+    run = prepared(search="exact", free_sweeps=2)
+    record = Record(run, None)
+    record._expected = {2: (100.0, 20.0), 1: (300.0, 40.0), 0: (500.0, 40.0)}
+
+    def after(level, left, share, free=0):
+        record._first_left = record._first_left or left
+        state = SimpleNamespace(active=left > 0, free=free)
+        record._advance(level, state, left, share)
+        return round(record._fraction * 1000, 6)
+
+    assert after(2, 1.0, 0.5) == 5  # of the first sweep no more is known than that it is one of many
+    assert after(2, 1.0, 1.0) == 10
+    assert after(2, 0.25, 0.5) == 55  # half of all, and half a tenth
+    assert after(2, 0.0025, 1.0) == 100  # no further than to the end
+    assert [after(2, 0.0, 0.5), after(2, 0.0, 1.0, 1)] == [105, 120]
+    assert after(1, 0.0, 1.0, 1) == 460  # a level that is known from the beginning
+    record._first_left = 0.0
+    assert [after(0, 0.5, 0.0), after(0, 0.32, 0.0), after(0, 0.405, 0.0)] == [460, 560, 560]  # it never falls
+    assert after(0, 0.0, 1.0, 2) == 1000
+
+
+@pytest.mark.parametrize(
+    ("given", "each", "first"),
+    [
+        ({"search": "exact"}, 600, 5.8),
+        ({"search": "coherent"}, 13, 5.8),
+        ({"search": "coherent", "chance": 0, "xi": -2.0}, 10, 3.4),
+        ({"search": "coherent", "chance": 999, "free_sweeps": 1}, 600, 5.8),
+    ],
+)
+def test_the_work_that_is_expected(given, each, first):
+    run = prepared(**given)
+    free = given.get("free_sweeps", 2)
+    each *= 1 if given["search"] == "exact" else 16
+    sweeps = {n: sites * by + 5.4 * 200_000 for n, sites, by in [(0, 460, each), (1, 120, each), (2, 30, 600)]}
+    expected = {number: (sweep * (first if number == 2 else 4.5), sweep * free) for number, sweep in sweeps.items()}
+    found = expected_work(run)
+    assert set(found) == set(expected)
+    for level, work in expected.items():
+        assert found[level] == pytest.approx(work)
+
+
+@pytest.mark.parametrize("given", [{"search": "exact"}, {"search": "coherent"}, {"array": "4x4"}])
+def test_a_run_is_counted(given):
+    given = {"order": 2, "levels": 3, "phases": 64, "edges": "reflect", "free_sweeps": 1} | given
+    told, seen, parts = [], [], []
+    run = prepared(**given)
+    done = {2: [], 1: [], 0: []}
+    for level, _, _ in sweeps(run, watch=lambda *part: told.append(part)):
+        these = told[sum(map(len, parts)) :]
+        done[level.number].append((these[0][1].active, [part for *_, part in these]))
+        parts.append(these)
+    _, output = simdtex.synthesize(
+        texture((24, 25), seed=3), (20, 23), rng=5, device=REFERENCE, full_output=True, callback=seen.append, **given
+    )
+    assert [(p.level, p.sweep, p.phase, p.temperature_left, bool(p.stage)) for p in seen] == [
+        (
+            level.number,
+            state.cooling + state.free + 1,
+            "relax" if state.active else "free",
+            state.temperature_sum / (1024 * level.grid.rows * level.grid.cols),
+            part.last,
+        )
+        for level, state, part in told
+    ]
+    assert {progress.levels for progress in seen} == {3}
+    statistics = output.statistics
+    assert seen[-1].fraction > 0.9
+    for report, (number, swept_parts) in zip(statistics["levels"], done.items(), strict=True):
+        cooled = [those for active, those in swept_parts if active]
+        every = [those for _, those in swept_parts]
+        for counted, swept in ((report, every), (report["equilibrium"], cooled)):
+            assert counted["sweeps"] == len(swept)
+            assert counted["steps"] == sum(part.steps for those in swept for part in those)
+            assert counted["relaxations"] == sum(part.sites for those in swept for part in those)
+        assert [p.step for p in seen if p.level == number][-1] == report["steps"]
+        assert report["candidates"] == 600
+        few = given.get("search") != "exact" and number < 2
+        assert (0 < report["weighed"] <= 13) if few else report["weighed"] == 600
+        assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16 * 2
+    assert statistics["options"]["levels"] == 3
+    assert statistics["options"]["schedule"] == "coloring"
+    own = {"device", "seed", "options", "seconds", "device_seconds", "levels", "use", "lattice", "light"}
+    assert set(statistics) == own | ({"accounting"} if "array" in given else set())
+
+
+def test_a_callback_sees_the_known_variables_of_a_site():
+    sample, known, seen = texture((16, 16), 3), np.full((12, 12, 3), np.nan), []
+    known[2, 4, 1] = 77
+    options = {"order": 2, "levels": 2, "rng": 1, "device": REFERENCE, "channel_axis": -1}
+    simdtex.synthesize(sample, (12, 12), known=known, callback=lambda p: seen.append((p.level, p.image())), **options)
+    assert {int(image[2 >> level, 4 >> level, 1]) for level, image in seen} == {77}
+    assert {level for level, _ in seen} == {0, 1}
+
+
+def test_a_site_that_nothing_matches_is_named():
+    sample = np.zeros((7, 7), np.uint8)
+    sample[3, 3] = 1
+    image = np.zeros((6, 8), np.uint8)
+    image[4, 5] = image[4, 6] = image[3, 5] = 1
+    words = (
+        "no neighbourhood of the sample equals that of site ({}, {}); "
+        'use fewer grey levels, a smaller order, or estimator="parzen"'
+    )
+    with pytest.raises(ValueError) as caught:
+        simdtex.lcpdf(image, sample, [(0, 0), (4, 5), (3, 5)], order=1, estimator="histogram", device=REFERENCE)
+    assert str(caught.value) == words.format(4, 5)

@@ -1,0 +1,53 @@
+"""The preset ``paper`` makes its sample's texture; the literal density, for which all equations hold too, does not."""
+
+import numpy as np
+import pytest
+from skimage import data
+
+import simdtex
+from simdtex.jobs.studies.quality import coverage, plausibility
+
+
+def cloth():
+    """Bands of 7 pixels that cross, with threads of 2: structured."""
+    band, thread = np.arange(64) // 7 % 2, np.arange(64) % 2
+    levels = 60 + 70 * (band[:, None] + band) + 20 * (thread[:, None] ^ thread)
+    return np.rint(levels + np.random.default_rng(1).normal(0, 3, levels.shape)).astype(np.uint8)
+
+
+GRAVEL = data.gravel()[:96, :96]
+SAMPLES = {"cloth": cloth(), "gravel": GRAVEL}
+
+
+@pytest.fixture
+def faults(script):
+    """Return the function that names the figures by which an output is none of the sample's texture."""
+    figures = script("textures").figures
+
+    def found(sample, output):
+        mean, deviation, specks, coarse = figures(sample, output)
+        within = {
+            "mean": abs(mean) < 0.15,
+            "deviation": 0.85 < deviation < 1.15,
+            "specks": specks < 1.3,
+            "coarse sites": coarse < 1.4,
+            "plausibility": plausibility(sample, output) < 0.4,
+            "coverage": coverage(sample, output) < 0.45,
+        }
+        return {name for name, holds in within.items() if not holds}
+
+    return found
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_the_preset_makes_the_texture(machine, faults, name):
+    sample = SAMPLES[name]
+    given = {"preset": "paper", "order": 18, "rng": 1, "device": machine}
+    assert not faults(sample, simdtex.synthesize(sample, (96, 96), **given))
+    literal = simdtex.synthesize(sample, (96, 96), pixel="density", relaxation="gibbs", **given)
+    assert {"mean", "specks", "plausibility", "coverage"} <= faults(sample, literal)
+
+
+def test_without_the_last_sweep_sites_of_coarse_levels_stand_out(machine, faults):
+    given = {"preset": "paper", "order": 18, "rng": 1, "device": machine, "free_sweeps": 0}
+    assert faults(GRAVEL, simdtex.synthesize(GRAVEL, (96, 96), **given)) == {"coarse sites"}

@@ -1,0 +1,238 @@
+"""The penalty on use: how often each candidate is a source, and what it costs for that."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, opencl, problem, problems
+from hypothesis import given, settings
+
+import simdtex
+from simdtex.methods.mrf.neighbourhood import Field
+from simdtex.methods.mrf.use import FairUse, Regions, use, use_penalty
+from simdtex.model.display import use_colours
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.source_map import counts, effective_use
+
+
+@given(p=problems(max_order=5))
+@settings(max_examples=20)
+def test_known_sites_are_counted_at_their_sources(machine, p):
+    expected = dict.fromkeys(p.positions(), 0)
+    for source, t in zip(p.field.source.ravel().tolist(), p.field.temperature.ravel().tolist(), strict=True):
+        place = divmod(source, p.sample.cols)
+        if t < 1024 and place in expected:
+            expected[place] += 1
+    for m in (REFERENCE, machine):
+        _, field, _ = p.on(m)
+        found = use(m, field, p.grid, p.candidates(m))
+        assert (found.dtype, found.tolist()) == (np.int32, list(expected.values()))
+
+
+def test_many_sites_of_one_source_are_all_counted(machine):
+    """Work-items that add to one number at once."""
+    p = problem(1, shape=(90, 80), edges="reflect", temperatures="zero")
+    p = p._replace(field=p.field._replace(source=np.full_like(p.field.source, p.candidates(REFERENCE).positions[5])))
+    _, field, _ = p.on(machine)
+    found = use(machine, field, p.grid, p.candidates(machine))
+    assert found[5] == 7200
+    assert found.sum() == 7200
+
+
+@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize(
+    "how", [{"nowhere": 0.5}, {"masked": 0.5}, {"nowhere": 0.3, "masked": 0.4, "spacing": 2}], ids=str
+)
+def test_what_is_from_nowhere_uses_nothing(machine, how, every):
+    """And a number is that of a candidate, or of its place among all."""
+    p = problem(2, shape=(30, 28), edges="reflect", **how)
+    candidates = p.candidates(REFERENCE, every)
+    expected = dict.fromkeys(candidates.positions[: candidates.size].tolist(), 0)
+    for source, t in zip(p.field.source.ravel().tolist(), p.field.temperature.ravel().tolist(), strict=True):
+        if t < 1024 and source >= 0 and p.sample.inside.ravel()[source]:
+            expected[source] += 1
+    assert sum(expected.values())
+    for m in (REFERENCE, machine):
+        _, field, _ = p.on(m)
+        assert use(m, field, p.grid, p.candidates(m, every)).tolist() == list(expected.values())
+
+
+def plainly(counts, radius, rate):
+    """The penalty in Python numbers."""
+    rows, cols = counts.shape
+    found = np.zeros(counts.shape)
+    for i in range(rows):
+        for j in range(cols):
+            here = [
+                int(counts[k, m])
+                for k in range(max(0, i - radius), min(rows, i + radius + 1))
+                for m in range(max(0, j - radius), min(cols, j + radius + 1))
+            ]
+            u = (sum(here) / len(here)) / (int(counts.sum()) / counts.size)
+            found[i, j] = rate * min(4, max(0, u - 1))
+    return found.ravel()
+
+
+@pytest.mark.parametrize("radius", [0, 1, 2, 9])
+def test_the_price_is_the_excess_over_the_fair_share(radius):
+    rng = np.random.default_rng(radius)
+    counts = rng.integers(0, 4, (7, 9)) * (rng.random((7, 9)) < 0.3)
+    counts[2, 3] = 60
+    found = use_penalty(counts.ravel(), FairUse((7, 9), radius), 12.5)
+    assert found.dtype == np.float32
+    assert np.allclose(found, plainly(counts, radius, 12.5), rtol=1e-6, atol=1e-6)
+    if radius == 1:
+        assert found.max() == 50, "no more than four times the rate"
+        assert found.min() == 0, "what is used less than its share costs nothing"
+
+
+FAIR = np.int64([[2, 0, 2, 1], [0, 0, 1, 1], [4, 4, 0, 1]])
+
+
+def test_what_is_fair_may_differ_and_nobody_is_where_nothing_is_fair():
+    """Use in proportion to what is fair costs nothing; a number runs over places, or over candidates alone."""
+    there = FAIR.ravel() > 0
+    for listed in (False, True):
+        fair_use = FairUse((3, 4), 0, FAIR.ravel(), listed)
+        where = slice(None) if not listed else there
+        used = 3 * FAIR.ravel()
+        assert not use_penalty(used[where], fair_use, 7.0)[there[where]].any()
+        used[0] += 8  # 14 of a total of 56, where 12 of 48 are due ... 2 of 16
+        found = use_penalty(used[where], fair_use, 7.0)
+        assert found[0] == np.float32(7.0 * (14 * 16 / (2 * 56) - 1))
+        assert np.isinf(found).tolist() == (~there[where]).tolist()
+        again = use_penalty(used[where], fair_use, 7.0, found)
+        assert np.array_equal(again, found), "an infinite penalty stays so"
+
+
+def test_what_is_fair_counts_in_the_square_around():
+    fair_use = FairUse((3, 4), 1, FAIR.ravel())
+    used = np.zeros(12, int)
+    used[0], used[8] = 6, 4
+    found = use_penalty(used, fair_use, 1.0).reshape(3, 4)
+    due, whole = {(0, 0): 2, (2, 1): 9}, 16
+    assert found[0, 0] == np.float32(min(4, 6 * whole / (due[0, 0] * 10) - 1))
+    assert found[2, 1] == 0.0 == np.float32(max(0, 4 * whole / (due[2, 1] * 10) - 1))
+
+
+def test_the_penalty_of_a_kind_adds_up_where_it_is_not_as_often_as_asked():
+    """Of two regions, from the sweep before or from the level above, beside the penalties of candidates."""
+    fair_use = FairUse((2, 2), 0, wanted=np.array([[0.25, 0.75, 0.0], [1.0, 0.0, 0.0]]), gain=100)
+    used, kinds = np.array([8, 0, 0, 0]), np.array([2, 9, 1, 0, 0, 0])  # of 12: 3, 9 and 0 are due
+    kept, before = np.float32([7, 0, 0, 5, 0, 0]), np.array([2, 4, 0, 6], np.float32)
+    found = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept))
+    assert found[:4].tolist() == [2.5, 2, 0, 3]
+    assert found[4:].tolist() == [7 + round(-100 / 3 * 12 / 16), 0, 100 * 12 / 16, 5, 0, 0]
+    begun = use_penalty(np.append(used, kinds), fair_use, 1.0, kept)
+    assert begun.tolist() == [3, 0, 0, 0, *kept], "a level begins with those of the level above"
+    assert not use_penalty(np.append(used, kinds), fair_use, 1.0)[4:].any(), "the coarsest with none"
+
+
+def test_a_kind_is_counted_where_a_region_has_a_relaxed_site_of_it():
+    grid = Grid((2, 4))
+    of = np.repeat(np.int32([[0, 0, 1, -1]]), 2, 0)
+    regions = Regions(np.ones((2, 2, 4)), of, lambda source: source % 2, grid, 1, np.float32(0.5))
+    temperature = np.array([[0, 1024, 0, 0], [1023, 0, 0, 0]], np.uint16)
+    field = Field(None, np.int32([[4, 5, 6, 7], [8, 9, -1, 5]]), temperature)
+    assert regions.counts(field, grid).tolist() == [2, 1, 1, 0, *[0] * 4]
+    soft = np.float32([[[0, 8, 0, 1]] * 2, [[3, 0, 0, 0]] * 2, [[9, 9, 9, 9]] * 2])
+    found = regions.costs(soft, np.float32([2, 4, -6, 0, *[0] * 4]), grid)
+    assert found[:, 0].tolist() == [[0, 7, 0, 1], [4, 0, 3, 0], [9] * 4]
+
+
+@pytest.mark.parametrize(("shape", "split"), [((100, 110), 0), ((4, 20, 24), 1)])
+def test_the_sites_of_a_region_that_lack_neighbours_are_another(shape, split):
+    """Of the region in which they are 256 or more, at the finest level of an open lattice."""
+    offsets, p = neighbourhood_offsets(2, len(shape)), np.random.default_rng(1).random((2, *shape))
+    of = np.zeros(shape, np.int32)
+    of[..., :20], of[..., 0] = 1, -1
+    for torus, step in ((False, 1), (False, 2), (True, 1)):
+        regions = Regions(p, of, lambda source: source, Grid.of(shape, 1, torus), 1, np.float32(1))
+        grid = Grid.of(shape, step, torus)
+        near = (grid.neighbours(np.arange(grid.size, dtype=np.int32), offsets) < 0).any(0).reshape(grid.shape)
+        found, plain = regions.at(grid), grid.decimated(of)
+        assert (found == np.where(near & (plain == split), plain + 2, plain)).all()
+        for number, share in enumerate(regions.wanted(grid)):
+            those = grid.decimated(p)[:, found == number]
+            assert np.allclose(share, those.mean(1) if those.size else 0)
+        if len(shape) == 2:
+            assert (regions.at(grid.window(1, 2, 4, 6)) == found[1:5, 2:8]).all()
+
+
+def test_a_price_is_the_mean_of_two_sweeps():
+    counts, before = np.array([8, 0, 0, 0]), np.array([2, 4, 0, 6, 99], np.float32)
+    assert use_penalty(counts, FairUse((2, 2), 0), 1.0).tolist() == [3, 0, 0, 0]
+    assert use_penalty(counts, FairUse((2, 2), 0), 1.0, before).tolist() == [2.5, 2, 0, 3]
+
+
+def test_where_nothing_is_known_nothing_costs():
+    nobody = np.zeros(6, np.int32)
+    assert use_penalty(nobody, FairUse((2, 3), 1), 5.0).tolist() == [0] * 6
+    assert use_penalty(nobody + 1, FairUse((2, 3), 1), 0.0).tolist() == [0] * 6
+    assert use_penalty(nobody, FairUse((2, 3), 1), 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, (
+        "and a penalty fades"
+    )
+
+
+def test_a_run_uses_the_sample_more_evenly(cl_device):
+    """A bright corner of a gradient that nothing but the penalty would use."""
+    row, col = np.indices((48, 48))
+    sample = (row * 2 + col * 2 + np.random.default_rng(1).integers(0, 40, (48, 48))).astype(np.uint8)
+    share = {}
+    for balance in (0.0, 0.5):
+        _, output = simdtex.synthesize(
+            sample, (96, 96), rng=1, device=opencl(cl_device), balance=balance, full_output=True
+        )
+        share[balance] = effective_use(output.source, sample.shape).effective_share
+    assert share[0.5] > share[0.0] + 0.05
+
+
+def test_pixels_without_a_source_are_not_counted():
+    source = np.array([[[0, 1], [-1, -1], [2, 0]], [[0, 1], [1, 1], [-1, -1]]])
+    assert counts(source, (3, 2)).tolist() == [[0, 2], [0, 1], [1, 0]]
+    taken = source[source[..., 0] >= 0][np.newaxis]
+    assert effective_use(source, (3, 2), piece=1) == effective_use(taken, (3, 2), piece=1)
+
+
+def test_each_sample_is_counted_alone():
+    rng = np.random.default_rng(2)
+    source = np.dstack([rng.integers(0, 4, (9, 8)), rng.integers(0, 5, (9, 8)), rng.integers(0, 2, (9, 8))])
+    source[3, :, :2] = -1
+    for sample in range(3):
+        own = source[(source[..., 2] == sample) & (source[..., 0] >= 0)]
+        expected = np.zeros((4, 5), int)
+        for row, col, _ in own:
+            expected[row, col] += 1
+        assert counts(source, (4, 5), sample=sample).tolist() == expected.tolist()
+        if sample < 2:
+            found = effective_use(source, (4, 5), piece=2, sample=sample)
+            assert found == effective_use(own[np.newaxis, :, :2], (4, 5), piece=2)
+    source[0, 0] = (90, 0, 1)  # outside of the smaller sample, but not of its own
+    assert counts(source, (4, 5), sample=0).sum() == counts(source, (91, 5), sample=0).sum()
+    with pytest.raises(ValueError, match="outside a sample of 4 x 5"):
+        counts(source, (4, 5), sample=1)
+
+
+def test_errors_of_counting():
+    one, three = np.zeros((2, 2, 2), int), np.zeros((2, 2, 3), int)
+    with pytest.raises(ValueError, match="several samples: say which"):
+        counts(three, (4, 4))
+    with pytest.raises(ValueError, match="sample is 1: give None"):
+        counts(one, (4, 4), sample=1)
+    with pytest.raises(ValueError, match="sample is -1: give 0 or more"):
+        counts(three, (4, 4), sample=-1)
+    with pytest.raises(ValueError, match="outside a sample of 4 x 4"):
+        counts(np.array([[[0, 4]]]), (4, 4))
+    for bad in (np.array([[[-1, 0]]]), np.array([[[0, -1]]]), np.array([[[-2, -2]]]), one[:0]):
+        with pytest.raises(ValueError, match="source map"):
+            counts(bad, (4, 4))
+
+
+def test_a_sample_that_nothing_is_taken_from():
+    none = np.full((3, 3, 2), -1)
+    assert not counts(none, (4, 4)).any()
+    for figure in (effective_use,):
+        with pytest.raises(ValueError, match="no pixel was taken from the sample"):
+            figure(none, (4, 4))
+    with pytest.raises(ValueError, match="no pixel was taken"):
+        effective_use(np.zeros((3, 3, 3), int), (4, 4), sample=1)
+    colours = use_colours(counts(none, (4, 4)))
+    assert (colours == colours[0, 0]).all()
