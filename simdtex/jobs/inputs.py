@@ -78,7 +78,7 @@ class Work(NamedTuple):
         run: Any = (
             self.run
             if callable(self.run)
-            else partial(drive, self.run, others=accounting(getattr(self.options, "array", None)))
+            else partial(drive, self.run, others=accounting(vars(self.options).get("array")))
         )
         relit, seen = self.relit, callback
         if relit and callback:

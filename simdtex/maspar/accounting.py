@@ -100,7 +100,7 @@ class Account:
 
 
 class Accounting(Observer):
-    """The observer that keeps the `Account` of a run on a processor array, which is named as in the option ``array``."""
+    """The observer of a run that keeps its `Account`; ``array`` is the value of the option."""
 
     def __init__(self, array: str, run: Lattices) -> None:
         super().__init__(run, None)

@@ -192,7 +192,7 @@ def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
     for number in range(whole.levels):
         run, grid = whole.of(number), whole.grid(number)
         coarsest = number == run.levels - 1
-        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(options.xi)) if coarsest else 6 * 0.75
+        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(run.options.xi)) if coarsest else 6 * 0.75
         each = run.places(number).positions.size
         if not run.exhaustive(number):
             each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
