@@ -9,7 +9,7 @@ from pathlib import Path
 from textwrap import fill
 
 import simdtex
-from simdtex.inputs import inputs, parameter_types
+from simdtex.declared import inputs, parameter_types
 from simdtex.jobs.why.job import NOT_REPLAYED
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, table
 from simdtex.schedules import SCHEDULES

@@ -10,18 +10,29 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from copy import deepcopy
+from dataclasses import fields, replace
 from functools import partial
 from math import inf
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, begin_run
 from simdtex.machine import Machine, open_machine
+from simdtex.model.light import Light
 from simdtex.options import real_array, whole
 from simdtex.run import Callback, Observer, Output, Progress
+
+Seed = int | np.random.Generator | None
+"""The seed of a public function."""
+
+Device: TypeAlias = "str | Machine | None"
+"""The device of a public function: a name, or an open machine."""
+
+Kept = str | os.PathLike[str] | Checkpoint | Checkpointing | None
+"""Where a public function keeps the state of its run."""
 
 Tree = Any
 """Plain arrays and numbers, in dicts, lists and tuples."""
@@ -116,6 +127,69 @@ def drive(
 
 def _saved(run: Run, state: Any, observers: Sequence[Observer]) -> Tree:
     return {"state": run.save(state), "observers": [observer.save() for observer in observers]}
+
+
+class Job(Protocol):
+    """The checked input of a public function: a frozen dataclass, whose fields identify a run in a checkpoint.
+
+    Fields declared with ``compare=False`` do not. ``options`` are those of the method, ``channel_axis`` is that of the
+    picture, and ``light`` puts the light of the place back into it.
+    """
+
+    @property
+    def options(self) -> Any:
+        """The options of the method."""
+
+    @property
+    def channel_axis(self) -> int | None:
+        """The axis of the picture that holds channels; None if it has none."""
+
+    @property
+    def light(self) -> Light:
+        """What was done to the light of the pictures."""
+
+    def make(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Return the picture, channels last, and the rest of the output; one run of `drive`, or several in turn."""
+
+
+def run(
+    name: str,
+    job: Job,
+    rng: Seed,
+    device: Device,
+    callback: Callback | None,
+    checkpoint: Kept,
+) -> tuple[NDArray[Any], Output]:
+    """Run the job of a public function on a device; return the picture with the axes of the sample, and the output.
+
+    ``name`` is that of the function, and a `Checkpointing` as ``checkpoint`` keeps states in memory; all others are the
+    parameters that public functions share.
+    """
+    machine = open_machine(device)
+    machine.profile()  # forget what was before
+    axis, light = job.channel_axis, job.light
+    if callback:  # which may change the arrays of the call; a schedule may tell its owner what it saw
+        job = deepcopy(job, {id(job.options): job.options})
+
+    def seen(progress: Progress) -> Any:
+        assert callback
+        return callback(replace(progress, image=lambda: restored(light(progress.image(), progress.level), axis)))
+
+    with begin_run(checkpoint, name, rng, partial(identities, job), machine.name) as (seed, checkpointing):
+        image, output = job.make(machine, seed, callback and seen, checkpointing)
+    output.statistics.update(machine.profile() or {})
+    if light.about:
+        output.statistics["light"] = light.about
+    made = light(image)
+    stages = [replace(stage, image=restored(light(stage.image, stage.level), axis)) for stage in output.stages]
+    return restored(made, axis), replace(output, stages=stages, made=made)
+
+
+def identities(job: Any) -> dict[str, Any]:
+    """Return the fields of a job that identify its run."""
+    return {one.name: getattr(job, one.name) for one in fields(job) if one.compare}
 
 
 def execute(

@@ -1,749 +1,272 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of inputs: what the public functions and commands take beside the options of a method.
-
-An input is declared once, by `given`, as a field of the dataclass of its job. The declaration gives the parameter of
-the public function, its entry in the docstring and its check (`simdtex.driver.public`); what of it identifies a run in
-a checkpoint; the option of the command and the reader of its files (`simdtex.cli.options.input_options`,
-`simdtex.cli.inputs.read_inputs`); the painter of the live page (`simdtex.live.job`); and the types that editors show
-(``docs/stubs.py``). Checks, readers and painters are named here, and found when they are needed.
-"""
+"""Checks of the arrays of a job: each returns what a job takes, or raises with the remedy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from functools import partial
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from copy import deepcopy
+from math import prod
+from typing import Any, NamedTuple
 
-from simdtex.options import UNSET, Choice, Number, Option, Switch, Whole, table
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping, Sequence
-
-    import numpy as np
-
-    from simdtex.checkpoint import Checkpoint
-    from simdtex.io.hard_data import HardData
-    from simdtex.machine import Machine
-    from simdtex.run import Callback
-
-    ArrayLike = Any  # for the planners, whose call has what a check made of the array
-
-
-@dataclass(frozen=True)
-class Data:
-    """Arrays, tables and other values that a check of the job examines; ``says`` is the type, as in a docstring."""
-
-    says: str
-
-    def check(self, name: str, value: Any) -> None:
-        """Do nothing."""
-
-    def __str__(self) -> str:
-        return self.says
+from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
+from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of, plain_array
+from simdtex.machine import memory
+from simdtex.model.given import Given
+from simdtex.model.guide import GuidePair
+from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
+from simdtex.options import DataWarning, check_real
 
 
-@dataclass(frozen=True)
-class Input(Option):
-    """The declaration of an input: the fields of an `Option`, whose ``help`` is that of the command line, and others.
+def kept(value: Any) -> Any:
+    """Return a copy of an argument, whose arrays a callback may change; itself if it is of a type without copies."""
+    with suppress(Exception):
+        return deepcopy(value)
+    return value
 
-    Parameters
-    ----------
-    doc : str
-        The entry in the docstring. By default that of an option.
-    positional : bool
-        Whether the function takes it without its name; with the default `UNSET` it is required.
-    command_only : bool
-        Whether only the command has it, which says by it how files are read.
-    checker : str
-        A key of `simdtex.jobs.inputs.CHECKS`: ``check(name, value, call)`` returns the value, unless it is None, as the
-        job takes it. The ``call`` has all inputs by name, the earlier ones as their checks returned them.
-    identity : bool or str
-        Whether the value identifies a run in a checkpoint, as it is in the call once the job is planned; or a key of
-        `simdtex.jobs.inputs.IDENTITIES`: ``identity(call, name)`` returns what does.
-    flags : str
-        The names on the command line, separated by spaces: by default that of the field. Empty `help`: no option.
-    takes : str
-        The type of the option, in `simdtex.cli.options.TYPES`. By default that of the values.
-    metavar : str, optional
-    multiple : bool
-        Whether the option may be repeated.
-    method : str
-        The method that has it, if others of the command have it not.
-    reader : str
-        ``reader(given, files)`` of `simdtex.cli.inputs` returns the value from what the option was given.
-    painter : str
-        The method of `simdtex.live.job.Job` that adds the value which is painted on the page, or follows from it.
+
+Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
+"""`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
+
+
+class Inputs(NamedTuple):
+    """The arrays of a job: the sample's ``pictures``, the ``given`` values of the output, and the ``guide`` of both."""
+
+    pictures: Pictures
+    given: Given | None = None
+    guide: GuidePair | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether there is one sample and no other array."""
+        return self.pictures.clean and self.given is None and self.guide is None
+
+    def identity(self, name: str) -> Any:
+        """Return the arrays of an argument, as a part of the identity of a run."""
+        if name in ("sample", "training"):
+            return self.pictures.pixels, self.pictures.known
+        if name in ("mask", "guide"):
+            return self.pictures.usable if name == "mask" else self.guide
+        given = self.given if self.given and self.given.given_mask.any() else None
+        if name == "known_source":
+            return given and given.place
+        return given and (np.where(given.given_mask, given.values, 0), given.given_mask)
+
+
+def check_inputs(
+    sample: ArrayLike | Sequence[ArrayLike] | Pictures,
+    shape: tuple[int, ...],
+    channel_axis: int | None = None,
+    mask: Any = None,
+    known: Any = None,
+    known_source: Any = None,
+    guide: Any = None,
+    place: Placing = place_hard_data,
+) -> Inputs:
+    """Check the arrays of a job, and return them; the parameters are those of `simdtex.synthesize`.
+
+    ``sample`` may already be checked. ``place(table, shape, dtype)`` places a table of known values.
     """
-
-    doc: str = ""
-    positional: bool = False
-    command_only: bool = False
-    checker: str = ""
-    identity: bool | str = True
-    flags: str = ""
-    takes: str = ""
-    metavar: str | None = None
-    multiple: bool = False
-    method: str = ""
-    reader: str = ""
-    painter: str = ""
-
-    def named(self, name: str) -> list[str]:
-        """Return the names of the option, as `click.option` takes them, of the input of this name."""
-        return self.flags.split() or [f"--{name.replace('_', '-')}"]
-
-    def flag(self, name: str) -> str:
-        """Return the long name of the option."""
-        return next(flag for flag in self.named(name) if flag.startswith("--"))
-
-    def parameter(self, name: str) -> str:
-        """Return the name of the option among the parameters of a command."""
-        return self.named(name)[-1].removeprefix("--").replace("-", "_")
-
-    def described(self) -> str:
-        """Return the entry in the docstring."""
-        return self.doc or super().described()
-
-
-def given(kind: Any, help: str = "", doc: str = "", default: Any = None, **more: Any) -> Any:
-    """Return a field that declares an input; the arguments are those of `Input`."""
-    return field(default=default, metadata={"option": Input(default, kind, help, doc=doc, **more)})
-
-
-def needed(kind: Any, help: str = "", doc: str = "", **more: Any) -> Any:
-    """Return a field that declares a required input, which needs no name."""
-    return given(kind, help, doc, UNSET, positional=True, **more)
-
-
-DATA, OUTPUTS = "Data and guides", "Further outputs"
-RUNS, DEVICE = "Large outputs and interrupted runs", "Device and messages"
-"""Groups of options."""
-
-PICTURE = "(rows, cols) or, with `channel_axis`, (rows, cols, channels) array"
-PATHS: dict[str, Any] = {"takes": "file", "group": DATA}
-CELLS: dict[str, Any] = {"group": DATA, "identity": False}
-TABLES: dict[str, Any] = {"group": DATA, "method": "mrf"}
-READING: dict[str, Any] = {**TABLES, "command_only": True}
-MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader": "read_map"}
-NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
-
-
-declared: Any = partial(dataclass, init=False, repr=False, eq=False)  # of tables there are no instances
-
-
-class Planned:
-    """What the call of a planner has beside the inputs: ``options`` as given, and what checks and planners add."""
-
-    options: dict[str, Any]
-    inputs: Any
-    axes: int
-    given: Any
-    maps: Any
-    place: Any
-
-
-@declared
-class Watched(Planned):
-    """The inputs that all functions share."""
-
-    device: str | Machine | None = given(
-        Data("str or Machine"),
-        "Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`",
-        'Part of a device\'s name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes '
-        "SIMDTEX_DEVICE, else a GPU, else a CPU.",
-        none="SIMDTEX_DEVICE, else a GPU, else a CPU",
-        metavar="TEXT",
-        group=DEVICE,
-        identity=False,
-    )
-    callback: Callback | None = given(
-        Data("callable"),
-        doc="Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.",
-        identity=False,
-    )
-
-
-@declared
-class Seeded(Watched):
-    """The inputs of functions that draw random numbers."""
-
-    channel_axis: int | None = given(
-        Data("int"), doc="The axis of pictures that holds channels; None for grey pictures.", identity=False
-    )
-    rng: int | np.random.Generator | None = given(
-        Data("int or numpy.random.Generator"),
-        "Use this seed: the same seed gives the same output on every device",
-        "The seed. The same seed gives the same bytes on every device. None draws a random seed.",
-        none="a random one, printed",
-        flags="--seed",
-        takes="integer",
-        identity=False,
-    )
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = given(
-        Data("path or simdtex.Checkpoint"),
-        "Keep the state of the run in this file; `simdtex resume FILE` continues it",
-        "A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, "
-        "the run continues from it, to the same bytes. The file is removed when the function returns.",
-        takes="new file",
-        metavar="FILE",
-        group=RUNS,
-        identity=False,
-    )
-
-
-@declared
-class Common(Seeded):
-    """The inputs of functions that return the result of a run."""
-
-    full_output: bool = given(Data("bool"), doc="Return a `simdtex.run.Output` too.", identity=False, default=False)
-
-
-@declared
-class Sampled:
-    """The inputs about the sample and what is known of the output."""
-
-    mask: ArrayLike | Sequence[ArrayLike] | None = given(
-        Data("(rows, cols) bool array, or a list of such"),
-        "Take pixels only from the white parts of this mask, of the sample's size; give one for each sample",
-        "True for pixels of the sample that may be taken; all other pixels are still neighbours.",
-        identity="arrays",
-        flags="--sample-mask",
-        multiple=True,
-        method="mrf",
-        reader="read_masks",
-        **PATHS,
-    )
-    known: ArrayLike | HardData | str | os.PathLike[str] | None = given(
-        Data("array of `shape` (and the channel axis), HardData, pandas.DataFrame or path"),
-        "Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of Geo-EAS, or "
-        "a picture or a grid whose unknown pixels are transparent or NaN",
-        "Conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN "
-        "for unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some "
-        "variables (channels) of a pixel may be known and others not.",
-        checker="data",
-        identity="arrays",
-        method="mrf",
-        reader="read_known",
-        **PATHS,
-    )
-    columns: Any = given(
-        Data(""),
-        "Take these columns of the table of --known as x, y, z and value, by name or, without a header, by number; the "
-        "variable of a grid is value",
-        none="columns with names of axes, as X, Northing, lon; all others are values",
-        takes="columns",
-        metavar="x=NAME,...",
-        **READING,
-    )
-    categories: Any = given(
-        Data(""),
-        "Take these numbers for the texts in the table of --known, as sand=1,shale=0",
-        takes="categories",
-        metavar="NAME=NUMBER,...",
-        **READING,
-    )
-    missing: Any = given(
-        Data(""),
-        "Take this number in tables and grids as unknown, too; may be repeated",
-        none="codes such as -999, outside of the values of the sample",
-        takes="number",
-        metavar="VALUE",
-        multiple=True,
-        **READING,
-    )
-
-
-@declared
-class Guided:
-    """A guide."""
-
-    guide: tuple[Any, Any] | None = given(
-        Data("(array, array)"),
-        "Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of labels or "
-        "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples",
-        "Two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the "
-        "output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means "
-        "no guide. With several samples, the first is a list of pictures.",
-        identity="arrays",
-        takes="pair",
-        metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-        reader="read_guides",
-        painter="_guide",
-        **TABLES,
-    )
-
-
-@declared
-class Lit:
-    """How uneven light is treated."""
-
-    light: Literal["keep", "even"] = given(
-        Choice(("keep", "even")),
-        "Keep the sample's light, or take pixels from the sample in even light",
-        "Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic "
-        "of row and column. A part that is made in a picture gets the picture's light again. Where a result wraps "
-        "around, it has even light.",
-        default="keep",
-        group="Appearance",
-    )
-
-
-@declared
-class Synth(Common, Lit, Guided, Sampled):
-    """The inputs of `simdtex.synthesize`."""
-
-    sample: ArrayLike = needed(
-        Data(f"{PICTURE}; or a list of such"),
-        doc="The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN "
-        "or masked, and there may be several samples of one type, of any sizes.",
-        checker="samples",
-        identity="arrays",
-    )
-    shape: tuple[int, int] = needed(
-        Data("(int, int)"),
-        doc="Rows and columns of the output, each 1 or more; smaller or larger than the sample.",
-        checker="rows and columns",
-        flags="--size",
-        painter="_size",
-    )
-    method: Literal["mrf", "multires", "pyramid"] = given(
-        Choice(("mrf", "multires", "pyramid")),
-        "Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid)",
-        "Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1; De Bonet's "
-        "multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).",
-        default="mrf",
-        painter="_method",
-    )
-    known_source: ArrayLike | None = given(
-        Data("(rows, cols, 2) int array"),
-        doc="The (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 "
-        "for pixels from elsewhere. Known pixels with a position suggest candidates that continue it.",
-        identity="arrays",
-        method="mrf",
-    )
-
-
-@declared
-class Solid(Common):
-    """The inputs of `simdtex.synthesize_solid`."""
-
-    sample: ArrayLike = needed(
-        Data(PICTURE),
-        doc="The texture. It should be isotropic, since every slice of the block looks like it.",
-        checker="picture",
-    )
-    shape: tuple[int, int, int] = needed(
-        Data("(int, int, int)"),
-        doc="Depth, rows and columns of the block, each 1 or more. It repeats without a seam in every direction.",
-        checker="block",
-    )
-
-
-@declared
-class Tileset(Common, Lit):
-    """The inputs of `simdtex.tileset`."""
-
-    sample: ArrayLike = needed(
-        Data(f"{PICTURE}; or a list of such"),
-        doc="The texture, or a list of two or three of one type, such as grass and sand: those of the corners.",
-        checker="samples",
-        identity="arrays",
-    )
-    size: int | tuple[int, int] = given(
-        Data("int or (int, int)"),
-        doc="Rows and columns of a tile, 16 or more; one number for both. Whole cells of a regular texture should fit.",
-        default=256,
-        positional=True,
-        checker="tile",
-    )
-    colours: int | None = given(
-        Whole(2, 3),
-        "Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81",
-        none="2; with several samples their number",
-    )
-
-
-@declared
-class Fill(Common):
-    """The inputs of `simdtex.fill`."""
-
-    image: ArrayLike = needed(Data(PICTURE), doc="The picture; any real type.", checker="picture with gaps")
-    mask: ArrayLike | None = given(
-        Data("(rows, cols) bool array"),
-        "Fill the white parts of this mask, of the same size",
-        "True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.",
-        none="the parts of PICTURE that are not fully opaque, or NaN; the output then has no alpha",
-        positional=True,
-        checker="hole",
-        takes="file",
-        painter="_hole",
-    )
-    invert: Any = given(Switch(), "Fill all but the white parts of --mask", command_only=True)
-    grow: int = given(Whole(0), "Make the holes wider by this many pixels", default=0)
-    feather: int = given(
-        Whole(0),
-        "Blend the filled pixels with the picture up to this many pixels around the holes",
-        default=0,
-        more="Values without a mean (categories, few different pixels) change half-way instead.",
-    )
-    light: Literal["keep", "even"] | None = given(
-        Choice(("keep", "even")),
-        "Take pixels in the light of their place, or in even light, which then gets that of the hole's place",
-        "Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row "
-        "and column, which is then added at their new place (even).",
-        none="even if the picture is smooth for the most part, such as a sky; keep with a reach or finish 0",
-        group="Appearance",
-    )
-    sample: ArrayLike | None = given(
-        Data("array of the image's type"),
-        "Fill with this texture, not with that around the hole; may be repeated",
-        "The texture to fill with, or a list of several. None: the rest of the picture.",
-        checker="texture",
-        flags="--sample samples",
-        takes="file",
-        multiple=True,
-    )
-    reach: int | None = given(
-        Whole(1),
-        "Fill a hole from the surroundings up to this far away, in pixels",
-        more="It has no effect with `sample`.",
-        none="128, or twice the hole's longer side",
-    )
-
-
-@declared
-class Extend(Common, Lit):
-    """The inputs of `simdtex.extend`."""
-
-    image: ArrayLike = needed(
-        Data(PICTURE),
-        doc="The picture, which is also the sample; any real type.",
-        checker="picture",
-    )
-    left: int = given(Whole(0), "Add this many pixels at the left", default=0)
-    right: int = given(Whole(0), "Add this many pixels at the right", default=0)
-    top: int = given(Whole(0), "Add this many pixels at the top", default=0)
-    bottom: int = given(Whole(0), "Add this many pixels at the bottom", default=0)
-    seamless: bool | Literal["x", "y"] = given(
-        Data('bool or {"x", "y"}'),
-        "Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`",
-        "Whether the result wraps around: in both directions, or only left and right (x) or top and bottom (y). If no "
-        "pixels are added in such a direction, a band along its edges is replaced.",
-        default=False,
-        none="both, if no direction is given",
-        takes="direction",
-        metavar="[x|y|both]",
-        painter="_seam",
-    )
-    band: int | None = given(
-        Whole(1),
-        "Replace this many pixels along each edge that no pixels are added to, so that the output tiles",
-        none="the size of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter "
-        "side",
-    )
-
-
-@declared
-class Cells(Sampled):
-    """The inputs about the training image, and where its cells and data lie."""
-
-    channels: Any = given(
-        Switch(),
-        "Treat the last axis of a .npy of three axes as channels",
-        none="such a file is a volume",
-        group=DATA,
-        command_only=True,
-    )
-    origin: Sequence[float] | None = given(
-        Data("(x, y) or (x, y, z)"),
-        "Place the centre of the first cell here, in the units of the table of --known",
-        "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. "
-        "None: see `like`, else 0.",
-        none="see --like, else 0,0",
-        takes="numbers",
-        metavar="X,Y[,Z]",
-        **CELLS,
-    )
-    cell: Sequence[float] | None = given(
-        Data("(x, y) or (x, y, z)"),
-        "Make cells of this size, in the same units",
-        "The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.",
-        none="see --like, else 1,1",
-        takes="numbers",
-        metavar="DX,DY[,DZ]",
-        **CELLS,
-    )
-    like: Any = given(
-        Data("array or dataset of xarray"),
-        "Place the output where this grid or raster lies, and give it its size",
-        "An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and "
-        "number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to "
-        "lie at one place; else `origin` and `cell`; else those of such a training image.",
-        none="that of --known, --region and other maps that are grids; else --origin and --cell; else that of a grid "
-        "TRAINING_IMAGE",
-        metavar="GRID",
-        reader="read_like",
-        takes="file",
-        **CELLS,
-    )
-    several: Literal["refuse", "mean", "most"] = given(
-        Choice(("refuse", "mean", "most")),
-        "Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent "
-        "value (most)",
-        default="refuse",
-        more="There is no mean of categories. See `simdtex.place_hard_data`.",
-        **CELLS,
-    )
-    outside: Literal["refuse", "skip"] = given(
-        Choice(("refuse", "skip")),
-        "Treat data of a table outside of the cells as an error (refuse), or leave them out (skip)",
-        default="refuse",
-        **CELLS,
-    )
-    variables: Any = given(
-        Data(""),
-        "Take this variable of a grid TRAINING_IMAGE; may be repeated",
-        none="all",
-        metavar="NAME",
-        multiple=True,
-        group=DATA,
-        command_only=True,
-    )
-
-
-@declared
-class Simulate(Seeded, Guided, Cells):
-    """The inputs of `simdtex.simulate`."""
-
-    training: ArrayLike = needed(
-        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
-        doc="The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values "
-        "are categories. With `channel_axis` it has one more axis, for variables.",
-        checker="training",
-        identity="arrays",
-    )
-    n: int = needed(Whole(1), "Make this many realisations", none="1", flags="-n --number")
-    first: int = given(Whole(0), "Start with the realisation of this number", default=0)
-    shape: tuple[int, ...] | None = given(
-        Data("(int, int) or (int, int, int)"),
-        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `like`, `known`, or of "
-        "the first map below, if that is an array, else of the training image.",
-    )
-    region: ArrayLike | None = given(
-        Data("(rows, cols) or (layers, rows, cols) bool array"),
-        "Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation",
-        "True for cells that are simulated. All other cells have no value: NaN in floats, else the attribute "
-        "``missing``.",
-        **MAP,
-    )
-    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = given(
-        Data("(categories, rows, cols) array, or table or its path"),
-        "Follow these probabilities of the categories, in ascending order of category: a table of x, y and one column "
-        "for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN",
-        "Soft data, of a volume (categories, layers, rows, cols): the probability at each cell of each category of the "
-        "first variable, in ascending order of category; the sum is 1, and unknown probabilities are NaN. A table has "
-        "the columns x, y, and one for each category. See `soft_weight`.",
-        **MAP,
-    )
-    image_map: ArrayLike | None = given(
-        Data("([layers,] rows, cols) or (training images, [layers,] rows, cols) array"),
-        "Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
-        "their weights",
-        "The number, from 0, of the training image of each cell, or the weight of each training image at each cell. "
-        "NaN: any training image.",
-        **MAP,
-    )
-    rotation: ArrayLike | None = given(
-        Data("([layers,] rows, cols) array"),
-        "Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn",
-        "Rotation of the training image at each cell, of a volume about z, in degrees from x to y (from columns to "
-        "rows), rounded to eighths of a turn. NaN: any rotation of another cell.",
-        **MAP,
-    )
-    scale: ArrayLike | None = given(
-        Data("([layers,] rows, cols) array"),
-        "Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2",
-        "Factor by which all axes of the training image are enlarged at each cell, 1/2 to 2, rounded to powers of the "
-        "square root of 2. NaN: any factor of another cell.",
-        **MAP,
-    )
-    source: bool = given(
-        Switch(),
-        "Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz",
-        "Return the position in the training image of each cell of each realisation too.",
-        default=False,
-        group=OUTPUTS,
-    )
-    jobs: int | None = given(
-        Whole(1),
-        "Make this many realisations at a time",
-        none="one for each core, at most 4; on a GPU 1",
-        identity=False,
-        group=DEVICE,
-    )
-
-
-@declared
-class Estimate(Watched, Cells):
-    """The inputs of `simdtex.estimate`."""
-
-    training: ArrayLike = needed(
-        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
-        doc="The training image, as in `simdtex.simulate`; one variable.",
-        checker="training",
-    )
-    shape: tuple[int, ...] | None = given(
-        Data("(int, int) or (int, int, int)"),
-        doc="[Layers,] rows and columns of the result. None: those of `known` if an array, else of the training image.",
-    )
-    categorical: bool = given(Switch(), "Treat values as categories", group=DATA, default=False)
-    nearest: int = given(Whole(0, 64), "Use this many data for each cell, the nearest", default=8)
-    reach: int | None = given(
-        Whole(0),
-        "Use data up to this many cells away",
-        none="an eighth of the smaller of rows and columns of TRAINING_IMAGE",
-    )
-    bandwidth: float = given(
-        Number(0, above=True),
-        "Set the width of the Parzen kernel, in units of h_opt",
-        "h in units of h_opt, equation (8).",
-        default=1.0,
-    )
-
-
-@declared
-class Classify(Common):
-    """The inputs of `simdtex.classify`."""
-
-    image: ArrayLike = needed(
-        Data("(rows, cols) or, with `channel_axis`, (rows, cols, bands) array"),
-        doc="The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.",
-        checker="picture with gaps",
-    )
-    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike = needed(
-        Data("mapping of str to array or list of arrays, or (rows, cols) array of integers"),
-        "Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
-        "Transparent pixels are not used",
-        "The samples of each class, of the picture's type, by the name of the class. Or training regions of the "
-        "picture itself: 1, 2, ... where a pixel is of a class, and 0 elsewhere.",
-        flags="--texture textures",
-        takes="named",
-        metavar="NAME=FILE",
-        multiple=True,
-        group=DATA,
-        reader="read_classes",
-        painter="_classes",
-    )
-    strokes: Any = given(
-        Data(""),
-        "Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE",
-        command_only=True,
-        **PATHS,
-    )
-    masks: Mapping[str, Any] | None = given(
-        Data("mapping of str to (rows, cols) bool array or list of arrays"),
-        doc="True for pixels of the samples that may be used; a class without masks is used whole.",
-        identity=False,
-    )
-    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = given(
-        Data("mapping of str to array or list of arrays"),
-        "Measure with this picture of a class how much the class varies",
-        "Further pictures of a class, from which no exemplars are drawn. They measure how much the class varies, which "
-        "decides when a pixel is unknown.",
-        identity=False,
-        takes="named",
-        metavar="NAME=FILE",
-        multiple=True,
-        group=DATA,
-        reader="read_classes",
-    )
-
-
-@declared
-class Mix(Common):
-    """The inputs of `simdtex.mix`."""
-
-    samples: Sequence[ArrayLike] = needed(
-        Data("sequence of (rows, cols) or, with `channel_axis`, three-dimensional arrays"),
-        doc="One or more, of one type and any sizes. With `channel_axis`, grey ones may have two axes.",
-    )
-    shape: tuple[int, int] = needed(
-        Data("(int, int)"), doc="Rows and columns of the output.", checker="rows and columns"
-    )
-    palette: int | None = given(
-        Data("int"),
-        "Take the colours of this sample",
-        "The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.",
-        none="those of the pattern",
-        **NUMBERED,
-    )
-    pattern: int | None = given(
-        Data("int"),
-        "Take the pattern of this sample",
-        "The sample whose subband histograms are matched.",
-        none="the average of all",
-        **NUMBERED,
-    )
-    average: Sequence[float] | None = given(
-        Data("sequence of float"),
-        "Average the patterns with these weights, one for each sample",
-        "A weight for every sample, 0 or more. By default all weights are equal.",
-        takes="numbers",
-        metavar="W,W,...",
-    )
-    low: int | None = given(
-        Data("int"),
-        "Take the low frequencies of this sample, with --high",
-        "The sample of the low frequencies.",
-        **NUMBERED,
-    )
-    high: int | None = given(
-        Data("int"),
-        "Take the high frequencies of this sample, with --low",
-        "The sample of the high frequencies.",
-        **NUMBERED,
-    )
-    split: int | None = given(
-        Whole(0),
-        doc="Number of levels, from the finest on, that are high frequencies; by default half of them.",
-    )
-
-
-SHARED = table(Common)
-"""The inputs that most functions share."""
-
-TABLES_OF: dict[str, Any] = {
-    one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Simulate, Estimate, Tileset, Classify, Mix)
-}
-"""The tables by job, which has the name of its command."""
-
-MRF = {"mrf": "methods.mrf.options"}
-
-METHODS: dict[str, dict[str, str]] = {
-    "synth": {**MRF, "multires": "methods.multires.options", "pyramid": "methods.pyramid.options"},
-    "mix": {"pyramid": "methods.pyramid.options"},
-    "solid": {"pyramid.solid": "methods.pyramid.solid"},
-    "classify": {"classifier": "jobs.classification.options"},
-    "estimate": {},
-}
-"""The methods of a job, and the modules of their options; any other has ``mrf``."""
-
-
-def options_of(job: str) -> dict[str, Any]:
-    """Return the classes of options of a job's methods, by method."""
-    return {one: import_module(f"simdtex.{home}").Options for one, home in METHODS.get(job, MRF).items()}
-
-
-def inputs(job: str) -> dict[str, Input]:
-    """Return the inputs of a job by name: those that the function takes without a name first, the shared ones last."""
-    found: dict[str, Any] = {**table(TABLES_OF[job])}
-    order = sorted(found, key=lambda name: (not found[name].positional, name in SHARED))
-    return {name: found[name] for name in order}
-
-
-def parameter_types(job: str) -> dict[str, str]:
-    """Return the types of the parameters of a job's function, in the order of `inputs`."""
-    types = {one.name: str(one.type) for one in fields(TABLES_OF[job])}
-    return {name: types[name] for name, one in inputs(job).items() if not one.command_only}
+    pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
+    given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
+    return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
+
+
+def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
+    """Check a sample, or a list or tuple of samples, with the ``mask`` or masks of usable pixels, and return them.
+
+    With 3 ``axes`` the samples are volumes.
+    """
+    several = is_several(sample, channel_axis, axes)
+    arrays: list[Any] = [as_array("a sample", one) for one in sample] if several else [sample]
+    if several and len(kinds := {one.ndim for one in arrays}) > 1:
+        counts = f"{min(kinds)} and {max(kinds)}"
+        raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
+    pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
+    for number, picture in enumerate(pixels[1:], 1):
+        check_alike(f"sample {number}", picture, "sample 0", pixels[0])
+    if mask is None:
+        return Pictures(pixels, unknown)
+    masks = list(mask) if several and np.iterable(mask) else [mask]
+    if len(masks) != len(pixels):
+        raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
+    usable = tuple(check_mask(one, picture.shape[:-1]) for one, picture in zip(masks, pixels, strict=True))
+    if not any(one.any() for one in usable):
+        raise ValueError("the mask leaves nothing of the sample to be used; set it True where pixels may be taken from")
+    return Pictures(pixels, unknown, usable)
+
+
+def check_picture(image: Any, channel_axis: int | None, axes: int = 2) -> tuple[NDArray[Any], Mask]:
+    """Check a picture; return its pixels (rows, cols, channels), and the mask (rows, cols) of unknown ones.
+
+    A pixel is unknown if a channel is NaN or masked. With 3 ``axes`` it is a volume (layers, rows, cols, channels).
+    """
+    array = as_array("the sample", image)
+    pixels = check_sample(array, channel_axis, unknown=True, axes=axes)
+    hidden = np.ma.getmaskarray(array)
+    return pixels, unknown_in(pixels) | (hidden if channel_axis is None else hidden.any(channel_axis))
+
+
+def is_several(sample: Any, channel_axis: int | None, axes: int = 2) -> bool:
+    """Return whether a sample is a list or tuple of samples, and not one array written as a list."""
+    if not isinstance(sample, (list, tuple)):
+        return False
+    each = [0 if isinstance(one, (list, tuple)) else np.ndim(one) for one in sample]
+    return axes + (channel_axis is not None) in each and min(each) >= 2
+
+
+def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
+    """Return a mask as a bool array of ``shape``; raise if it is not one."""
+    found = plain_array(name, mask)
+    if found.dtype != np.bool_:
+        raise TypeError(f"{name} holds {found.dtype} values; give True and False")
+    _check_size(name, found.shape, of, shape)
+    return found
+
+
+def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) -> HardData | NDArray[Any]:
+    """Return known values as an array or as a table: a path, or a DataFrame whose columns have names.
+
+    Codes of unknown values within the values of ``pictures`` are values.
+    """
+    if isinstance(known, (str, os.PathLike)) or all(isinstance(one, str) for one in getattr(known, "columns", [0])):
+        if pictures is None:
+            return read_hard_data(known)
+        low, high = _ranges(pictures)
+        return read_hard_data(known, valid=(float(low.min()), float(high.max())))
+    return known if isinstance(known, HardData) else as_array(name, known)
+
+
+def _ranges(pictures: Pictures) -> tuple[Any, Any]:
+    """Return the smallest and the largest known value of each variable of the samples."""
+    ends = np.fmin, np.fmax
+    low, high = (end.reduce([end.reduce(one, tuple(range(one.ndim - 1))) for one in pictures.pixels]) for end in ends)
+    return low, high
+
+
+def check_known(
+    known: Any,
+    shape: tuple[int, ...],
+    channel_axis: int | None,
+    pictures: Pictures,
+    source: Any = None,
+    place: Placing = place_hard_data,
+) -> Given:
+    """Check the known values of an output, and return them.
+
+    ``known`` is a masked array, floats with NaN for unknown values, a table or its path.
+    """
+    known = as_known(known, pictures=pictures)
+    variables, dtype = pictures.pixels[0].shape[-1], pictures.pixels[0].dtype
+    if isinstance(known, HardData):
+        if len(known.names) != variables:
+            raise ValueError(
+                f"a datum has {len(known.names)} values, {', '.join(known.names)}, and a pixel of the sample "
+                f"{variables}; give as many, or choose columns: value of read_hard_data, --columns value=NAME"
+            )
+        memory.require_host(prod(shape) * variables * (dtype.itemsize + 1))  # values and a mask
+        array = place(known, shape, dtype).reshape(*shape, variables)
+    else:
+        axes = len(shape) + (channel_axis is not None)
+        check_real("known", known)
+        if known.ndim != axes:
+            raise ValueError(
+                f"known is {known.ndim}-dimensional; give "
+                f"{AXES[len(shape)] if channel_axis is None else 'the channel axis too'}"
+            )
+        array = known[..., None] if channel_axis is None else np.moveaxis(known, channel_axis, -1)
+    _check_size("known", array.shape, "the output", (*shape, variables))
+    there, values = ~np.ma.getmaskarray(array), np.ma.getdata(array)
+    if values.dtype.kind == "f":
+        there &= ~np.isnan(values)
+        if np.isinf(values[there]).any():
+            raise ValueError("known has infinite values; give numbers, or NaN where nothing is known")
+    if not there.any():
+        raise ValueError("known has no value; leave it out, or give numbers where something is known")
+    if there.all():
+        raise ValueError("known leaves nothing to do; give NaN or a masked array where the output is to be made")
+    kept = np.where(there, values, np.zeros((), values.dtype))
+    found, wrong = cast(kept, dtype)
+    if wrong.any():
+        raise ValueError(f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give such values")
+    _warn_beyond(found, there, pictures)
+    return Given(found, there, None if source is None else _check_source(source, there, pictures))
+
+
+def _warn_beyond(values: NDArray[Any], there: NDArray[np.bool_], pictures: Pictures) -> None:
+    """Warn of known values beyond those of the samples, which no candidate has."""
+    low, high = _ranges(pictures)
+    beyond = there & ((values < low) | (values > high))
+    if beyond.any():
+        variable = int(np.argwhere(beyond)[0][-1])
+        warnings.warn(
+            f"{np.count_nonzero(beyond)} of {np.count_nonzero(there)} known values are beyond those of the sample, "
+            f"{low[variable]:g} to {high[variable]:g}, the first {values[beyond][0]:g}; no candidate is like them",
+            DataWarning,
+            stacklevel=2,
+        )
+
+
+def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
+    """Return the positions of known pixels in the sample, (rows, cols, 2 or 3)."""
+    place = plain_array("known_source", source)
+    columns = 2 if len(pictures.pixels) == 1 else 3
+    if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
+        raise ValueError(
+            f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map"
+        )
+    used = (place[..., 0] >= 0) & there.all(-1)
+    own = place[used]
+    number = own[:, 2] if columns == 3 else np.zeros(len(own), np.intp)
+    inside = (number >= 0) & (number < len(pictures.pixels))
+    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])[np.where(inside, number, 0).astype(np.intp)]
+    if not (inside & ((own[:, :2] >= 0) & (own[:, :2] < sizes)).all(-1)).all():  # before a cast, which would wrap
+        raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
+    found = np.full(place.shape, -1, np.int32)
+    found[used] = own
+    return found
+
+
+def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> GuidePair:
+    """Check a guide ``(of the sample, of the output)``, arrays (rows, cols[, G]) or of a volume, and return it."""
+    if not isinstance(guide, (tuple, list)) or len(guide) != 2:
+        raise TypeError("guide is no pair; give (guide of the sample, guide of the output)")
+    first, second = guide
+    count = len(pictures.pixels)
+    if count > 1 and not (isinstance(first, (list, tuple)) and len(first) == count):
+        raise ValueError(f"there are {count} samples; give a list of a guide for each")
+    listed = count > 1 or (isinstance(first, (list, tuple)) and len(first) == 1 and hasattr(first[0], "ndim"))
+    axes = len(shape)
+    samples = tuple(_guide("the guide of the sample", one, axes) for one in (first if listed else [first]))
+    output = _guide("the guide of the output", second, axes)
+    for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
+        which = f"sample {number}" if count > 1 else "the sample"
+        _check_size(f"the guide of {which}", one.shape[:-1], which, picture.shape[:-1])
+        if one.shape[-1] != output.shape[-1]:
+            raise ValueError(
+                f"the guide of the sample has {one.shape[-1]} channels and that of the output {output.shape[-1]}; "
+                "give as many"
+            )
+        if unknown_in(one).any():
+            raise ValueError("the guide of the sample has NaN; give a number everywhere; NaN is for that of the output")
+    _check_size("the guide of the output", output.shape[:-1], "the output", shape)
+    return samples, output
+
+
+def _guide(name: str, array: Any, axes: int) -> NDArray[Any]:
+    found = pixels_of(name, array, axes)
+    if found.dtype.kind == "f" and np.isinf(found).any():
+        raise ValueError(f"{name} has infinite values; give numbers")
+    found = found.astype(np.uint8) if found.dtype == np.bool_ else found
+    return found[..., None] if found.ndim == axes else found
+
+
+def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int, ...]) -> None:
+    if shape != wanted:
+        sizes = ["x".join(map(str, sides)) for sides in (shape, wanted)]
+        raise ValueError(f"{name} is {sizes[0]} and {other} {sizes[1]} (rows x columns); give one size")

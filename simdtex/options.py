@@ -262,10 +262,11 @@ ARGUMENTS |= {name: name for name in ("rng", "device", "channel_axis", "callback
 """Arguments of the functions beside the options, by their names and by those of other libraries."""
 
 
-def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
+def resolve(options: type[T], job: str, given: Mapping[str, Any], function: Callable[..., Any] | None = None) -> T:
     """Return the options of a job: the method's defaults < the job's < the preset's < the user's values.
 
-    ``job`` is the name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``... Lists become tuples.
+    ``job`` is the name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``... Lists become tuples. A
+    name that is unknown may be that of a parameter of the public ``function``, misspelt.
     Raises TypeError if a name is unknown; the message lists the valid ones; ValueError or TypeError if a value is not
     valid.
     """
@@ -273,7 +274,8 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     known = ["preset"] * has_presets(own) + [*own]
     for name in given:
         if name not in known:
-            near = get_close_matches(name, [*known, *ARGUMENTS], 1, 0.66)
+            own_names = [*signature(function).parameters] if function else []
+            near = get_close_matches(name, [*known, *own_names, *ARGUMENTS], 1, 0.66)
             meant = f" (did you mean {ARGUMENTS.get(near[0], near[0])!r}?)" if near else ""
             method = options.__module__.split(".")[2]
             raise TypeError(f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join(known)}")

@@ -12,9 +12,9 @@ from cases import assert_same_bits, texture
 
 import simdtex
 import simdtex.jobs.tiles
+from simdtex.inputs import check_inputs, check_samples, is_several
 from simdtex.io import image, volume
 from simdtex.io.hard_data import HardData
-from simdtex.jobs.inputs import check_inputs, check_samples, is_several
 from simdtex.jobs.simulation.ensemble import ENSEMBLE, checked
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import DataWarning

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 import simdtex
-from simdtex import inputs
+from simdtex import declared as inputs
 from simdtex.checkpoint import Checkpoint, identity, read
 from simdtex.cli import inputs as readers
 from simdtex.cli.job import Task, job

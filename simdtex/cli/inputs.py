@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import Named, check_input, note, preview_of
-from simdtex.inputs import inputs
+from simdtex.declared import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
@@ -310,7 +310,7 @@ class Files(NamedTuple):
 def read_inputs(job: str, options: dict[str, Any], samples: Material, how: Reading = PLAIN) -> dict[str, Any]:
     """Return the inputs of a job that are in files, and the channel axis, by the parameters of its function.
 
-    Their options are taken out; ``labels`` is set if guides decide it. `simdtex.inputs` names the readers
+    Their options are taken out; ``labels`` is set if guides decide it. `simdtex.declared` names the readers
     ``reader(given, files)`` below.
     """
     found: dict[str, Any] = {"channel_axis": samples.channel_axis}

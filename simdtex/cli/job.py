@@ -9,7 +9,7 @@ import secrets
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -58,14 +58,14 @@ class Task(NamedTuple):
 
 
 def job(
-    *examples: tuple[str, str], usual: str = "", of: str | None = ""
+    *examples: tuple[str, str], usual: str = "", of: str = "", methods: Sequence[Any] = (), seeded: bool = True
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
-    The command has the options of its methods, ``--seed``, ``--dry-run``, ``--device``, ``--checkpoint`` and
-    ``--quiet`` beside those of the function, of which ``--stages``, ``--report`` and ``--profile`` are followed here.
-    ``usual`` are the names of the options that ``--help`` lists; ``of`` is the job whose options the command has, by
-    default that of its name. With None it has no such options, no ``--seed`` and no ``--checkpoint``.
+    The command has the options of its ``methods``, classes of options, with the defaults of the job ``of``, by default
+    that of its name; ``--seed`` and ``--checkpoint`` if it is ``seeded``; and ``--dry-run``, ``--device`` and
+    ``--quiet``, beside those of the function, of which ``--stages``, ``--report`` and ``--profile`` are followed here.
+    ``usual`` are the names of the options that ``--help`` lists.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
@@ -121,7 +121,8 @@ def job(
                 print_profile(statistics)
 
         own = planned.__dict__.pop("__click_params__", [])
-        drawn = () if of is None else (SEED, job_options(of or plan.__name__), CHECKPOINT)
+        own_options = job_options(of or plan.__name__, *methods)
+        drawn = (SEED, own_options, CHECKPOINT) if seeded else (own_options,)
         function: Any = together(*drawn, DEVICE, DRY_RUN, QUIET)(planned)
         function.__click_params__ += own
         return command(*examples, usual=usual)(function)

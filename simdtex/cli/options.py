@@ -25,7 +25,7 @@ from simdtex.cli.command import (
     WRITE,
     WRITE_PAIR,
 )
-from simdtex.inputs import SHARED, Input, inputs, options_of
+from simdtex.declared import SHARED, Input, inputs, options_of
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -113,9 +113,9 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
     return decorate
 
 
-def job_options(job: str) -> Callable[[Command], Command]:
-    """Return a decorator that adds to a command all options of its methods that it shows."""
-    tables = {method.partition(".")[0]: table(options) for method, options in options_of(job).items()}
+def job_options(job: str, *methods: Any) -> Callable[[Command], Command]:
+    """Return a decorator that adds to a command all options that it shows of its methods, classes of options."""
+    tables = {method.__module__.split(".")[2]: table(method) for method in methods}
     found: dict[str, dict[str, Declared]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
     for method, options in tables.items():
         for name, one in options.items():
@@ -183,7 +183,24 @@ def output_option(help: str, type: Any = EITHER, **how: Any) -> Callable[[Comman
 
 
 OUTPUT = output_option("Write this picture, or a folder of maps.")
-SEED, DEVICE, CHECKPOINT = (input_options("synth", name) for name in ("rng", "device", "checkpoint"))
+SEED = option(
+    "--seed",
+    type=int,
+    help="Use this seed: the same seed gives the same output on every device.  [a random one, printed]",
+)
+DEVICE = option(
+    "--device",
+    group=DEVICE_GROUP,
+    help="Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`.  "
+    "[SIMDTEX_DEVICE, else a GPU, else a CPU]",
+)
+CHECKPOINT = option(
+    "--checkpoint",
+    type=WRITE,
+    metavar="FILE",
+    group=RUNS,
+    help="Keep the state of the run in this file; `simdtex resume FILE` continues it.",
+)
 PROFILE = option(
     "--profile",
     is_flag=True,

@@ -16,14 +16,14 @@ import PIL.ImageDraw
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.inputs import inputs
+from simdtex.declared import inputs
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import options as classifier
 from simdtex.jobs.classification.job import classify
 from simdtex.jobs.classification.model import FEWEST_NEIGHBOURHOODS
-from simdtex.jobs.filling.job import extend, fill
-from simdtex.jobs.synthesis.job import synthesize
+from simdtex.jobs.filling.job import extend, fill, plan_extension, plan_filling
+from simdtex.jobs.synthesis.job import plan_synthesis, synthesize
 from simdtex.jobs.why.holes import HoleReplay
 from simdtex.jobs.why.replay import Replay
 from simdtex.live import frames
@@ -41,6 +41,9 @@ Message = dict[str, Any]
 
 FUNCTIONS: dict[str, Any] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
 """The functions of the page's jobs, by command: a larger texture, a seamless picture, a filled hole, labels."""
+
+PLANS: dict[str, Any] = {"synth": plan_synthesis, "extend": plan_extension, "fill": plan_filling}
+"""What makes the job of a function, to look inside its run."""
 
 METHODS = {
     "mrf": "Markov random field: any texture",
@@ -160,10 +163,11 @@ class Job:
         if self.method != "mrf":
             name = METHODS["mrf"].partition(":")[0]
             raise ValueError(f'only runs of the method "{name}" can be looked into; make a result by it first')
-        call, work = FUNCTIONS[self.kind].prepare(self.sample, **self._keywords)
+        keywords = {name: value for name, value in self._keywords.items() if name != "rng"}
+        job: Any = PLANS[self.kind](self.sample, **keywords)
         if self.kind == "fill":
-            return HoleReplay(work.run, work.relit, machine, call.rng)
-        return Replay(work.run, machine, call.rng)
+            return HoleReplay(job, machine, self._keywords["rng"])
+        return Replay(job.plan(), machine, self._keywords["rng"])
 
     def layers(
         self,

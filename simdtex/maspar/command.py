@@ -35,7 +35,7 @@ from simdtex.model.array import ARRAYS, MAPPINGS, PREFIX
     ("maspar gravel.png -o more.png --array 4k --mapping hierarchical", "Use a smaller array, with blocks on each PE."),
     ("maspar gravel.png -o more.png --order 8 --size 64 --report page", "See the PEs at work, for several schedules."),
     usual="output size order levels relaxation array film report seed quiet",
-    of=None,
+    seeded=False,
 )
 @click.argument("sample", type=READ)
 @output_option("Write this picture.", WRITE)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import check_shape, execute
-from simdtex.jobs.inputs import check_inputs, kept
+from simdtex.inputs import check_inputs, kept
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
 from simdtex.maspar import EXECUTED

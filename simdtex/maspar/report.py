@@ -19,8 +19,8 @@ from simdtex.driver import drive
 from simdtex.figures.page import Figure, Section, legend, new_figure, tidy, write_report
 from simdtex.figures.sheet import TEXT, common_scale, contact_sheet, magnified, rgb
 from simdtex.figures.tables import Table, duration_text, seconds_text
+from simdtex.inputs import check_inputs
 from simdtex.io.image import pillow_bytes
-from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import open_machine
 from simdtex.machine.reference import Reference
 from simdtex.maspar.job import Execution

@@ -7,15 +7,17 @@ parts unlike the rest count little. Coefficients are rounded, and values follow 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from math import ceil, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.model.pictures import Mask, few
+from simdtex.model.pictures import Mask, Pictures, few
 from simdtex.model.regularity import lattice_sentence
-from simdtex.options import LARGEST, moderate
+from simdtex.options import LARGEST, moderate, one_of
 
 Axes = tuple[int, ...]
 
@@ -33,6 +35,9 @@ SINGULAR = 1e-6
 
 ROW, COL = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 0, 2, 1, 0])
 """The exponents of row and column in each term."""
+
+LIGHTS = ("keep", "even")
+"""The values of the option ``light``: as it is, or without its trend."""
 
 BLOCKS, SMOOTH, SHARE = 8, 0.9, 0.2
 """A picture of `BLOCKS` x `BLOCKS` means is uneven if the trend is `SMOOTH` of their variance, and `SHARE` of the
@@ -138,6 +143,45 @@ class Relit(NamedTuple):
         rows, cols = (np.arange(0, n, step) - first for n, first in zip(self.made.shape, self.corner, strict=True))
         lit = self.trend.cast(image + self.trend.at(rows, cols, self.wraps))
         return np.where(self.made[::step, ::step, None], lit, self.whole[::step, ::step])
+
+
+@dataclass(frozen=True)
+class Light:
+    """What a job does to the light of its pictures: ``about`` for the statistics, and ``relit``, the way back."""
+
+    about: dict[str, Any] = field(default_factory=dict)
+    relit: Relit | None = None
+
+    def __call__(self, image: NDArray[Any], level: int = 0) -> NDArray[Any]:
+        """Return a picture of a run, or of a level, in the light of its place."""
+        return self.relit(image, level) if self.relit else image
+
+
+def in_light(pictures: Pictures, light: str, categorical: Any = False) -> tuple[Pictures, Light]:
+    """Return the pictures of a sample with the option ``light``, ``"keep"`` or ``"even"``, and what was done.
+
+    Only pixels that are known and may be taken count. Raises ValueError if the values are categories.
+    """
+    one_of("light", light, LIGHTS)
+    about = {"light": light, **unevenness(pictures.pixels[0])}
+    if light == "keep":
+        return pictures, Light(about)
+    use = [np.ones(one.shape[:2], bool) for one in pictures.pixels]
+    for masks in filter(None, (pictures.known, pictures.usable)):
+        use = [one & mask for one, mask in zip(use, masks, strict=True)]
+    found = trends(pictures.pixels, use, categorical)
+    pixels = tuple(one.removed(picture) for one, picture in zip(found, pictures.pixels, strict=True))
+    return replace(pictures, pixels=pixels), Light(about)
+
+
+def trends(pixels: Sequence[NDArray[Any]], use: Sequence[Mask], categorical: Any) -> list[Trend]:
+    """Return the trends that ``light="even"`` removes; raise ValueError if the values are categories."""
+    if categorical or few(pixels):
+        raise ValueError(
+            'light="even" subtracts a smooth trend, and categories, or at most 16 different pixels, have none; '
+            "leave light out"
+        )
+    return [trend(*pair) for pair in zip(pixels, use, strict=True)]
 
 
 def unevenness(picture: NDArray[Any]) -> dict[str, float]:

@@ -19,7 +19,7 @@ from PIL import ImageCms
 
 import simdtex
 from simdtex import cli
-from simdtex.inputs import inputs
+from simdtex.declared import inputs
 from simdtex.io.image import read_bytes
 from simdtex.jobs.classification.job import algorithm
 from simdtex.live import frames, results

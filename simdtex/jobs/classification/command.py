@@ -15,6 +15,7 @@ from simdtex.cli.command import DATA, OUTPUTS, READ, WRITE
 from simdtex.cli.inputs import read_inputs, read_material, size_text
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option
+from simdtex.jobs.classification.options import Options
 
 FITS = (".tif", ".tiff", ".npy")
 """The files of fits."""
@@ -27,6 +28,7 @@ UNLABELLED = 255
     ("classify a.png --texture brick=brick.png --texture grass=grass.png -o b.png", "Tell brick from grass."),
     ("classify a.png --strokes strokes.png -o b.png", "Learn the classes from strokes on the picture."),
     usual="output textures strokes truth confidence report order seed dry_run device quiet",
+    methods=[Options],
 )
 @click.argument("picture", type=READ)
 @output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)

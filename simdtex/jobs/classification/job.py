@@ -10,12 +10,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.declared import Classify
 from simdtex.driver import drive
-from simdtex.inputs import Classify
+from simdtex.inputs import check_mask, check_picture, is_several
 from simdtex.jobs.classification.algorithm import Plan
 from simdtex.jobs.classification.model import BANDS, CLASSES, FEWEST_NEIGHBOURHOODS, Model, Region, learn
 from simdtex.jobs.classification.options import Options
-from simdtex.jobs.inputs import Work, check_mask, check_picture, is_several, public
+from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, open_machine
 from simdtex.model.pictures import Mask, check_alike, completed
 from simdtex.options import lists, option_parameters, real_array, resolve, table

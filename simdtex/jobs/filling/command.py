@@ -11,7 +11,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import ENTER
+from simdtex.cli.command import ENTER, READ
 from simdtex.cli.inputs import (
     Material,
     Reading,
@@ -28,21 +28,36 @@ from simdtex.cli.options import (
     OUTPUT,
     PREVIEW,
     given,
-    input_options,
     material_options,
     option,
     report_option,
     size_option,
     stages_option,
+    together,
 )
 from simdtex.jobs.synthesis.command import write_page
+from simdtex.methods.mrf.options import Options
+from simdtex.model.light import LIGHTS
 from simdtex.model.pictures import unknown_in
 
-SIDES = ("top", "bottom", "left", "right")
+SIDES = ("left", "right", "top", "bottom")
 
 
 REPORTED = "its pictures, and how evenly it uses the picture"
 """What the page of a run shows."""
+
+BAND = option(
+    "--band",
+    type=int,
+    help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  [the size "
+    "of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side]",
+)
+LIGHT = option(
+    "--light",
+    words=LIGHTS,
+    group="Appearance",
+    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
+)
 
 
 @job(
@@ -50,12 +65,24 @@ REPORTED = "its pictures, and how evenly it uses the picture"
     ("extend photo.png -o larger.png --size 150% --seamless", "Add pixels at the right and below, and make it tile."),
     ("extend brick -o larger --right 512", "Extend all maps in the folder brick: albedo, normal, roughness..."),
     usual="output left right top bottom size seamless seed also preview dry_run device quiet",
+    methods=[Options],
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
-@input_options("extend", *SIDES)
+@together(*(option(f"--{side}", type=int, help=f"Add this many pixels at the {side}.") for side in SIDES))
 @size_option("that with the pixels of --left, --right, --top and --bottom", base="PICTURE")
-@input_options("extend", "seamless", "band", "light")
+@option(
+    "--seamless",
+    type=DIRECTION,
+    words=DIRECTIONS,
+    is_flag=False,
+    flag_value="both",
+    metavar="[x|y|both]",
+    help="Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`.  "
+    "[both, if no direction is given]",
+)
+@BAND
+@LIGHT
 @material_options
 @PREVIEW
 @stages_option("every level and sweep")
@@ -67,7 +94,7 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """
     if seamless is None and options["band"] is not None:
         raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
-    sides = {name: options.pop(name) or 0 for name in SIDES}
+    sides: dict[str, Any] = {name: options.pop(name) or 0 for name in SIDES}
     return continued(seamless or False, sides, size, **options)
 
 
@@ -77,6 +104,7 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     ("tile panorama.png -o round.png --direction x", "Join left and right only."),
     usual="output direction band seed also roles preview report dry_run device quiet",
     of="extend",
+    methods=[Options],
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
@@ -88,7 +116,8 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     show_default=True,
     help="Join left and right (x), top and bottom (y), or both.",
 )
-@input_options("extend", "band", "light")
+@BAND
+@LIGHT
 @material_options
 @PREVIEW
 @stages_option("every level and sweep")
@@ -104,7 +133,7 @@ def tile(direction: Any, **options: Any) -> Task:
 
 
 def continued(
-    seamless: Any, sides: dict[str, int], size: str | None, *, picture: Path, output: Path, **options: Any
+    seamless: Any, sides: dict[str, Any], size: str | None, *, picture: Path, output: Path, **options: Any
 ) -> Task:
     """Return the task that continues a picture, or a folder of maps; ``seamless`` as in `simdtex.extend`."""
     from simdtex.jobs.filling.job import extend
@@ -148,10 +177,40 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
     ("fill brick -o whole --grow 4", "Fill all maps in the folder brick where the albedo is transparent."),
     ("fill photo.png -o grass.png --mask car.png --sample meadow.png", "Fill with another texture."),
     usual="output mask invert grow feather samples reach seed also dry_run device quiet",
+    methods=[Options],
 )
 @click.argument("picture", type=ENTER)
 @OUTPUT
-@input_options("fill")
+@option(
+    "--mask",
+    type=READ,
+    metavar="FILE",
+    help="Fill the white parts of this mask, of the same size.  [the parts of PICTURE that are not fully opaque, or "
+    "NaN; the output then has no alpha]",
+)
+@option("--invert", is_flag=True, default=None, help="Fill all but the white parts of --mask.")
+@option("--grow", type=int, help="Make the holes wider by this many pixels.")
+@option("--feather", type=int, help="Blend the filled pixels with the picture up to this many pixels around the holes.")
+@option(
+    "--light",
+    words=LIGHTS,
+    group="Appearance",
+    help="Take pixels in the light of their place, or in even light, which then gets that of the hole's place.  [even "
+    "if the picture is smooth for the most part, such as a sky; keep with a reach or finish 0]",
+)
+@option(
+    "--sample",
+    "samples",
+    multiple=True,
+    type=READ,
+    metavar="FILE",
+    help="Fill with this texture, not with that around the hole; may be repeated.",
+)
+@option(
+    "--reach",
+    type=int,
+    help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
+)
 @material_options
 def fill(
     picture: Path, output: Path, mask: Path | None, invert: bool | None, samples: tuple[Path, ...], **options: Any

@@ -1,32 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Filling the holes of a picture from the rest of it, and extending a picture: `fill`, `extend` and their replay."""
+"""Filling the holes of a picture from the rest of it, and extending a picture: `fill` and `extend`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import ceil, log2, prod
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.driver import drive
-from simdtex.inputs import Extend, Fill
-from simdtex.jobs.inputs import Work, public, trends, with_light
+from simdtex.driver import Device, Kept, Seed, drive, run
+from simdtex.inputs import check_mask, check_picture, check_samples
+from simdtex.io.image import check_sample
+from simdtex.jobs.synthesis.job import Synthesis
 from simdtex.machine import Machine, memory
+from simdtex.maspar.accounting import accounting
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, of_palette
 from simdtex.methods.mrf.plan import NEAR
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.light import EXACT, Relit, unevenness
-from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.light import EXACT, LIGHTS, Light, Relit, in_light, trends, unevenness
+from simdtex.model.pictures import Mask, Pictures, check_alike
 from simdtex.model.regularity import autocorrelation, plain, regular
-from simdtex.options import resolve, within_32_bits
+from simdtex.options import one_of, resolve, whole, within_32_bits
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 REACH = 128
@@ -91,9 +94,61 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     return [Window(r, c, wanted) for r, c in found]
 
 
-@public("fill")
-def fill(call: Fill) -> Work:
+def fill(
+    image: ArrayLike,
+    mask: ArrayLike | None = None,
+    *,
+    grow: int = 0,
+    feather: int = 0,
+    light: Literal["keep", "even"] | None = None,
+    sample: ArrayLike | Sequence[ArrayLike] | None = None,
+    reach: int | None = None,
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    full_output: bool = False,
+    **options: Any,
+) -> Any:
     """Return a picture with its holes filled with the texture around them.
+
+    Parameters
+    ----------
+    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
+        The picture; any real type.
+    mask : (rows, cols) bool array, optional
+        True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.
+    grow : int, 0 or more
+        Make the holes wider by this many pixels.
+    feather : int, 0 or more
+        Blend the filled pixels with the picture up to this many pixels around the holes. Values without a mean
+        (categories, few different pixels) change half-way instead.
+    light : {"keep", "even"}, optional
+        Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row and
+        column, which is then added at their new place (even). None: even if the picture is smooth for the most part,
+        such as a sky; keep with a reach or ``finish=0``.
+    sample : array of the image's type, or a list of such, optional
+        The texture to fill with. None: the rest of the picture.
+    reach : int, 1 or more, optional
+        Fill a hole from the surroundings up to this far away, in pixels. It has no effect with `sample`. None: 128, or
+        twice the hole's longer side.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+    device : str or Machine, optional
+        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
+        SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
+        run continues from it, to the same bytes. The file is removed when the function returns.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
+    **options
+        Those of the method, see `simdtex.methods.mrf.Options`.
 
     Returns
     -------
@@ -102,6 +157,11 @@ def fill(call: Fill) -> Work:
     output : simdtex.run.Output
         Only with ``full_output=True``. ``source`` has positions in the image, and known pixels have their own. With
         `sample` it has positions in the sample, and -1 at known pixels.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -124,32 +184,94 @@ def fill(call: Fill) -> Work:
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    pixels, gaps = call.image
-    hole = gaps if call.mask is None else gaps | call.mask
+    about: dict[str, Any] = {"grow": grow, "feather": feather, "light": light, "sample": sample, "reach": reach}
+    job = plan_filling(image, mask, channel_axis=channel_axis, **about, **options)
+    picture, output = run("fill", job, rng, device, callback, checkpoint)
+    return (picture, output) if full_output else picture
+
+
+def plan_filling(
+    image: ArrayLike,
+    mask: ArrayLike | None,
+    *,
+    grow: int = 0,
+    feather: int = 0,
+    light: str | None = None,
+    sample: Any = None,
+    reach: int | None = None,
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Filling:
+    """Check the arguments of `fill`, and return its job."""
+    whole("grow", grow, 0)
+    whole("feather", feather, 0)
+    pixels, gaps = check_picture(image, channel_axis)
+    hole = gaps if mask is None else gaps | check_mask(mask, pixels.shape[:2])
+    if light is not None:
+        one_of("light", light, LIGHTS)
+    if reach is not None:
+        whole("reach", reach, 1)
+    pictures = None if sample is None else check_samples(sample, channel_axis)
+    if pictures:
+        check_alike("the sample", pictures.pixels[0], "the picture", pixels)
     if not hole.any():
         raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
-    share = widened(hole, call.grow, call.feather)
+    share = widened(hole, grow, feather)
     hole = share > 0
     if hole.all():
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
-    chosen = resolve(Options, "fill", call.options)
-    call.image, call.mask = np.where(hole[..., None], 0, pixels), hole
-    sample, found, relit = call.sample, None, None
-    if call.light == "even" or (call.light is None and _may_be_lit(call, chosen, pixels[~hole][None])):
+    chosen = resolve(Options, "fill", options, fill)
+    pixels, found = np.where(hole[..., None], 0, pixels), None
+    if light == "even" or (light is None and _may_be_lit(reach, chosen, pixels[~hole][None])):
         (found,) = trends([pixels], [~hole], chosen.categorical)
-        found = found if call.light or found.explains(pixels, ~hole) else None
-    call.light = "even" if found else "keep"
-    if found:
-        sample = sample and with_light(sample, call.light, chosen.categorical)[0]
-        relit = Relit(pixels, hole, found)
-        pixels = found.removed(pixels)
-    job: Any = Filling(pixels, hole, sample, call.reach, chosen, share)
-    return Work(job, chosen, call.channel_axis, light={"light": call.light}, relit=relit)
+        found = found if light or found.explains(pixels, ~hole) else None
+    if not found:
+        return Filling(pixels, hole, pictures, reach, chosen, share, Light({"light": "keep"}), channel_axis)
+    lit = Light({"light": "even"}, Relit(pixels, hole, found))
+    pictures = pictures and in_light(pictures, "even", chosen.categorical)[0]
+    return Filling(found.removed(pixels), hole, pictures, reach, chosen, share, lit, channel_axis)
 
 
-@public("extend", without="boundary")
-def extend(call: Extend) -> Work:
+def extend(
+    image: ArrayLike,
+    *,
+    left: int = 0,
+    right: int = 0,
+    top: int = 0,
+    bottom: int = 0,
+    seamless: bool | Literal["x", "y"] = False,
+    band: int | None = None,
+    light: Literal["keep", "even"] = "keep",
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    full_output: bool = False,
+    **options: Any,
+) -> Any:
     """Return a picture that is continued beyond its edges, or seamless.
+
+    Parameters
+    ----------
+    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
+        The picture, which is also the sample; any real type.
+    left, right, top, bottom : int, 0 or more
+        Add this many pixels at a side.
+    seamless : bool or {"x", "y"}
+        Whether the result wraps around: in both directions, or only left and right (x) or top and bottom (y). If no
+        pixels are added in such a direction, a band along its edges is replaced.
+    band : int, 1 or more, optional
+        Replace this many pixels along each edge that no pixels are added to, so that the output tiles. None: the size
+        of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side.
+    light : {"keep", "even"}
+        Whether the light of the picture is kept, or pixels are taken without a smooth trend of each channel, a
+        quadratic of row and column. New parts get the picture's light again; where the result wraps around, it has
+        even light.
+    channel_axis, rng, device, callback, checkpoint, full_output
+        As in `fill`.
+    **options
+        Those of the method, see `simdtex.methods.mrf.Options`, but for ``boundary``.
 
     Returns
     -------
@@ -157,6 +279,11 @@ def extend(call: Extend) -> Work:
         ``top + rows + bottom`` by ``left + cols + right``; the image, except for the bands, is at (top, left).
     output : simdtex.run.Output
         Only with ``full_output=True``; ``source`` is in pixels of the image.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
 
     Examples
     --------
@@ -166,16 +293,40 @@ def extend(call: Extend) -> Work:
     >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
     (72, 80)
     """
-    pixels, seamless = call.image, call.seamless
-    top, bottom, left, right = call.top, call.bottom, call.left, call.right
-    rows, cols = pixels.shape[:2]
+    sides: dict[str, Any] = {"left": left, "right": right, "top": top, "bottom": bottom}
+    about: dict[str, Any] = {"seamless": seamless, "band": band, "light": light, "channel_axis": channel_axis}
+    job = plan_extension(image, **sides, **about, **options)
+    picture, output = run("extend", job, rng, device, callback, checkpoint)
+    return (picture, output) if full_output else picture
+
+
+def plan_extension(
+    image: ArrayLike,
+    *,
+    left: int = 0,
+    right: int = 0,
+    top: int = 0,
+    bottom: int = 0,
+    seamless: bool | str = False,
+    band: int | None = None,
+    light: str = "keep",
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Synthesis:
+    """Check the arguments of `extend`, and return its job."""
+    pixels = check_sample(image, channel_axis)
+    for name, count in {"left": left, "right": right, "top": top, "bottom": bottom}.items():
+        whole(name, count, 0)
     if seamless not in (True, False, "x", "y"):
         raise ValueError(f'seamless is {seamless!r}; give True, False, "x" or "y"')
+    if band is not None:
+        whole("band", band, 1)
+    rows, cols = pixels.shape[:2]
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
     if not (seamless or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
     least = min([rows] * tall + [cols] * wide or [rows, cols])  # half of it at least is kept
-    width = call.band = min(band_of(pixels), max(1, least // 4)) if call.band is None else call.band
+    width = min(band_of(pixels), max(1, least // 4)) if band is None else band
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
     within_32_bits(shape[:2], 1)
     memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
@@ -185,19 +336,20 @@ def extend(call: Extend) -> Work:
     if 2 * across >= cols or 2 * along >= rows:
         raise ValueError(f"band={width} leaves nothing of {rows}x{cols} (rows x columns); give a narrower one")
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
-    if "boundary" in call.options:
+    if "boundary" in options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
     # on a torus the lattice of the picture is deformed, and its known pixels are not
     usual = {"boundary": "torus", "lattice": "none"} if seamless else {"boundary": "open"}
-    chosen = resolve(Options, "extend", usual | call.options)
+    chosen = resolve(Options, "extend", usual | options, extend)
     at: Any = slice(top, top + rows), slice(left, left + cols)
-    light, relit = {"light": call.light, **unevenness(pixels)}, None
-    if call.light == "even":
+    one_of("light", light, LIGHTS)
+    lit = Light({"light": light, **unevenness(pixels)})
+    if light == "even":
         (found,) = trends([pixels], [np.ones((rows, cols), bool)], chosen.categorical)
         wraps = (0,) * tall + (1,) * wide
-        whole = canvas.copy()
-        whole[at] = found.removed(pixels, wraps)
-        relit = Relit(whole, hole, found, (top, left), wraps)
+        whole_picture = canvas.copy()
+        whole_picture[at] = found.removed(pixels, wraps)
+        lit = replace(lit, relit=Relit(whole_picture, hole, found, (top, left), wraps))
         pixels = found.removed(pixels)
     canvas[at] = pixels
     place = np.full((*hole.shape, 2), -1, np.int32)
@@ -210,8 +362,7 @@ def extend(call: Extend) -> Work:
         # rows go on as rows, and columns as columns; along a row, parts move towards the seam
         corner = (np.nan if top or bottom else 0, np.nan if left or right or seamless else 0)
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner, colours=not seamless)
-    plan = mrf.plan(pictures, canvas.shape[:2], chosen, given, guide)
-    return Work(plan, chosen, call.channel_axis, light=light, relit=relit)
+    return Synthesis(pictures, (shape[0], shape[1]), "mrf", chosen, given, guide, lit, channel_axis)
 
 
 def band_of(pixels: NDArray[Any]) -> int:
@@ -280,8 +431,10 @@ class Filling:
     reach: int | None
     options: Options
     share: NDArray[Any]
+    light: Light
+    channel_axis: int | None = field(compare=False)
 
-    def __call__(
+    def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other, and return the result.
@@ -298,7 +451,8 @@ class Filling:
                 sample = self.sample_of(window)
                 seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                made, output = drive(self.plan(window, sample), machine, seed, seen, now)
+                plan, account = self.plan(window, sample), accounting(self.options.array)
+                made, output = drive(plan, machine, seed, seen, now, account)
                 assert output.source is not None and output.temperature is not None
                 about = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
                 finished.append(Made(sample.corner, made[hole], output.temperature[hole], output.source[hole], about))
@@ -411,12 +565,12 @@ def _has_tones(options: Options, pictures: Pictures) -> bool:
     return not (options.categorical or options.pixel == "density" or of_palette(pictures.pixels))
 
 
-def _may_be_lit(call: Fill, options: Options, known: NDArray[Any]) -> bool:
+def _may_be_lit(reach: int | None, options: Options, known: NDArray[Any]) -> bool:
     """Return whether the known pixels (1, n, C) of a picture to fill may lose their trend without being asked.
 
     The trend is of the whole picture, does not wrap around, and changes pixels.
     """
-    whole, tones = call.reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
+    whole, tones = reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
     return whole and tones and options.finish != 0 and max(float(known.max()), -float(known.min())) <= EXACT
 
 

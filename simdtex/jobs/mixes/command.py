@@ -14,12 +14,15 @@ from simdtex.cli.command import EITHER, OUTPUTS, READ, WRITE
 from simdtex.cli.inputs import channels, last_iteration, output_shape, read_inputs, read_material, size_text
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import PROFILE, given, input_options, option, output_option, size_option, stages_option
+from simdtex.methods.pyramid import options as pyramid
+from simdtex.methods.pyramid import solid as solids
 
 
 @job(
     ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
     usual="output size palette pattern average low high seed dry_run device quiet",
+    methods=[pyramid.Options],
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @output_option("Write this picture.", WRITE)
@@ -56,6 +59,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
     ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
     usual="outputs size picture seed iterations pyramid dry_run device quiet",
+    methods=[solids.Options],
 )
 @click.argument("sample", type=READ)
 @click.option(

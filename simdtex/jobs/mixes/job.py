@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
+from simdtex.declared import Mix, Solid
 from simdtex.driver import with_channels_last
-from simdtex.inputs import Mix, Solid
 from simdtex.jobs.inputs import Work, public
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid import solid

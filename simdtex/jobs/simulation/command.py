@@ -14,7 +14,8 @@ from simdtex.cli.command import ENTER
 from simdtex.cli.inputs import Material, in_place, output_shape, read_inputs, read_material, take_reading
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import given, input_options, output_option, report_option, size_option
-from simdtex.inputs import inputs as inputs_of
+from simdtex.declared import inputs as inputs_of
+from simdtex.methods.mrf import options as mrf
 
 TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
 
@@ -24,6 +25,7 @@ TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=
     ("simulate facies.png -o many.zarr -n 10 --size 500x500 --report page", "Set the size, and write a page."),
     ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "Read and write grids."),
     usual="output number size seed known categorical columns origin cell report dry_run device quiet",
+    methods=[mrf.Options],
 )
 @TRAINING_IMAGE
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
@@ -43,8 +45,8 @@ def simulate(
     A realisation depends only on the seed and on its number.
     """
     from simdtex.io.volume import write_realisations
-    from simdtex.jobs.inputs import Maps
     from simdtex.jobs.simulation.job import simulate
+    from simdtex.jobs.simulation.maps import Maps
     from simdtex.run import Output
 
     how, number = take_reading(options, deep=True), 1 if number is None else number
@@ -78,7 +80,7 @@ def simulate(
 @job(
     ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Estimate the probabilities."),
     ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
-    of=None,
+    seeded=False,
 )
 @TRAINING_IMAGE
 @output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")

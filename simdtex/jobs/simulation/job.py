@@ -20,21 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest
+from simdtex.declared import Cells, Estimate, Simulate
 from simdtex.driver import check_sides, drive
-from simdtex.inputs import Cells, Estimate, Simulate
+from simdtex.inputs import Inputs, Placing, check_inputs, check_known
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.places import Place
-from simdtex.jobs.inputs import (
-    Inputs,
-    Maps,
-    Placing,
-    Work,
-    check_inputs,
-    check_known,
-    check_region,
-    missing_value,
-    public,
-)
+from simdtex.jobs.inputs import Work, public
+from simdtex.jobs.simulation.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data

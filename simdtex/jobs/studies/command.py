@@ -14,6 +14,7 @@ from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
 from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import watching
 from simdtex.cli.options import DEVICE, QUIET, output_option
+from simdtex.methods.mrf.options import Options
 
 if TYPE_CHECKING:
     pass
@@ -52,7 +53,7 @@ from simdtex.schedules import PARALLEL, Schedule
     "--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
 )
 @click.option("--ising", is_flag=True, help="Relax Ising spins as well, and compare with the exact energy.")
-@job_options("schedules")
+@job_options("schedules", Options)
 @DEVICE
 @DRY_RUN
 @QUIET

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -33,6 +33,9 @@ from simdtex.cli.options import (
     stages_option,
 )
 from simdtex.jobs.tiles.command import check_tiles, synthesize_in_tiles, tiles_options
+from simdtex.methods.mrf import options as mrf
+from simdtex.methods.multires import options as multires
+from simdtex.methods.pyramid import options as pyramid
 
 
 @job(
@@ -41,6 +44,7 @@ from simdtex.jobs.tiles.command import check_tiles, synthesize_in_tiles, tiles_o
     ("synth gravel.png -o more.png --size 1024x512 --preview", "Set the size, and see 3x3 copies in more-3x3.png."),
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     usual="output size seed method order also guide preview report dry_run device quiet",
+    methods=[mrf.Options, multires.Options, pyramid.Options],
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
@@ -62,7 +66,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     from simdtex.io.hard_data import HardData
     from simdtex.jobs.synthesis.job import synthesize
 
-    context = click.get_current_context()
+    context, kind = click.get_current_context(), cast(Any, method)
     check_tiles(context)
     how = take_reading(options)
     target, material = read_lead(samples, output, options, how)
@@ -103,7 +107,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     height, width = material.sizes[0]
     by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
     return Task(
-        partial(synthesize, material.array, shape, method=method, **data | given(options)),
+        partial(synthesize, material.array, (shape[0], shape[1]), method=kind, **data | given(options)),
         f"{shape[1]}x{shape[0]} from {by}",
         str(target),
         writers,

@@ -3,36 +3,115 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from importlib import import_module
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from math import isqrt
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.driver import with_channels_last
-from simdtex.inputs import Synth, options_of
-from simdtex.jobs.inputs import Work, check_inputs, public, with_light
+from simdtex.checkpoint import Checkpointing
+from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_channels_last
+from simdtex.inputs import check_inputs, check_samples
+from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine, open_machine
+from simdtex.maspar.accounting import accounting
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import ORDERS
+from simdtex.methods.multires import options as multires
+from simdtex.methods.multires.algorithm import Plan as DeBonet
+from simdtex.methods.pyramid import options as pyramid
+from simdtex.methods.pyramid.algorithm import Plan as HeegerBergen
+from simdtex.model.given import Given
+from simdtex.model.guide import GuidePair, Surroundings
 from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.light import Light, in_light
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.options import SMALLER, one_of, real, real_array, resolve, whole
+from simdtex.run import Callback, Output
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.jobs.tiles"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
 
 
-@public("synth")
-def synthesize(call: Synth) -> Work:
+def synthesize(
+    sample: ArrayLike | Sequence[ArrayLike],
+    shape: tuple[int, int],
+    *,
+    method: Literal["mrf", "multires", "pyramid"] = "mrf",
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
+    light: Literal["keep", "even"] = "keep",
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    full_output: bool = False,
+    **options: Any,
+) -> Any:
     """Synthesise a picture of any size with the texture of a sample.
+
+    Parameters
+    ----------
+    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
+        The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN or
+        masked, and there may be several samples of one type, of any sizes.
+    shape : (int, int)
+        Rows and columns of the output, each 1 or more; smaller or larger than the sample.
+    method : {"mrf", "multires", "pyramid"}
+        Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1; De Bonet's
+        multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).
+    mask : (rows, cols) bool array, or a list of such, optional
+        ``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.
+    known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
+        ``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN
+        for unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some
+        variables (channels) of a pixel may be known and others not.
+    known_source : (rows, cols, 2) int array, optional
+        ``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 for
+        pixels from elsewhere. Known pixels with a position suggest candidates that continue it.
+    guide : (array, array), optional
+        ``mrf``: two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the
+        output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
+        guide. With several samples, the first is a list of pictures.
+    light : {"keep", "even"}
+        Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic
+        of row and column.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+    device : str or Machine, optional
+        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
+        SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
+        run continues from it, to the same bytes. The file is removed when the function returns.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
+    **options
+        Those of the method, see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.options.Options` and
+        `simdtex.methods.pyramid.options.Options`.
 
     Returns
     -------
     image : array of the sample's type
         `shape` plus the channel axis, if the sample has one.
+    output : simdtex.run.Output
+        Only with ``full_output=True``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -53,22 +132,78 @@ def synthesize(call: Synth) -> Work:
     >>> more.shape
     (80, 96)
     """
-    call.inputs = check_inputs(
-        call.sample, call.shape, call.channel_axis, None, call.known, call.known_source, call.guide
-    )
-    if call.method != "mrf" and not call.inputs.plain:
+    about: dict[str, Any] = {"method": method, "mask": mask, "known": known, "known_source": known_source}
+    job = plan_synthesis(sample, shape, guide=guide, light=light, channel_axis=channel_axis, **about, **options)
+    picture, output = run("synthesize", job, rng, device, callback, checkpoint)
+    return (picture, output) if full_output else picture
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """The job of `synthesize`: one run of a method.
+
+    ``pictures`` are the samples, ``shape`` (rows, cols) is that of the output, ``given`` are known values of the output
+    and ``guide`` leads a run; ``remedy`` is the user's remedy if the memory does not suffice.
+    """
+
+    pictures: Pictures
+    shape: tuple[int, int]
+    method: str
+    options: Any
+    given: Given | None
+    guide: GuidePair | Surroundings | None
+    light: Light
+    channel_axis: int | None = field(compare=False)
+    remedy: str = field(default=SMALLER, compare=False)
+
+    def plan(self) -> Any:
+        """Return the plan of the run."""
+        if self.method == "mrf":
+            plan = mrf.plan(self.pictures, self.shape, self.options, self.given, self.guide)
+            return replace(plan, remedy=self.remedy)
+        return METHODS[self.method][1](self.pictures.pixels[0], self.shape, self.options)
+
+    def make(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Run the plan, and return its result."""
+        others = accounting(self.options.array) if self.method == "mrf" else ()
+        return drive(self.plan(), machine, seed, callback, checkpointing, others)
+
+
+METHODS: dict[str, tuple[Any, Any]] = {
+    "mrf": (mrf.Options, mrf.Plan),
+    "multires": (multires.Options, DeBonet),
+    "pyramid": (pyramid.Options, HeegerBergen),
+}
+"""The options and the plan of each method."""
+
+
+def plan_synthesis(
+    sample: Any,
+    shape: tuple[int, int],
+    *,
+    method: str = "mrf",
+    mask: Any = None,
+    known: Any = None,
+    known_source: Any = None,
+    guide: Any = None,
+    light: str = "keep",
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Synthesis:
+    """Check the arguments of `synthesize`, and return its job."""
+    one_of("method", method, METHODS)
+    pictures, size = check_samples(sample, channel_axis, mask), check_shape(shape)
+    inputs = check_inputs(pictures, size, channel_axis, None, known, known_source, guide)
+    if method != "mrf" and not inputs.plain:
         raise ValueError(
-            f"the method {call.method} takes one sample that is known everywhere, no mask, no known values and no "
+            f"the method {method} takes one sample that is known everywhere, no mask, no known values and no "
             'guide; give method="mrf"'
         )
-    given = with_channels_last(call.options, call.channel_axis)
-    chosen: Any = resolve(options_of("synth")[call.method], "synth", given)
-    sample, light = with_light(call.sample, call.light, getattr(chosen, "categorical", False))
-    if call.method == "mrf":
-        plan: Any = replace(mrf.plan(sample, call.shape, chosen, call.inputs.given, call.inputs.guide), remedy=TILED)
-    else:
-        plan = import_module(f"simdtex.methods.{call.method}.algorithm").Plan(sample.pixels[0], call.shape, chosen)
-    return Work(plan, chosen, call.channel_axis, light=light)
+    chosen: Any = resolve(METHODS[method][0], "synth", with_channels_last(options, channel_axis), synthesize)
+    lit, about = in_light(pictures, light, vars(chosen).get("categorical", False))
+    return Synthesis(lit, size, method, chosen, inputs.given, inputs.guide, about, channel_axis, TILED)
 
 
 def lcpdf(

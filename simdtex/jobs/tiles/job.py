@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import check_version, warn
+from simdtex.declared import Lit
 from simdtex.driver import check_shape, drive
-from simdtex.inputs import Lit
+from simdtex.inputs import Inputs, check_inputs
 from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
-from simdtex.jobs.inputs import Inputs, check_inputs, with_light
 from simdtex.jobs.tiles.layout import Layout, Maps, further, planned
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.model.light import unevenness
+from simdtex.model.light import in_light, unevenness
 from simdtex.model.source_map import apply_source_map
 from simdtex.options import require, resolve, table
 from simdtex.random import as_seed
@@ -241,7 +241,7 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any], light:
     chosen = resolve(Options, "synth", options)
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
-    sample, _ = with_light(inputs.pictures, light, chosen.categorical)
+    sample, _ = in_light(inputs.pictures, light, chosen.categorical)
     return planned_run(sample, size, chosen, inputs.given, inputs.guide)
 
 

@@ -15,6 +15,7 @@ from simdtex.cli.command import ENTER, FOLDER
 from simdtex.cli.inputs import SHEET, Also, Folder, Material, Reading, channels, output_shape, read_lead, read_material
 from simdtex.cli.job import Task, job, notes
 from simdtex.cli.options import MAP, PROFILE, given, input_options, output_option, size_option
+from simdtex.methods.mrf import options as mrf
 
 PLANE = 8
 """Rows and columns of tiles of the plane that shows a set."""
@@ -25,6 +26,7 @@ PLANE = 8
     ("tileset grass.png sand.png -o terrain", "Make tiles of grass and sand, which meet within the tiles."),
     ("tileset brick -o tiles", "Make tiles of all maps in the folder brick, arranged alike."),
     usual="output size colours seed order light roles dry_run device quiet",
+    methods=[mrf.Options],
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this folder: pictures, and the set for Tiled, Godot and GLSL.", FOLDER)

@@ -14,15 +14,17 @@ from scipy import ndimage
 
 from simdtex import random
 from simdtex.checkpoint import Checkpointing
+from simdtex.declared import Tileset
 from simdtex.driver import drive, with_channels_last
-from simdtex.inputs import Tileset
-from simdtex.jobs.inputs import Inputs, Work, public, with_light
+from simdtex.inputs import Inputs
+from simdtex.jobs.inputs import Work, public
 from simdtex.jobs.tilesets.corners import CYCLE, TORUS, corners_of, torus
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import sums_around
+from simdtex.model.light import in_light
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import Lattice, Phases, parse_lattice, phases, plain, regular
 from simdtex.options import DataWarning, resolve
@@ -83,11 +85,11 @@ def tileset(call: Tileset) -> Work:
     chosen = resolve(Options, "tileset", options)
     if chosen.pixel == "density":
         raise ValueError('tiles continue the sources of their borders, and a density has none; give pixel="source"')
-    pictures, light = with_light(call.sample, call.light, chosen.categorical)
+    pictures, light = in_light(call.sample, call.light, chosen.categorical)
     call.inputs = Inputs(call.sample)
     size: Any = call.size
     tiles: Any = Tiles(pictures, size, colours, replace(chosen, labels=True))
-    return Work(tiles, chosen, call.channel_axis, light=light)
+    return Work(tiles, chosen, call.channel_axis, light=light.about)
 
 
 class Canvas(NamedTuple):

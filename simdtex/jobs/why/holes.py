@@ -13,25 +13,24 @@ from simdtex.jobs.filling.job import Filling, paste, shifted
 from simdtex.jobs.why.replay import Instant, Replay, Sweep
 from simdtex.machine import Machine
 from simdtex.model.explanation import Explanation
-from simdtex.model.light import Relit
 
 
 class HoleReplay:
     """The replay of a run that fills one hole, with the methods of `simdtex.jobs.why.replay.Replay`.
 
     The arrays of `at` are those of the whole picture, with the sites of a coarse level repeated; sites are pixels of
-    the window around the hole, and sources and candidates are pixels of the picture or of the sample. ``relit`` puts
-    the light back into the picture, None if it has its light. Raises ValueError if the job has several windows.
+    the window around the hole, and sources and candidates are pixels of the picture or of the sample. Raises ValueError
+    if the job has several windows.
     """
 
-    def __init__(self, job: Filling, relit: Relit | None, machine: Machine, seed: int) -> None:
+    def __init__(self, job: Filling, machine: Machine, seed: int) -> None:
         parts = job.windows()
         if len(parts) > 1:
             raise ValueError(f"{len(parts)} holes are filled by runs of their own; fill one hole to look into its run")
         (window,) = parts
         sample = job.sample_of(window)
         self._replay = Replay(job.plan(window, sample), machine, seed)
-        self._at, self._hole, self._corner, self._relit = window.at, job.hole, sample.corner, relit
+        self._at, self._hole, self._corner, self._light = window.at, job.hole, sample.corner, job.light
         self._whole = job.begin()
         self.origin, self.largest_order = (window.rows.start, window.cols.start), self._replay.largest_order
 
@@ -47,7 +46,7 @@ class HoleReplay:
         image = pasted(self._whole.image, now.image)
         return Instant(
             now.level,
-            self._relit(image) if self._relit else image,
+            self._light(image),
             pasted(self._whole.source, shifted(now.source, self._corner)),
             pasted(self._whole.temperature, now.temperature),
             pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),

@@ -3,37 +3,38 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from operator import index
-from typing import Any
+from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from simdtex.jobs.synthesis.job import synthesize
+from simdtex.driver import Device, Seed
+from simdtex.io.hard_data import HardData
+from simdtex.jobs.synthesis.job import plan_synthesis
 from simdtex.jobs.why.replay import Replay
 from simdtex.machine import open_machine
-from simdtex.methods import mrf
 from simdtex.model.explanation import Explanation
-from simdtex.options import lists, option_parameters, whole
+from simdtex.options import whole
 from simdtex.random import as_seed
 
-NOT_REPLAYED = ("method", "callback", "full_output", "checkpoint", "options")
 
-
-REPLAYED = [
-    *(one for name, one in synthesize.written.parameters.items() if name not in NOT_REPLAYED),
-    *option_parameters("synth", mrf.Options),
-]
-"""The parameters of `synthesize` that a replay has."""
-
-
-@lists(REPLAYED)
 def explain(
-    sample: ArrayLike,
+    sample: ArrayLike | Sequence[ArrayLike],
     shape: tuple[int, int],
     site: tuple[int, int],
     *,
     level: int = 0,
     sweep: int | None = None,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
+    light: Literal["keep", "even"] = "keep",
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
     **options: Any,
 ) -> Explanation:
     """Return an explanation of why a site takes its candidate, in a synthesis by the method ``mrf``.
@@ -51,9 +52,12 @@ def explain(
         0 is the finest.
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
+    mask, known, known_source, guide, light, channel_axis, device
+        As in `synthesize`.
+    rng : int or numpy.random.Generator, optional
+        The seed of the run to explain.
     **options
-        As in `synthesize`: ``channel_axis``, ``mask``, ``known``, ``known_source``, ``guide``, ``light``,
-        ``device`` and ``rng``, the seed of the run to explain; and those of `simdtex.methods.mrf.Options`.
+        Those of `simdtex.methods.mrf.Options`.
 
     Returns
     -------
@@ -85,16 +89,30 @@ def explain(
         row, col = map(index, site)
     except (TypeError, ValueError):
         raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
-    return replay(sample, shape, **options).explain((row, col), level, sweep)
+    about: dict[str, Any] = {"mask": mask, "known": known, "known_source": known_source, "guide": guide, "light": light}
+    about |= {"channel_axis": channel_axis, "rng": rng, "device": device}
+    return replay(sample, shape, **about, **options).explain((row, col), level, sweep)
 
 
-@lists(REPLAYED)
-def replay(sample: ArrayLike, shape: tuple[int, int], **options: Any) -> Replay:
+def replay(
+    sample: ArrayLike | Sequence[ArrayLike],
+    shape: tuple[int, int],
+    *,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
+    light: Literal["keep", "even"] = "keep",
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    **options: Any,
+) -> Replay:
     """Return a replay of a synthesis by the method ``mrf``, with its field after any set of sites that relax together.
 
     Parameters
     ----------
-    sample, shape, **options
+    sample, shape, mask, known, known_source, guide, light, channel_axis, rng, device, **options
         As in `explain`.
 
     Returns
@@ -121,7 +139,6 @@ def replay(sample: ArrayLike, shape: tuple[int, int], **options: Any) -> Replay:
     >>> replay.at(-1, sets=1).image.shape
     (32, 32, 1)
     """
-    call, work = synthesize.prepare(sample, shape, **options)
-    if call.method != "mrf":
-        raise ValueError("only runs of the method mrf can be looked into")
-    return Replay(work.run, open_machine(call.device), as_seed(call.rng))
+    about: dict[str, Any] = {"mask": mask, "known": known, "known_source": known_source, "guide": guide, "light": light}
+    job = plan_synthesis(sample, shape, channel_axis=channel_axis, **about, **options)
+    return Replay(job.plan(), open_machine(device), as_seed(rng))
