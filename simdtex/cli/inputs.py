@@ -475,7 +475,8 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
 def _check_flat(samples: Material) -> None:
     """Raise if pictures of samples are asked for, which are no pictures."""
     if samples.deep:
-        raise ValueError(f"{samples.paths[0]} is a volume; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
+        path = samples.paths[0]
+        raise ValueError(f"{path} is a volume; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
 
 
 def read_guides(
