@@ -49,11 +49,12 @@ class Checkpointing:
     """The state from which a run continues, and the function that receives every later state.
 
     ``found`` is None for a new run. ``offer(info, tree)`` is called after every step; ``tree()`` returns the state, for
-    a later `found`, and ``now=True`` requires that it is written.
+    a later `found`, and ``now=True`` requires that it is written. ``stopping()`` returns whether the run is to stop.
     """
 
     found: Any = None
     offer: Callable[..., Any] = lambda info, tree, *, now=False: None
+    stopping: Callable[[], bool] = lambda: False
 
 
 class Checkpoint:
@@ -137,7 +138,7 @@ class Checkpoint:
             seed, found = self._open(job, rng, inputs(), device)
             self.running, self.resumed = True, found is not None
             try:
-                yield seed, Checkpointing(found, self.offer)
+                yield seed, Checkpointing(found, self.offer, lambda: self.stopping)
             except (ValueError, TypeError):  # the input, which a plan finds out; a checkpoint of it is of no use
                 if not self._saved and found is None:
                     self.remove()
@@ -178,9 +179,9 @@ class Checkpoint:
             old, new = before.get(name), now.get(name)
             if old == new:
                 continue
-            if name == "options" and isinstance(old, dict) and isinstance(new, dict):
-                name = next(one for one in {**old, **new} if old.get(one) != new.get(one))
-                old, new, name = old.get(name), new.get(name), f"option {name}"
+            if name in ("options", "maps") and isinstance(old, dict) and isinstance(new, dict):
+                part = next(one for one in {**old, **new} if old.get(one) != new.get(one))
+                old, new, name = old.get(part), new.get(part), part if name == "maps" else f"option {part}"
             raise self._another(NAMES.get(name, name), _shown(old, new))
         if seed is not None and seed != about["seed"]:
             raise self._another("seed", f" ({about['seed']}, not {seed})")

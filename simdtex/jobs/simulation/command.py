@@ -1,23 +1,119 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex simulate``, ``estimate`` and ``classify``: realisations of a training image, and which texture is where."""
+"""``simdtex simulate`` and ``estimate``: realisations of a training image, and what data say of each cell."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-from simdtex.cli.command import ENTER
-from simdtex.cli.inputs import Material, in_place, output_shape, read_inputs, read_material, take_reading
+from simdtex.cli.command import DATA, DEVICE_GROUP, ENTER, OUTPUTS, READ
+from simdtex.cli.inputs import (
+    Material,
+    Reading,
+    in_place,
+    output_shape,
+    planes,
+    read_guides,
+    read_known,
+    read_masks,
+    read_material,
+    read_pixels,
+    read_table,
+    take_reading,
+)
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, input_options, output_option, report_option, size_option
-from simdtex.declared import inputs as inputs_of
+from simdtex.cli.options import (
+    GUIDE,
+    KNOWN_OPTIONS,
+    NUMBERS,
+    SAMPLE_MASK,
+    given,
+    option,
+    output_option,
+    report_option,
+    size_option,
+    together,
+)
 from simdtex.methods.mrf import options as mrf
 
+CELL_OPTIONS = together(
+    SAMPLE_MASK,
+    KNOWN_OPTIONS,
+    option(
+        "--channels",
+        is_flag=True,
+        default=None,
+        group=DATA,
+        help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
+    ),
+    option(
+        "--origin",
+        type=NUMBERS,
+        metavar="X,Y[,Z]",
+        group=DATA,
+        help="Place the centre of the first cell here, in the units of the table of --known.  [see --like, else 0,0]",
+    ),
+    option(
+        "--cell",
+        type=NUMBERS,
+        metavar="DX,DY[,DZ]",
+        group=DATA,
+        help="Make cells of this size, in the same units.  [see --like, else 1,1]",
+    ),
+    option(
+        "--like",
+        type=READ,
+        metavar="GRID",
+        group=DATA,
+        help="Place the output where this grid or raster lies, and give it its size.  [that of --known, --region and "
+        "other maps that are grids; else --origin and --cell; else that of a grid TRAINING_IMAGE]",
+    ),
+    option(
+        "--several",
+        words=("refuse", "mean", "most"),
+        group=DATA,
+        help="Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most "
+        "frequent value (most).  [refuse]",
+    ),
+    option(
+        "--outside",
+        words=("refuse", "skip"),
+        group=DATA,
+        help="Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).  [refuse]",
+    ),
+    option(
+        "--variables",
+        multiple=True,
+        metavar="NAME",
+        group=DATA,
+        help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
+    ),
+)
+"""The data, and where the cells of an output lie."""
+
+MAPS = {
+    "region": "Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a "
+    "realisation.",
+    "probabilities": "Follow these probabilities of the categories, in ascending order of category: a table of x, y "
+    "and one column for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN.",
+    "image_map": "Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for "
+    "each gives their weights.",
+    "rotation": "Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn.",
+    "scale": "Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2.",
+}
+"""The maps of a simulation, and the help of their options."""
+
 TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=ENTER)
+
+
+def flag(name: str) -> str:
+    """Return the option of a parameter."""
+    return f"--{'sample-mask' if name == 'mask' else name.replace('_', '-')}"
 
 
 @job(
@@ -30,14 +126,31 @@ TRAINING_IMAGE = click.argument("training_image", nargs=-1, required=True, type=
 @TRAINING_IMAGE
 @output_option("Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib, .sgems or .tif.")
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations", "TRAINING_IMAGE")
-@input_options("simulate")
+@option("-n", "--number", type=int, help="Make this many realisations.  [1]")
+@option("--first", type=int, help="Start with the realisation of this number.")
+@CELL_OPTIONS
+@GUIDE
+@together(*(option(flag(name), type=READ, metavar="FILE", group=DATA, help=help) for name, help in MAPS.items()))
+@option(
+    "--source",
+    is_flag=True,
+    group=OUTPUTS,
+    help="Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz.",
+)
+@option(
+    "--jobs",
+    type=int,
+    group=DEVICE_GROUP,
+    help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
+)
 @report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
     training_image: tuple[Path, ...],
     output: Path,
     number: int | None,
     size: str | None,
-    source: bool | None,
+    source: bool,
+    guide: Any,
     **options: Any,
 ) -> Task:
     """Simulate realisations that look like TRAINING_IMAGE and honour data.
@@ -46,22 +159,24 @@ def simulate(
     """
     from simdtex.io.volume import write_realisations
     from simdtex.jobs.simulation.job import simulate
-    from simdtex.jobs.simulation.maps import Maps
     from simdtex.run import Output
 
     how, number = take_reading(options, deep=True), 1 if number is None else number
     material = read_material(training_image, how)
-    data = read_inputs("simulate", options, material, how)
-    pixels, maps = material.pixels[0], [data[name] for name in Maps._fields if hasattr(data[name], "shape")]
+    lies = options["origin"], options["like"]
+    data = read_data(material, how, options)
+    data["guide"], options["labels"] = read_guides(guide, material, how, options["labels"])
+    data |= {name: read_map(name, options.pop(name), material, how, *lies) for name in MAPS}
+    pixels, maps = material.pixels[0], [data[name] for name in MAPS if hasattr(data[name], "shape")]
     cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps if one.ndim >= 2 + material.deep]
     shape = output_shape(size, pixels, data["like"], data["known"], *cells, pixels, axes=2 + material.deep)
-    place = check_place(material, output, options, data, shape, bool(source))
+    place = check_place(material, output, options, data, shape, source)
     known = data["known"]
     if click.get_current_context().params["report"]:
         if source or data["region"] is not None:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(material, shape, getattr(known, "values", known))
-    inputs = data | given(options) | {"shape": shape, "source": bool(source)}
+    inputs = data | given(options) | {"shape": shape, "source": source, "channel_axis": material.channel_axis}
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
         made = simulate(described(material), number, **inputs, **call)
@@ -85,34 +200,80 @@ def simulate(
 @TRAINING_IMAGE
 @output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")
 @size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
-@input_options("estimate")
+@CELL_OPTIONS
+@option("--categorical", is_flag=True, default=None, group=DATA, help="Treat values as categories.")
+@option("--nearest", type=int, help="Use this many data for each cell, the nearest.  [8]")
+@option(
+    "--reach",
+    type=int,
+    help="Use data up to this many cells away.  [an eighth of the smaller of rows and columns of TRAINING_IMAGE]",
+)
+@option("--bandwidth", type=float, help="Set the width of the Parzen kernel, in units of h_opt.  [1]")
 def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
     """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
 
     It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex.io.volume import write_realisations
-    from simdtex.jobs.simulation.job import estimate
+    from simdtex.jobs.simulation.estimation import estimate
     from simdtex.run import Output
 
     how = take_reading(options, deep=True)
     material = read_material(training_image, how)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    data = read_inputs("estimate", options, material, how)
+    data = read_data(material, how, options)
     pixels = material.pixels[0]
     shape = output_shape(size, pixels, data["like"], data["known"], pixels, axes=2 + material.deep)
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
     check_place(material, output, options, data, shape)
-    inputs: dict[str, Any] = {name: data[name] for name in ("known", "mask", "like")} | given(options)
+    inputs = data | given(options) | {"shape": shape}
 
     def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
-        made = estimate(described(material), shape=shape, device=device, callback=callback, **inputs)
+        made = estimate(described(material), device=device, callback=callback, **inputs)
         return made, Output(None, statistics=made.attrs)
 
     size = "x".join(map(str, shape[::-1]))
     return Task(make, f"maps of {size}", str(output), [lambda made, run: write_realisations(output, made)])
+
+
+def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the mask, the data and the place of an output, whose options are taken out."""
+    mask, path, like = (options.pop(name) for name in ("sample_mask", "known", "like"))
+    found = {"mask": read_masks(mask, material, how)}
+    found["known"], _ = read_known(path, material, how, options["origin"], like)
+    return found | {"like": like and read_like(like, how)}
+
+
+def read_like(path: Path, how: Reading) -> Any:
+    """Read the grid that says where the output lies."""
+    found, _, grid = read_pixels(path, how._replace(variables=()))
+    if grid is None or not grid.frame.told:
+        raise ValueError(f"{path} does not say where its cells lie; give a grid or a raster with coordinates")
+    return in_place(found[..., :1], grid)
+
+
+def read_map(
+    name: str, path: Path | None, material: Material, how: Reading, origin: Sequence[float] | None, like: Path | None
+) -> Any:
+    """Read a map of a simulation: of probabilities a table, too; any other a picture or a grid, channels in front."""
+    from simdtex.io import grids, image
+
+    if path is None:
+        return None
+    how = how._replace(channels=not material.deep)
+    if name == "probabilities" and (table := read_table(path, material, how, origin, like)) is not None:
+        return table
+    if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
+        return image.read_mask(path, image.read(path).pixels.shape, ascending=how.ascending)
+    found, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
+    pixels = planes(found) > 0 if name == "region" else planes(found)
+    several = pixels.shape[-1] > 1
+    values: Any = in_place(pixels, grid) if grid else pixels if several else pixels[..., 0]
+    if several:
+        return values.transpose("variable", ...) if grid else np.moveaxis(values, -1, 0)
+    return values
 
 
 def check_place(
@@ -132,7 +293,7 @@ def check_place(
     from simdtex.io.places import located
     from simdtex.io.volume import check_realisations_path
 
-    flags = {one.flag(name): data[name] for name, one in inputs_of("simulate").items() if name in data and one.reader}
+    flags = {flag(name): one for name, one in data.items()}
     place = located(flags, described(material), options["origin"], options["cell"])
     lies: dict[str, Any] = place.frame._asdict() if place else {}
     if check_realisations_path(output, source=source) in SUFFIXES:

@@ -1,48 +1,135 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Random fields that look like a training image and honour data: `simulate`, and `estimate` without a simulation."""
+"""Random fields that look like a training image and honour data: `simulate`."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoint import Checkpoint, Checkpointing, digest
-from simdtex.declared import Cells, Estimate, Simulate
-from simdtex.driver import check_sides, drive
-from simdtex.inputs import Inputs, Placing, check_inputs, check_known
-from simdtex.io.hard_data import HardData, place_hard_data
+from simdtex.checkpoint import Checkpointing, digest
+from simdtex.driver import Device, Kept, Seed, drive, run
+from simdtex.inputs import check_inputs
+from simdtex.io.hard_data import HardData
 from simdtex.io.places import Place
-from simdtex.jobs.inputs import Work, public
+from simdtex.jobs.simulation.cells import Cells, digests, georeferenced, grid_axes, plan_cells
 from simdtex.jobs.simulation.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.methods.mrf.density import Data, given_data
 from simdtex.model.given import Given, Soft
-from simdtex.model.pictures import Pictures
-from simdtex.model.sample import Sample
-from simdtex.options import moderate, require, resolve, whole, within_32_bits
+from simdtex.model.guide import GuidePair
+from simdtex.model.light import Light
+from simdtex.model.pictures import Pictures, Turned
+from simdtex.options import resolve, true_or_false, whole
 from simdtex.run import Callback, Output, Progress
 
 MOST_TOGETHER = 4
 """The most realisations that run on a processor at the same time, each with its own queue."""
 
 
-@public("simulate")
-def simulate(call: Simulate) -> Work:
+def simulate(
+    training: ArrayLike | Sequence[ArrayLike],
+    n: int,
+    *,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    origin: Sequence[float] | None = None,
+    cell: Sequence[float] | None = None,
+    like: Any = None,
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
+    guide: tuple[Any, Any] | None = None,
+    first: int = 0,
+    shape: tuple[int, ...] | None = None,
+    region: ArrayLike | None = None,
+    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    image_map: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    scale: ArrayLike | None = None,
+    source: bool = False,
+    jobs: int | None = None,
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    **options: Any,
+) -> Any:
     """Return realisations that look like a training image and honour data (multiple-point simulation).
+
+    Parameters
+    ----------
+    training : (rows, cols) or (layers, rows, cols) array, or a list of such
+        The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values are
+        categories. With `channel_axis` it has one more axis, for variables.
+    n : int, 1 or more
+        Make this many realisations.
+    mask : (rows, cols) bool array, or a list of such, optional
+        True for pixels of the training image that may be taken; all other pixels are still neighbours.
+    known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
+        Conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN for
+        unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some variables
+        (channels) of a pixel may be known and others not.
+    origin : (x, y) or (x, y, z), optional
+        The centre of the first cell of a realisation, in the units of the table and of the result's coordinates.
+        None: see `like`, else 0.
+    cell : (x, y) or (x, y, z), optional
+        The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.
+    like : array or dataset of xarray, optional
+        An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and
+        number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to
+        lie at one place; else `origin` and `cell`; else those of such a training image.
+    several : {"refuse", "mean", "most"}
+        Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent
+        value (most). There is no mean of categories. See `simdtex.place_hard_data`.
+    outside : {"refuse", "skip"}
+        Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).
+    guide : (array, array), optional
+        Two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the training image's size and of the
+        output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
+        guide. With several training images, the first is a list of pictures.
+    first : int, 0 or more
+        Start with the realisation of this number.
+    shape : (int, int) or (int, int, int), optional
+        Rows and columns of each realisation, or layers, rows and columns. None: those of `like`, `known`, or of the
+        first map below, if that is an array, else of the training image.
+    region : (rows, cols) or (layers, rows, cols) bool array, optional
+        True for cells that are simulated. All other cells have no value: NaN in floats, else the attribute
+        ``missing``.
+    probabilities : (categories, rows, cols) array, or table or its path, optional
+        Soft data, of a volume (categories, layers, rows, cols): the probability at each cell of each category of the
+        first variable, in ascending order of category; the sum is 1, and unknown probabilities are NaN. A table has the
+        columns x, y, and one for each category. See `soft_weight`.
+    image_map : ([layers,] rows, cols) or (training images, [layers,] rows, cols) array, optional
+        The number, from 0, of the training image of each cell, or the weight of each training image at each cell. NaN:
+        any training image.
+    rotation : ([layers,] rows, cols) array, optional
+        Rotation of the training image at each cell, of a volume about z, in degrees from x to y (from columns to rows),
+        rounded to eighths of a turn. NaN: any rotation of another cell.
+    scale : ([layers,] rows, cols) array, optional
+        Factor by which all axes of the training image are enlarged at each cell, 1/2 to 2, rounded to powers of the
+        square root of 2. NaN: any factor of another cell.
+    source : bool
+        Return the position in the training image of each cell of each realisation too.
+    jobs : int, 1 or more, optional
+        Make this many realisations at a time. None: one for each core, at most 4; on a GPU 1.
+    channel_axis : int, optional
+        The axis of training images that holds variables; None for a single one.
+    rng, device, callback, checkpoint
+        As in `simdtex.synthesize`.
+    **options
+        Those of the method, see `simdtex.methods.mrf.Options`.
 
     Returns
     -------
@@ -66,6 +153,11 @@ def simulate(call: Simulate) -> Work:
         adds ``source_layer``, and several training images add ``source_image``, the number of the training image. Cells
         without a source, such as data, have -1. The dataset has the attributes, too.
 
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
+
     Notes
     -----
     Cost: n times that of `simdtex.synthesize`, and the memory of n results. Every combination of training image, eighth
@@ -82,293 +174,236 @@ def simulate(call: Simulate) -> Work:
     >>> dict(found.sizes)
     {'realisation': 2, 'y': 32, 'x': 40}
     """
-    require("simulate", "xarray")
-    from simdtex.figures.show import Realisations, Results, described
+    given = {"like": like, "known": known, "guide": guide, "mask": mask, "region": region}
+    given |= {"probabilities": probabilities, "image_map": image_map, "rotation": rotation, "scale": scale}
+    place: Any = {"origin": origin, "cell": cell, "several": several, "outside": outside}
+    cells = plan_cells(training, shape, given, channel_axis, **place)
+    job = plan_simulation(cells, n, first, source, jobs, channel_axis, **options)
+    values, output = run("simulate", job, rng, device, callback, checkpoint)
+    return job.result(values, output)
 
-    n, first, axes, pictures, known = call.n, call.first, call.axes, call.training, call.known
-    sides = ("layers", "rows", "columns")[-axes:]
-    if axes == 2 and isinstance(call.shape, (tuple, list)) and len(call.shape) == 3:
-        raise ValueError("shape is of a volume and the training image is a picture; give a training volume")
-    if call.shape is not None:
-        within_32_bits(check_sides(call.shape, sides), 1)
-    maps = call.maps = Maps(**{name: getattr(call, name) for name in Maps._fields})
-    size = _like(call) or maps.shape(axes) or pictures.pixels[0].shape[:-1]
-    if call.like is None and isinstance(known, np.ndarray) and known.ndim == axes + (call.channel_axis is not None):
-        size = known.shape if call.channel_axis is None else np.moveaxis(known, call.channel_axis, -1).shape[:-1]
-    size = call.shape = check_sides(size if call.shape is None else call.shape, sides)
-    place = placing(call)
-    inputs = check_inputs(pictures, size, call.channel_axis, None, known, None, call.guide, place)
+
+def plan_simulation(
+    cells: Cells,
+    n: int,
+    first: int = 0,
+    source: bool = False,
+    jobs: int | None = None,
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Simulation:
+    """Check the arguments of `simulate`, of which ``cells`` has those on the training image, and return its job."""
+    whole("n", n, 1)
+    whole("first", first, 0)
+    true_or_false("source", source)
+    if jobs is not None:
+        whole("jobs", jobs, 1)
+    own, size, given = cells.training, cells.size, cells.given
+    maps = Maps(*(given[name] for name in Maps._fields))
+    inputs = check_inputs(own, size, channel_axis, None, given["known"], None, given["guide"], cells.put)
     missing: Any = None
     if maps.region is not None:
-        inputs, missing = check_region(maps.region, size, inputs), missing_value(pictures.pixels)
-    call.inputs = inputs
-    chosen = resolve(mrf.Options, "simulate" if axes == 2 else "simulate 3-D", call.options)
-    copies = maps.of_images(pictures, size)
-    if copies and chosen.shares:
-        raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
-    sample = copies.pictures(pictures) if copies else pictures
-    kinds = chosen.of(sample)
-    check_several(call.several, known, kinds)
+        inputs, missing = check_region(maps.region, size, inputs), missing_value(own.pixels)
+    chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
+    copies, training, guide = maps.of_images(own, size), own, inputs.guide
+    if copies:
+        if chosen.shares:
+            raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
+        training = copies.pictures(own)
+        guide = guide and (tuple(one.of(guide[0]) for one in copies.copies), guide[1])
+    kinds = chosen.of(training)
+    cells.check_several(kinds)
     categories = kinds.categories(0)
-    soft = Soft(maps.of_categories(categories, size, place), copies.probability if copies else None)
-    guides = inputs.guide
-    if guides and copies:
-        guides = tuple(one.of(guides[0]) for one in copies.copies), guides[1]
-    told = chosen.proportions or guides or maps.probabilities is not None
-    alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
+    soft = Soft(maps.of_categories(categories, size, cells.put), copies.probability if copies else None)
+    told = chosen.proportions or guide or maps.probabilities is not None
+    alone = own.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     if categories is not None and alone and not told:
         images = replace(kinds, shares=soft.shares) if copies else kinds
         chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
-    plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
-    pixels = pictures.pixels[0]
-    columns = (axes + (len(pictures.pixels) > 1)) if call.source else 0
-    each = 2 * prod(size) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)  # realisations are copied once
-    memory.require_host(n * (each + 64))
-    made = np.empty((n, *size, pixels.shape[-1]), pixels.dtype)
-    sources = np.empty((n, *size, columns), np.int32)
-    finished: list[int] = []
-    lock = Lock()
-
-    def state() -> dict[str, Any]:
-        return {"numbers": list(finished), "pictures": made[finished], "sources": sources[finished]}
-
-    def run(
-        machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
-    ) -> tuple[NDArray[Any], Output]:
-        machines = [machine, *(open_machine(call.device) for _ in range(_together(machine, call.jobs, n) - 1))]
-        if checkpointing.found is not None:
-            finished.extend(checkpointing.found["numbers"])
-            made[finished], sources[finished] = checkpointing.found["pictures"], checkpointing.found["sources"]
-        shares = np.zeros(n)
-        shares[finished] = 1
-
-        def offer_finished(info: Any, tree: Callable[[], Any]) -> None:
-            if isinstance(call.checkpoint, Checkpoint) and call.checkpoint.stopping:  # a realisation has no saved state
-                with lock:
-                    checkpointing.offer(info, state)
-
-        def tell(number: int, progress: Progress) -> None:
-            shares[number] = progress.fraction
-            with lock:
-                if callback:
-                    doing = f"{len(finished)} of {n} realisations finished"
-                    about = {"realisation": first + number, "finished": len(finished), "realisations": n}
-                    callback(replace(progress, fraction=shares.sum() / n, doing=doing, details=about))
-
-        def one(number: int, machine: Machine) -> None:
-            told = callback and (
-                lambda progress: tell(number, replace(progress, stage=None, source=None, explain=None))
-            )
-            own = Checkpointing(None, offer_finished)
-            picture, output = drive(plan, machine, realisation_seed(seed, first + number), told, own)
-            if inputs.given and inputs.given.outside is not None:
-                picture[inputs.given.outside] = missing
-            with lock:
-                made[number] = picture
-                if call.source:
-                    at: Any = output.source
-                    sources[number] = copies.sources(at, columns > axes) if copies else at
-                finished.append(number)
-                checkpointing.offer(None, state)
-            name = f"realisation{first + number:04d}"
-            tell(number, Progress(levels=plan.levels, fraction=1.0, doing="", stage=name, image=lambda: picture))
-
-        try:
-            _in_turn(one, [number for number in range(n) if number not in finished], machines)
-        except BaseException:
-            checkpointing.offer(None, state, now=True)  # those that wait for their turn
-            raise
-        return made, Output(None, statistics={"seed": seed, "device": machine.name})
-
-    def finish(arrays: NDArray[Any], output: Output) -> Any:
-        dims = ["realisation", *"zyx"[-axes:], "variable"][: arrays.ndim]
-        along, sides_of_cells = grid_axes(size, call.place)
-        seed = output.statistics["seed"]
-        seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
-        coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), **along}
-        coordinates["seed"] = ("realisation", seeds)
-        attributes = _attributes(output.statistics, chosen, inputs) | maps.digests()
-        if inputs.given and inputs.given.outside is not None:
-            coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
-            attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
-        if categories is not None and plan.kinds and plan.kinds.categories is not None:
-            p = np.broadcast_to(plan.kinds.categories, (len(categories), *size))
-            there = ~np.isnan(p[0])
-            if inputs.given and inputs.given.outside is not None:
-                there &= ~inputs.given.outside
-            told = arrays.reshape(n, *size, -1)[:, there, 0]
-            asked = np.array(chosen.proportions or p[:, there].sum(1))
-            reached = np.array([(told == one).sum() for one in categories])
-            for name, those in (("asked", asked), ("reached", reached)) if told.size else ():
-                attributes[f"shares_{name}"] = " ".join(f"{one:.3f}" for one in those / those.sum())
-        attributes |= sides_of_cells | described(call.given, known)
-        made = Realisations(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
-        result = georeferenced(made, call.place)
-        if not call.source:
-            return result
-        names = (*(("layer",) if axes > 2 else ()), "row", "column", "image")
-        lattice = dims[: 1 + axes]
-        places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
-        return Results({"simulation": result, **places}, attrs=result.attrs)
-
-    return Work(run, chosen, None if call.channel_axis is None else -1, finish)
+    found = digests(own, inputs.given)
+    if inputs.guide:
+        found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
+    if own.usable:
+        found["mask"] = digest(*own.usable)
+    names = (*("layer", "row", "column")[-len(size) :], *["image"] * (len(own.pixels) > 1)) if source else ()
+    about = {"sources": names, "digests": found, "about": cells.about, "missing": missing, "jobs": jobs}
+    results: Any = {**about, "place": cells.place, "channel_axis": None if channel_axis is None else -1}
+    parts = (training, inputs.given, guide, soft, copies, source)
+    return Simulation(maps.digests(), n, first, size, *parts, chosen, **results)
 
 
-@public("estimate")
-def estimate(call: Estimate) -> Work:
-    """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
+@dataclass(frozen=True)
+class Simulation:
+    """The job of `simulate`: a run of one plan for each realisation.
 
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``z`` of a volume, ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the
-        variables ``probability`` (category, [z,] y, x), float64, which adds up to 1, and ``entropy`` ([z,] y, x) in
-        bits; else ``mean`` and ``variance`` in the units of the training image. A cell with a datum has its value with
-        certainty.
-        ``plot()`` draws the maps.
-
-    Notes
-    -----
-    Equations (6), (7) and (12): neighbours without data have t = 1, so they have no weight, and each datum is compared
-    at its own offset from the cell. h is that of equation (8) for this number of data. The result has no sampling
-    noise, and the same bits on every device. Cost: cells x pixels of the training image x `nearest` fma.
-
-    Examples
-    --------
-    >>> import numpy as np, simdtex
-    >>> training = np.tile([0, 0, 0, 1], (32, 8))
-    >>> known = np.full((4, 6), np.nan)
-    >>> known[2, 1] = 1
-    >>> found = simdtex.estimate(training, known=known, categorical=True)
-    >>> found.probability.sel(category=1)[2].values.round(2).tolist()
-    [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
+    ``maps`` are digests. ``training`` and ``guide`` have the ``copies`` of training images, if these are turned or
+    scaled, and ``soft`` their probabilities. Of the result, ``sources`` are the columns of the source map, ``missing``
+    is the value outside of the region, and ``about`` and ``digests`` are attributes.
     """
-    require("simulate", "xarray")
-    from simdtex.figures.show import Results, described
 
-    categorical, nearest, axes = call.categorical, call.nearest, call.axes
-    pictures = mrf.Options(categorical=categorical).of(call.training)
-    least = min(min(one.shape[-3:-1]) for one in pictures.pixels)
-    reach = least // 8 if call.reach is None else call.reach
-    whole("reach", reach, 0, least - 1)
-    known, size = call.known, _like(call) or pictures.pixels[0].shape[:-1]
-    if known is None:
-        raise ValueError("an estimate requires data; give known")
-    if call.like is None and isinstance(known, np.ndarray) and known.ndim == axes:
-        size = known.shape
-    size = check_sides(size if call.shape is None else call.shape, ("layers", "rows", "columns")[-axes:])
-    along, sides_of_cells = grid_axes(size, call.place)
-    check_several(call.several, known, pictures)
-    given = check_known(known, size, None, pictures, place=placing(call))
-    mrf.check_categories(pictures, given)
-    if not categorical:
-        moderate("the training image", *pictures.pixels)
-    sample = Sample(pictures, pictures.channels * (nearest + 1), reach)
-    positions = sample.places(np.zeros((1, axes), np.int32), 1).positions
-    own = sample.own(positions)[:, 0]
-    names, of = np.unique(own if categorical else sample.working[0, positions], return_inverse=True)
-    data = Data(np.argwhere(given.whole), sample.scale.levels(given.values[given.whole]).T)
+    maps: dict[str, str]
+    n: int
+    first: int
+    shape: tuple[int, ...]
+    training: Pictures
+    known: Given | None
+    guide: GuidePair | None
+    soft: Soft
+    copies: Turned | None
+    source: bool
+    options: mrf.Options
+    sources: tuple[str, ...] = field(compare=False)
+    digests: dict[str, str] = field(compare=False)
+    about: dict[str, str] = field(compare=False)
+    missing: Any = field(compare=False)
+    jobs: int | None = field(compare=False)
+    place: Place | None = field(compare=False)
+    channel_axis: int | None = field(compare=False)
+    light: Light = field(default=Light(), compare=False)
 
-    def run(
-        machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    @property
+    def outside(self) -> NDArray[np.bool_] | None:
+        """Cells that take no part; None without a region."""
+        return self.known.outside if self.known else None
+
+    def plan(self) -> mrf.Plan:
+        """Return the plan of all runs."""
+        soft = self.soft if self.soft.rows else None
+        return mrf.plan(self.training, self.shape, self.options, self.known, self.guide, soft=soft)
+
+    def make(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
-        memory.require(machine, 0, 8 * prod(size) * ((len(names) if categorical else 0) + 4))
-        sites = np.argwhere(np.ones(size, bool))
-        rows = given_data(machine, sample, of, data, sites, nearest, call.bandwidth)
-        found, done = np.full((len(names) if categorical else 2, prod(size)), np.nan), 0
-        for here, probability in rows:
-            found[:, here] = probability.T if categorical else _moments(probability, of, own)
-            done += here.size
-            if callback:
-                now, doing = found.T.reshape(*size, -1).copy, f"{done} of {len(sites)} cells"
-                callback(Progress(fraction=done / len(sites), doing=doing, image=now))
-        told = given.values[given.whole][:, 0]
-        certain = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])
-        found[:, given.whole.ravel()] = certain
-        return found.T.reshape(*size, -1), Output(None, statistics={"device": machine.name})
+        """Make all realisations, and return them; the source of the output is that of all."""
+        batch = Batch(self, seed, callback, checkpointing)
+        try:
+            _in_turn(batch.make, batch.left, self.machines(machine))
+        except BaseException:
+            checkpointing.offer(None, batch.state, now=True)  # those that wait for their turn
+            raise
+        statistics = {"seed": seed, "device": machine.name, "shares": self.shares(batch)}
+        return batch.values, Output(batch.sources, statistics=statistics)
 
-    def finish(found: NDArray[Any], output: Output) -> Any:
-        dims, maps = tuple("zyx"[-axes:]), np.moveaxis(found, -1, 0)
-        units = {"units": about["units"]} if "units" in (about := described(call.given)) else {}
-        variables: dict[str, Any] = {
-            "mean": (dims, maps[0], units),
-            "variance": (dims, maps[1], {name: f"({unit})\u00b2" for name, unit in units.items()}),
-        }
-        if categorical:
-            entropy = 0 - (maps * np.log2(np.where(maps > 0, maps, 1))).cumsum(0)[-1]
-            variables = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
-            along["category"] = names
-        attributes = {
-            **{"version": version("simdtex"), "device": output.statistics["device"], "nearest": nearest},
-            **{"reach": reach, "bandwidth": call.bandwidth, **digests(pictures, given), **sides_of_cells},
-        }
-        return georeferenced(Results(variables, along, attributes), call.place)
+    def machines(self, machine: Machine) -> list[Machine]:
+        """Return a machine, and others of its device, for the realisations that are made at a time."""
+        usual = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
+        info: Any = getattr(machine, "info", "reference")
+        return [machine, *(open_machine(info) for _ in range(min(self.jobs or usual, self.n) - 1))]
 
-    return Work(run, None, -1, finish)
+    def shares(self, batch: Batch) -> dict[str, str]:
+        """Return the shares of categories that were asked and those that were reached, as attributes."""
+        kinds, categories = batch.plan.kinds, self.options.of(self.training).categories(0)
+        if categories is None or not kinds or kinds.categories is None:
+            return {}
+        p = np.broadcast_to(kinds.categories, (len(categories), *self.shape))
+        there = ~np.isnan(p[0])
+        if self.outside is not None:
+            there &= ~self.outside
+        made = batch.values[:, there, 0]
+        if not made.size:
+            return {}
+        asked = np.array(self.options.proportions or p[:, there].sum(1))
+        reached = np.array([(made == one).sum() for one in categories])
+        both = {"shares_asked": asked, "shares_reached": reached}
+        return {name: " ".join(f"{one:.3f}" for one in those / those.sum()) for name, those in both.items()}
 
+    def result(self, values: NDArray[Any], output: Output) -> Any:
+        """Return the array or dataset of xarray."""
+        from simdtex.figures.show import Realisations, Results
 
-def _like(call: Simulate | Estimate) -> tuple[int, ...] | None:
-    """Return the sides of ``like``, which gives the output's; None without."""
-    if call.like is None:
-        return None
-    if not hasattr(call.like, "sizes") or call.place is None or not {"x", "y"} <= {*call.like.sizes}:
-        raise ValueError("like has no coordinates x and y; give an array of xarray that has, or shape, origin and cell")
-    size = tuple(call.like.sizes.get(axis, 1) for axis in "zyx"[-call.axes :])
-    if call.shape is not None and tuple(call.shape) != size:
-        raise ValueError(f"shape is {call.shape} and like has {size}; leave shape out")
-    return size
-
-
-def georeferenced(made: Any, place: Place | None) -> Any:
-    """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
-    if place is None or not place.crs:
-        return made
-    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
-    with suppress(ImportError):  # the extra rasters
-        from rasterio.crs import CRS
-
-        system = CRS.from_wkt(place.crs)
-        unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
-        for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
-            if axis in found.coords:
-                named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
-                found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
-    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
-    return found
+        lattice = ["realisation", *"zyx"[-len(self.shape) :]]
+        dims, numbers = [*lattice, "variable"][: values.ndim], range(self.first, self.first + self.n)
+        along, sides = grid_axes(self.shape, self.place)
+        seed, device, shares = (output.statistics[name] for name in ("seed", "device", "shares"))
+        seeds = np.array([realisation_seed(seed, number) for number in numbers], np.uint64)
+        coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
+        attributes = {"seed": seed, "version": version("simdtex"), "device": device, "options": _text(self.options)}
+        attributes |= self.digests | self.maps
+        if self.outside is not None:
+            coordinates["region"] = (lattice[1:], ~self.outside)
+            attributes |= {} if values.dtype.kind == "f" else {"missing": self.missing.item()}
+        attributes |= shares | sides | self.about
+        made = Realisations(values, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+        found = georeferenced(made, self.place)
+        if not self.source:
+            return found
+        assert output.source is not None
+        places = {f"source_{name}": (lattice, output.source[..., k]) for k, name in enumerate(self.sources)}
+        return Results({"simulation": found, **places}, attrs=found.attrs)
 
 
-def check_several(several: str, known: Any, pictures: Pictures) -> None:
-    """Raise if different data of a table in one cell would become a mean of categories."""
-    if several == "mean" and isinstance(known, HardData) and any(pictures.categorical or ()):
-        raise ValueError("several is 'mean', which invents categories; give 'most', or 'refuse'")
+class Batch:
+    """The realisations of a run: their ``values`` and source maps, of which those of the numbers ``finished`` are made.
 
+    Threads make one each at a time.
+    """
 
-def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the coordinates of cells and the sizes of a cell as attributes; without a place, columns and rows."""
-    at, sides = place.frame if place else ((), ())
-    found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
-    for axis, first, side in zip("xyz", at, sides, strict=False):
-        values, about = first + side * found.get(axis, 0), place.about.get(axis, {}) if place else {}
-        found[axis] = ((axis,) if axis in found else (), values, about)
-    return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
+    def __init__(self, job: Simulation, seed: int, callback: Callback | None, checkpointing: Checkpointing) -> None:
+        self.job, self.seed, self.callback, self.checkpointing = job, seed, callback, checkpointing
+        self.plan = job.plan()
+        pixels, columns = job.training.pixels[0], len(job.sources)
+        values = prod(job.shape) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)
+        memory.require_host(job.n * (2 * values + 64))  # realisations are copied once
+        self.values = np.empty((job.n, *job.shape, pixels.shape[-1]), pixels.dtype)
+        self.sources = np.empty((job.n, *job.shape, columns), np.int32)
+        self.finished: list[int] = []
+        self.shares, self.lock = np.zeros(job.n), Lock()
+        if checkpointing.found is not None:
+            self.finished += checkpointing.found["numbers"]
+            self.values[self.finished] = checkpointing.found["pictures"]
+            self.sources[self.finished] = checkpointing.found["sources"]
+            self.shares[self.finished] = 1
+
+    @property
+    def left(self) -> list[int]:
+        """The numbers of the realisations that are not yet made."""
+        return [number for number in range(self.job.n) if number not in self.finished]
+
+    def state(self) -> dict[str, Any]:
+        """Return the finished realisations, as plain arrays."""
+        done = self.finished
+        return {"numbers": list(done), "pictures": self.values[done], "sources": self.sources[done]}
+
+    def make(self, number: int, machine: Machine) -> None:
+        """Make a realisation on a machine."""
+        job, own = self.job, Checkpointing(None, self._offer)
+        told = self.callback and partial(self._tell, number)
+        picture, output = drive(self.plan, machine, realisation_seed(self.seed, job.first + number), told, own)
+        if job.outside is not None:
+            picture[job.outside] = job.missing
+        with self.lock:
+            self.values[number] = picture
+            if job.source:
+                at: Any = output.source
+                self.sources[number] = job.copies.sources(at, "image" in job.sources) if job.copies else at
+            self.finished.append(number)
+            self.checkpointing.offer(None, self.state)
+        if self.callback:
+            done = Progress(levels=self.plan.levels, fraction=1.0, doing="", image=lambda: picture)
+            self._tell(number, done, f"realisation{job.first + number:04d}")
+
+    def _offer(self, info: Any, tree: Callable[[], Any]) -> None:
+        """Offer the state after a step of a realisation, which itself has no saved state, if the run is to stop."""
+        if self.checkpointing.stopping():
+            with self.lock:
+                self.checkpointing.offer(info, self.state)
+
+    def _tell(self, number: int, progress: Progress, stage: str | None = None) -> None:
+        """Call back with the progress of all realisations; ``stage`` is the name of one that is complete."""
+        assert self.callback
+        self.shares[number] = progress.fraction
+        n = self.job.n
+        with self.lock:
+            finished = len(self.finished)
+            about = {"realisation": self.job.first + number, "finished": finished, "realisations": n}
+            doing, fraction = f"{finished} of {n} realisations finished", self.shares.sum() / n
+            more: Any = {"stage": stage, "source": None, "explain": None, "details": about}
+            self.callback(replace(progress, fraction=fraction, doing=doing, **more))
 
 
 def realisation_seed(seed: int, number: int) -> int:
     """Return the seed of a realisation from the seed of the simulation and the number of the realisation."""
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
-
-
-def placing(call: Cells) -> Placing:
-    """Return a function that places a table of data in the cells of a call."""
-    return partial(place_hard_data, origin=call.origin, cell=call.cell, several=call.several, outside=call.outside)
-
-
-def _together(machine: Machine, jobs: int | None, n: int) -> int:
-    """Return how many realisations are made at a time."""
-    if jobs is None:
-        jobs = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
-    return min(jobs, n)
 
 
 def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: list[Machine]) -> None:
@@ -394,35 +429,6 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
             raise
 
 
-def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
-    """Return the digests of hard data and of the training images, with their unknown pixels completed."""
-    found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
-    if given and given.given_mask.any():
-        found["hard_data"] = digest(np.where(given.given_mask, given.values, 0), given.given_mask)
-    return found
-
-
-def _attributes(statistics: dict[str, Any], options: mrf.Options, inputs: Inputs) -> dict[str, Any]:
-    text = json.dumps(
-        vars(options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
-    )
-    found: dict[str, Any] = {"seed": statistics["seed"], "version": version("simdtex")}
-    found |= {"device": statistics["device"], "options": text}
-    found |= digests(inputs.pictures, inputs.given)
-    if inputs.guide:
-        found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
-    if inputs.pictures.usable:
-        found["mask"] = digest(*inputs.pictures.usable)
-    return found
-
-
-def _moments(
-    probability: NDArray[np.float64], of: NDArray[np.integer], own: NDArray[Any]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return mean and variance of sites, (S,), from the probability of each level, (S, levels)."""
-    values = own.astype(np.float64)
-    count = np.bincount(of)
-    level = np.bincount(of, values) / count
-    within = np.bincount(of, (values - level[of]) ** 2) / count
-    mean = (probability * level).cumsum(1)[:, -1]
-    return mean, (probability * (within + (level - mean[:, None]) ** 2)).cumsum(1)[:, -1]
+def _text(options: mrf.Options) -> str:
+    """Return options as JSON."""
+    return json.dumps(vars(options), default=lambda one: one.tolist() if isinstance(one, np.generic) else str(one))

@@ -32,22 +32,15 @@ class Maps(NamedTuple):
     rotation: NDArray[Any] | HardData | None = None
     scale: NDArray[Any] | HardData | None = None
 
-    def shape(self, axes: int) -> tuple[int, ...] | None:
-        """Return the sides of the first map that is an array: rows and columns and, with 3 ``axes``, layers."""
-        shapes = (np.shape(one)[-axes:] for one in self if one is not None and not isinstance(one, HardData))
-        return next((shape for shape in shapes if len(shape) == axes), None)
-
-    def digest(self, name: str) -> str | None:
-        """Return the SHA-256 digest of a map; None if it is not given."""
-        one = getattr(self, name)
-        if one is None:
-            return None
-        table = isinstance(one, HardData)
-        return digest(*((one.points, one.values) if table else (np.ma.getdata(one), np.ma.getmaskarray(one))))
-
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 digest of each map, by name."""
-        return {name: found for name in self._fields if (found := self.digest(name))}
+        found = {}
+        for name, one in self._asdict().items():
+            if isinstance(one, HardData):
+                found[name] = digest(one.points, one.values)
+            elif one is not None:
+                found[name] = digest(np.ma.getdata(one), np.ma.getmaskarray(one))
+        return found
 
     def of_images(self, pictures: Pictures, shape: tuple[int, ...]) -> Turned | None:
         """Return the copies of training images that the maps require; None without such maps."""
