@@ -40,8 +40,11 @@ SHARE = 75
 LOST = 300.0
 """The most seconds between two writes, even if writing then takes a larger share of the time."""
 
-NAMES = {"job": "call", "shape": "shape of the output"}
-"""Names of inputs in messages, if they differ from the input's own."""
+NAMES = {
+    **{"job": "call", "shape": "shape of the output", "pictures": "sample", "usable": "mask", "given": "known"},
+    **{"place": "known_source", "pixels": "sample", "hole": "mask"},
+}
+"""Names of the fields of a job in messages, if they differ from the field's own."""
 
 
 @dataclass(frozen=True)
@@ -179,9 +182,12 @@ class Checkpoint:
             old, new = before.get(name), now.get(name)
             if old == new:
                 continue
-            if name in ("options", "maps") and isinstance(old, dict) and isinstance(new, dict):
-                part = next(one for one in {**old, **new} if old.get(one) != new.get(one))
-                old, new, name = old.get(part), new.get(part), part if name == "maps" else f"option {part}"
+            if isinstance(old, dict) and isinstance(new, dict):
+                inside = next(one for one in {**old, **new} if old.get(one) != new.get(one))
+                old, new = old.get(inside), new.get(inside)
+                name = (
+                    f"option {inside}" if name == "options" else inside if name == "maps" or inside in NAMES else name
+                )
             raise self._another(NAMES.get(name, name), _shown(old, new))
         if seed is not None and seed != about["seed"]:
             raise self._another("seed", f" ({about['seed']}, not {seed})")
@@ -367,7 +373,7 @@ def identity(thing: Any) -> Any:
     if isinstance(thing, Integral) and abs(int(thing)) >= 2**53:
         return str(int(thing))
     if isinstance(thing, Real):
-        return float(thing)  # 1 and 1.0 are equal
+        return "nan" if thing != thing else float(thing)  # 1 and 1.0 are equal, and so are two NaN
     if isinstance(thing, (list, tuple)):
         return [identity(one) for one in thing]
     if isinstance(thing, dict):

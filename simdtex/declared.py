@@ -15,7 +15,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from simdtex.options import UNSET, Choice, Number, Option, Switch, Whole, table
+from simdtex.options import UNSET, Choice, Option, Switch, Whole, table
 
 if TYPE_CHECKING:
     import os
@@ -123,10 +123,8 @@ RUNS, DEVICE = "Large outputs and interrupted runs", "Device and messages"
 
 PICTURE = "(rows, cols) or, with `channel_axis`, (rows, cols, channels) array"
 PATHS: dict[str, Any] = {"takes": "file", "group": DATA}
-CELLS: dict[str, Any] = {"group": DATA, "identity": False}
 TABLES: dict[str, Any] = {"group": DATA, "method": "mrf"}
 READING: dict[str, Any] = {**TABLES, "command_only": True}
-MAP: dict[str, Any] = {**PATHS, "checker": "data", "identity": "maps", "reader": "read_map"}
 NUMBERED: dict[str, Any] = {"metavar": "SAMPLE", "reader": "read_number"}
 
 
@@ -138,10 +136,7 @@ class Planned:
 
     options: dict[str, Any]
     inputs: Any
-    axes: int
     given: Any
-    maps: Any
-    place: Any
 
 
 @declared
@@ -446,174 +441,6 @@ class Extend(Common, Lit):
 
 
 @declared
-class Cells(Sampled):
-    """The inputs about the training image, and where its cells and data lie."""
-
-    channels: Any = given(
-        Switch(),
-        "Treat the last axis of a .npy of three axes as channels",
-        none="such a file is a volume",
-        group=DATA,
-        command_only=True,
-    )
-    origin: Sequence[float] | None = given(
-        Data("(x, y) or (x, y, z)"),
-        "Place the centre of the first cell here, in the units of the table of --known",
-        "The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. "
-        "None: see `like`, else 0.",
-        none="see --like, else 0,0",
-        takes="numbers",
-        metavar="X,Y[,Z]",
-        **CELLS,
-    )
-    cell: Sequence[float] | None = given(
-        Data("(x, y) or (x, y, z)"),
-        "Make cells of this size, in the same units",
-        "The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.",
-        none="see --like, else 1,1",
-        takes="numbers",
-        metavar="DX,DY[,DZ]",
-        **CELLS,
-    )
-    like: Any = given(
-        Data("array or dataset of xarray"),
-        "Place the output where this grid or raster lies, and give it its size",
-        "An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and "
-        "number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to "
-        "lie at one place; else `origin` and `cell`; else those of such a training image.",
-        none="that of --known, --region and other maps that are grids; else --origin and --cell; else that of a grid "
-        "TRAINING_IMAGE",
-        metavar="GRID",
-        reader="read_like",
-        takes="file",
-        **CELLS,
-    )
-    several: Literal["refuse", "mean", "most"] = given(
-        Choice(("refuse", "mean", "most")),
-        "Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent "
-        "value (most)",
-        default="refuse",
-        more="There is no mean of categories. See `simdtex.place_hard_data`.",
-        **CELLS,
-    )
-    outside: Literal["refuse", "skip"] = given(
-        Choice(("refuse", "skip")),
-        "Treat data of a table outside of the cells as an error (refuse), or leave them out (skip)",
-        default="refuse",
-        **CELLS,
-    )
-    variables: Any = given(
-        Data(""),
-        "Take this variable of a grid TRAINING_IMAGE; may be repeated",
-        none="all",
-        metavar="NAME",
-        multiple=True,
-        group=DATA,
-        command_only=True,
-    )
-
-
-@declared
-class Simulate(Seeded, Guided, Cells):
-    """The inputs of `simdtex.simulate`."""
-
-    training: ArrayLike = needed(
-        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
-        doc="The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values "
-        "are categories. With `channel_axis` it has one more axis, for variables.",
-        checker="training",
-        identity="arrays",
-    )
-    n: int = needed(Whole(1), "Make this many realisations", none="1", flags="-n --number")
-    first: int = given(Whole(0), "Start with the realisation of this number", default=0)
-    shape: tuple[int, ...] | None = given(
-        Data("(int, int) or (int, int, int)"),
-        doc="Rows and columns of each realisation, or layers, rows and columns. None: those of `like`, `known`, or of "
-        "the first map below, if that is an array, else of the training image.",
-    )
-    region: ArrayLike | None = given(
-        Data("(rows, cols) or (layers, rows, cols) bool array"),
-        "Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation",
-        "True for cells that are simulated. All other cells have no value: NaN in floats, else the attribute "
-        "``missing``.",
-        **MAP,
-    )
-    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = given(
-        Data("(categories, rows, cols) array, or table or its path"),
-        "Follow these probabilities of the categories, in ascending order of category: a table of x, y and one column "
-        "for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN",
-        "Soft data, of a volume (categories, layers, rows, cols): the probability at each cell of each category of the "
-        "first variable, in ascending order of category; the sum is 1, and unknown probabilities are NaN. A table has "
-        "the columns x, y, and one for each category. See `soft_weight`.",
-        **MAP,
-    )
-    image_map: ArrayLike | None = given(
-        Data("([layers,] rows, cols) or (training images, [layers,] rows, cols) array"),
-        "Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
-        "their weights",
-        "The number, from 0, of the training image of each cell, or the weight of each training image at each cell. "
-        "NaN: any training image.",
-        **MAP,
-    )
-    rotation: ArrayLike | None = given(
-        Data("([layers,] rows, cols) array"),
-        "Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn",
-        "Rotation of the training image at each cell, of a volume about z, in degrees from x to y (from columns to "
-        "rows), rounded to eighths of a turn. NaN: any rotation of another cell.",
-        **MAP,
-    )
-    scale: ArrayLike | None = given(
-        Data("([layers,] rows, cols) array"),
-        "Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2",
-        "Factor by which all axes of the training image are enlarged at each cell, 1/2 to 2, rounded to powers of the "
-        "square root of 2. NaN: any factor of another cell.",
-        **MAP,
-    )
-    source: bool = given(
-        Switch(),
-        "Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz",
-        "Return the position in the training image of each cell of each realisation too.",
-        default=False,
-        group=OUTPUTS,
-    )
-    jobs: int | None = given(
-        Whole(1),
-        "Make this many realisations at a time",
-        none="one for each core, at most 4; on a GPU 1",
-        identity=False,
-        group=DEVICE,
-    )
-
-
-@declared
-class Estimate(Watched, Cells):
-    """The inputs of `simdtex.estimate`."""
-
-    training: ArrayLike = needed(
-        Data("(rows, cols) or (layers, rows, cols) array, or a list of such"),
-        doc="The training image, as in `simdtex.simulate`; one variable.",
-        checker="training",
-    )
-    shape: tuple[int, ...] | None = given(
-        Data("(int, int) or (int, int, int)"),
-        doc="[Layers,] rows and columns of the result. None: those of `known` if an array, else of the training image.",
-    )
-    categorical: bool = given(Switch(), "Treat values as categories", group=DATA, default=False)
-    nearest: int = given(Whole(0, 64), "Use this many data for each cell, the nearest", default=8)
-    reach: int | None = given(
-        Whole(0),
-        "Use data up to this many cells away",
-        none="an eighth of the smaller of rows and columns of TRAINING_IMAGE",
-    )
-    bandwidth: float = given(
-        Number(0, above=True),
-        "Set the width of the Parzen kernel, in units of h_opt",
-        "h in units of h_opt, equation (8).",
-        default=1.0,
-    )
-
-
-@declared
 class Classify(Common):
     """The inputs of `simdtex.classify`."""
 
@@ -714,9 +541,7 @@ class Mix(Common):
 SHARED = table(Common)
 """The inputs that most functions share."""
 
-TABLES_OF: dict[str, Any] = {
-    one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Simulate, Estimate, Tileset, Classify, Mix)
-}
+TABLES_OF: dict[str, Any] = {one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Tileset, Classify, Mix)}
 """The tables by job, which has the name of its command."""
 
 MRF = {"mrf": "methods.mrf.options"}
@@ -726,7 +551,6 @@ METHODS: dict[str, dict[str, str]] = {
     "mix": {"pyramid": "methods.pyramid.options"},
     "solid": {"pyramid.solid": "methods.pyramid.solid"},
     "classify": {"classifier": "jobs.classification.options"},
-    "estimate": {},
 }
 """The methods of a job, and the modules of their options; any other has ``mrf``."""
 

@@ -163,7 +163,7 @@ def test_another_run_is_refused(file):
     ("changes", "words"),
     [
         ({"version": "0.0.1"}, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; go on with"),
-        ({"format": 4}, r"is of format 4 and this simdtex reads 9; go on with the code of simdtex .* that wrote it,"),
+        ({"format": 4}, r"is of format 4 and this simdtex reads 10; go on with the code of simdtex .* that wrote it,"),
     ],
     ids=["version", "format"],
 )

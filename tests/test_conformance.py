@@ -273,7 +273,10 @@ def test_the_key_of_kept_results_is_of_every_byte_and_name(tmp_path):
         seen.add(key(files))
     seen |= {key(files[:1]), key([files[1].rename(tmp_path / "c.cl")]), key([tmp_path / "c.cl", files[0]])}
     assert len(seen) == 7
-    package, tests = {PACKAGE / "ops" / "relax.py", PACKAGE / "options.py"}, {HERE / "runs.py", HERE / "plain_mrf.py"}
+    package, tests = (
+        {PACKAGE / "methods" / "mrf" / "relax.py", PACKAGE / "options.py"},
+        {HERE / "runs.py", HERE / "plain_mrf.py"},
+    )
     assert {*package, *tests} <= set(sources())
     assert {path.suffix for path in sources()} >= {".py", ".cl", ".h"}
 

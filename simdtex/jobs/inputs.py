@@ -19,8 +19,6 @@ from simdtex.declared import Input, inputs, options_of, parameter_types
 from simdtex.driver import Plan, check_shape, check_sides, drive, execute
 from simdtex.inputs import as_known, check_mask, check_picture, check_samples, kept
 from simdtex.io.image import check_sample
-from simdtex.io.places import ascending, located
-from simdtex.jobs.simulation.maps import Maps
 from simdtex.machine import Machine
 from simdtex.maspar.accounting import accounting
 from simdtex.model.light import Relit
@@ -158,29 +156,7 @@ def _parameter(name: str, one: Input, type_: str) -> Parameter:
 # The arrays of a job
 
 
-# The maps of a simulation
-
-
 # The checks and identities that declarations name
-
-
-def _training(name: str, value: Any, call: Any) -> Pictures:
-    """Return training images, of which those of three axes, without that of the variables, are volumes.
-
-    Arrays of xarray get their axes in ascending order here, and the call the place of its output.
-    """
-    value, output = ascending(value), {}
-    for one in ("like", "known", "guide", "mask", *Maps._fields):
-        if hasattr(call, one):
-            output[one] = ascending(getattr(call, one))
-            setattr(call, one, output[one])
-    call.place = located(output, value, call.origin, call.cell)
-    if call.place:
-        call.origin, call.cell = call.place.frame
-    first = value[0] if isinstance(value, (list, tuple)) and value else value
-    call.axes = 3 if getattr(first, "ndim", 2) - (call.channel_axis is not None) > 2 else 2
-    call.given, call.sample = value, (found := check_samples(value, call.channel_axis, call.mask, call.axes))
-    return found
 
 
 def _texture(name: str, value: Any, call: Any) -> Pictures:
@@ -192,7 +168,6 @@ def _texture(name: str, value: Any, call: Any) -> Pictures:
 
 CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
     "samples": lambda name, value, call: check_samples(value, call.channel_axis, call.mask),
-    "training": _training,
     "texture": _texture,
     "picture": lambda name, value, call: check_sample(value, call.channel_axis),
     "picture with gaps": lambda name, value, call: check_picture(value, call.channel_axis),
@@ -207,6 +182,5 @@ CHECKS: dict[str, Callable[[str, Any, Any], Any]] = {
 IDENTITIES: dict[bool | str, Callable[[Any, str], Any]] = {
     True: getattr,
     "arrays": lambda call, name: call.inputs.identity(name),
-    "maps": lambda call, name: call.maps.digest(name),
 }
-"""What identifies a run, of inputs that the plan has placed in ``call.inputs`` and ``call.maps``."""
+"""What identifies a run, of inputs that the plan has placed in ``call.inputs``."""

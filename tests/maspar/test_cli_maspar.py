@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from simdtex import maspar, schedules
 from simdtex.commands import main
 from simdtex.io.image import read, write
-from simdtex.jobs.studies import report
+from simdtex.maspar import report
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 
 

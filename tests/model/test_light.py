@@ -12,6 +12,7 @@ from skimage import data
 
 import simdtex
 from simdtex.io import image
+from simdtex.jobs.filling.job import plan_filling
 from simdtex.live.job import Picture
 from simdtex.model.light import ROUND, light_sentence, trend, unevenness
 
@@ -103,8 +104,8 @@ def test_a_hole_gets_the_light_of_its_place(dtype):
         assert wrong[0] < 6 < wrong[1]
     for one in seen:
         assert_same_bits(one[~hole], picture[~hole])
-    _, work = simdtex.fill.prepare(painted, hole, light="even", **how)
-    assert np.ptp(trend(work.run.sample.pixels[0]).limits) < np.ptp(trend(sample[..., None]).limits) / 10
+    job = plan_filling(painted, hole, light="even", sample=sample)
+    assert np.ptp(trend(job.sample.pixels[0]).limits) < np.ptp(trend(sample[..., None]).limits) / 10
 
 
 def test_beyond_an_edge_the_light_is_that_of_the_edge():

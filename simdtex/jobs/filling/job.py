@@ -221,7 +221,7 @@ def plan_filling(
     if hole.all():
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     chosen = resolve(Options, "fill", options, fill)
-    pixels, found = np.where(hole[..., None], 0, pixels), None
+    found = None
     if light == "even" or (light is None and _may_be_lit(reach, chosen, pixels[~hole][None])):
         (found,) = trends([pixels], [~hole], chosen.categorical)
         found = found if light or found.explains(pixels, ~hole) else None

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
+from simdtex.jobs.synthesis.job import plan_synthesis
 from simdtex.methods import mrf
 
 QUICK = {"order": 2, "levels": 1, "xi": -8.0, "device": REFERENCE}
@@ -298,8 +299,7 @@ def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
     """`simdtex.synthesize` itself would take long at these sizes."""
 
     def reduction(sample, **options):
-        _, work = simdtex.synthesize.prepare(sample, (600, 600), **options)
-        return work.run.sizes[-1].reduction
+        return plan_synthesis(sample, (600, 600), **options).plan().sizes[-1].reduction
 
     large = texture((500, 520))
     assert [reduction(large[:n, :n], lattice="none") for n in (170, 250, 400)] == [1, 2, 4]
