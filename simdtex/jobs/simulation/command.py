@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -41,56 +42,56 @@ from simdtex.cli.options import (
 )
 from simdtex.methods.mrf import options as mrf
 
+if TYPE_CHECKING:
+    from simdtex.jobs.simulation.job import Estimation, Simulation
+    from simdtex.jobs.simulation.maps import Cells
+    from simdtex.run import Output
+
+data_option = partial(option, group=DATA)
+
 CELL_OPTIONS = together(
     SAMPLE_MASK,
     KNOWN_OPTIONS,
-    option(
+    data_option(
         "--channels",
         is_flag=True,
         default=None,
-        group=DATA,
         help="Treat the last axis of a .npy of three axes as channels.  [such a file is a volume]",
     ),
-    option(
+    data_option(
         "--origin",
         type=NUMBERS,
         metavar="X,Y[,Z]",
-        group=DATA,
         help="Place the centre of the first cell here, in the units of the table of --known.  [see --like, else 0,0]",
     ),
-    option(
+    data_option(
         "--cell",
         type=NUMBERS,
         metavar="DX,DY[,DZ]",
-        group=DATA,
         help="Make cells of this size, in the same units.  [see --like, else 1,1]",
     ),
-    option(
+    data_option(
         "--like",
         type=READ,
         metavar="GRID",
-        group=DATA,
         help="Place the output where this grid or raster lies, and give it its size.  [that of --known, --region and "
         "other maps that are grids; else --origin and --cell; else that of a grid TRAINING_IMAGE]",
     ),
-    option(
+    data_option(
         "--several",
         words=("refuse", "mean", "most"),
-        group=DATA,
         help="Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most "
         "frequent value (most).  [refuse]",
     ),
-    option(
+    data_option(
         "--outside",
         words=("refuse", "skip"),
-        group=DATA,
         help="Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).  [refuse]",
     ),
-    option(
+    data_option(
         "--variables",
         multiple=True,
         metavar="NAME",
-        group=DATA,
         help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
     ),
 )
@@ -130,7 +131,7 @@ def flag(name: str) -> str:
 @option("--first", type=int, help="Start with the realisation of this number.")
 @CELL_OPTIONS
 @GUIDE
-@together(*(option(flag(name), type=READ, metavar="FILE", group=DATA, help=help) for name, help in MAPS.items()))
+@together(*(data_option(flag(name), type=READ, metavar="FILE", help=help) for name, help in MAPS.items()))
 @option(
     "--source",
     is_flag=True,
@@ -158,8 +159,7 @@ def simulate(
     A realisation depends only on the seed and on its number.
     """
     from simdtex.io.volume import write_realisations
-    from simdtex.jobs.simulation.job import simulate
-    from simdtex.run import Output
+    from simdtex.jobs.simulation.job import plan_simulation
 
     how, number = take_reading(options, deep=True), 1 if number is None else number
     material = read_material(training_image, how)
@@ -167,28 +167,20 @@ def simulate(
     data = read_data(material, how, options)
     data["guide"], options["labels"] = read_guides(guide, material, how, options["labels"])
     data |= {name: read_map(name, options.pop(name), material, how, *lies) for name in MAPS}
-    pixels, maps = material.pixels[0], [data[name] for name in MAPS if hasattr(data[name], "shape")]
-    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps if one.ndim >= 2 + material.deep]
-    shape = output_shape(size, pixels, data["like"], data["known"], *cells, pixels, axes=2 + material.deep)
-    place = check_place(material, output, options, data, shape, source)
-    known = data["known"]
+    cells = check_cells(material, output, size, data, options, source)
     if click.get_current_context().params["report"]:
         if source or data["region"] is not None:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
-        _check_report(material, shape, getattr(known, "values", known))
-    inputs = data | given(options) | {"shape": shape, "source": source, "channel_axis": material.channel_axis}
-
-    def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
-        made = simulate(described(material), number, **inputs, **call)
-        return made, Output(None, statistics=made.attrs)
+        _check_report(material, cells)
+    plan = plan_simulation(cells, number, source=source, channel_axis=material.channel_axis, **given(options))
 
     return Task(
-        make,
-        f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
+        partial(make, "simulate", plan),
+        f"{number} realisation{'s' * (number != 1)} of {size_of(cells)}",
         str(output),
         [lambda made, run: write_realisations(output, made)],
         more=lambda made, _: _say_shares(made.attrs),
-        report=lambda folder, made, run: _report(folder, material, made, known, place),
+        report=lambda folder, made, run: _report(folder, material, made, cells),
     )
 
 
@@ -201,7 +193,7 @@ def simulate(
 @output_option("Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib, .sgems or .tif.")
 @size_option("that of --known, else of TRAINING_IMAGE", "maps", "TRAINING_IMAGE")
 @CELL_OPTIONS
-@option("--categorical", is_flag=True, default=None, group=DATA, help="Treat values as categories.")
+@data_option("--categorical", is_flag=True, default=None, help="Treat values as categories.")
 @option("--nearest", type=int, help="Use this many data for each cell, the nearest.  [8]")
 @option(
     "--reach",
@@ -215,27 +207,31 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex.io.volume import write_realisations
-    from simdtex.jobs.simulation.estimation import estimate
-    from simdtex.run import Output
+    from simdtex.jobs.simulation.job import plan_estimation
 
     how = take_reading(options, deep=True)
     material = read_material(training_image, how)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     data = read_data(material, how, options)
-    pixels = material.pixels[0]
-    shape = output_shape(size, pixels, data["like"], data["known"], pixels, axes=2 + material.deep)
     if data["known"] is None:
         raise ValueError("an estimate requires data; give --known")
-    check_place(material, output, options, data, shape)
-    inputs = data | given(options) | {"shape": shape}
+    cells = check_cells(material, output, size, data, options)
+    plan = plan_estimation(cells, **given(options))
 
-    def make(device: Any, callback: Any, **_: Any) -> tuple[Any, Output]:
-        made = estimate(described(material), device=device, callback=callback, **inputs)
-        return made, Output(None, statistics=made.attrs)
+    summary = f"maps of {size_of(cells)}"
+    return Task(
+        partial(make, "estimate", plan), summary, str(output), [lambda made, run: write_realisations(output, made)]
+    )
 
-    size = "x".join(map(str, shape[::-1]))
-    return Task(make, f"maps of {size}", str(output), [lambda made, run: write_realisations(output, made)])
+
+def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: Any) -> tuple[Any, Output]:
+    """Run a job, and return its result with the attributes as statistics."""
+    from simdtex.driver import run
+    from simdtex.run import Output
+
+    made = plan.result(*run(name, plan, **call))
+    return made, Output(None, statistics=made.attrs)
 
 
 def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict[str, Any]:
@@ -276,32 +272,38 @@ def read_map(
     return values
 
 
-def check_place(
+def check_cells(
     material: Material,
     output: Path,
-    options: dict[str, Any],
+    size: str | None,
     data: dict[str, Any],
-    shape: tuple[int, ...],
+    options: dict[str, Any],
     source: bool = False,
-) -> dict[str, Any]:
-    """Return the origin and the size of cells, and how data are placed in them, as parameters of `place_hard_data`.
+) -> Cells:
+    """Return the cells of an output, whose options are taken out; rows of tables become coordinates.
 
-    Rows of tables become coordinates. Raises ValueError if places differ, or the output cannot hold the place.
+    Raises ValueError if places differ, or the output cannot hold the place.
     """
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.hard_data import HardData
-    from simdtex.io.places import located
     from simdtex.io.volume import check_realisations_path
+    from simdtex.jobs.simulation.maps import plan_cells
 
-    flags = {flag(name): one for name, one in data.items()}
-    place = located(flags, described(material), options["origin"], options["cell"])
-    lies: dict[str, Any] = place.frame._asdict() if place else {}
+    shape = None if size is None else output_shape(size, material.pixels[0], axes=2 + material.deep)
+    lies = given({name: options.pop(name) for name in ("origin", "cell", "several", "outside")})
+    cells = plan_cells(described(material), shape, data, material.channel_axis, flag, **lies)
+    frame = cells.place.frame if cells.place else None
     if check_realisations_path(output, source=source) in SUFFIXES:
-        check_grid(output, material.pixels, lies.get("origin"), lies.get("cell"))
-    for name, one in data.items():
+        check_grid(output, material.pixels, *(frame or (None, None)))
+    for name, one in cells.given.items():
         if isinstance(one, HardData) and one.from_top:
-            data[name] = one.upside_down(shape[-2], place and place.frame)
-    return lies | given({name: options[name] for name in ("several", "outside")})
+            cells.given[name] = one.upside_down(cells.size[-2], frame)
+    return cells
+
+
+def size_of(cells: Cells) -> str:
+    """Return width x height, of a volume x depth, as text."""
+    return "x".join(map(str, cells.size[::-1]))
 
 
 def described(material: Material) -> Any:
@@ -319,21 +321,16 @@ def _say_shares(attributes: dict[str, Any]) -> None:
         click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**attributes))
 
 
-def _report(folder: Path, material: Material, made: Any, known: Any, place: dict[str, Any]) -> None:
-    from simdtex.io.hard_data import HardData, place_hard_data
+def _report(folder: Path, material: Material, made: Any, cells: Cells) -> None:
+    from simdtex.io.hard_data import HardData
     from simdtex.jobs.simulation.report import write_ensemble, write_volumes
 
     pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
-    data = None
+    data, known = None, cells.given["known"]
     if known is not None:
-        table = isinstance(known, HardData)
-        known = (
-            place_hard_data(known, made.shape[1:], **place)
-            if table
-            else np.ma.masked_invalid(getattr(known, "values", known))
-        )
-        cells = np.nonzero(~np.ma.getmaskarray(known))
-        data = np.stack([*cells[::-1], known.data[cells].astype(np.float64)], -1)
+        known = cells.put(known, cells.size) if isinstance(known, HardData) else np.ma.masked_invalid(known)
+        at = np.nonzero(~np.ma.getmaskarray(known))
+        data = np.stack([*at[::-1], known.data[at].astype(np.float64)], -1)
     shown: dict[str, Any] = {"data": data, "command": command_line()}
     if material.deep:
         write_volumes(folder, pixels, made, categorical, **shown)
@@ -341,7 +338,7 @@ def _report(folder: Path, material: Material, made: Any, known: Any, place: dict
         write_ensemble(folder, pixels, made, categories=None if categorical else [], **shown)
 
 
-def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> None:
+def _check_report(material: Material, cells: Cells) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
     from simdtex.jobs.simulation.ensemble import LEAST_IMAGE_SIDE
     from simdtex.options import LARGEST
@@ -350,8 +347,9 @@ def _check_report(material: Material, shape: tuple[int, ...], known: Any) -> Non
         raise ValueError("--report requires one training image of one variable; leave it out")
     if not material.known:
         raise ValueError("--report requires a training image without unknown cells; leave it out")
-    given = material.pixels if known is None else [*material.pixels, known]
-    if not material.deep and min(*shape, *material.pixels[0].shape) < LEAST_IMAGE_SIDE:
+    known = cells.given["known"]
+    given = material.pixels if known is None else [*material.pixels, getattr(known, "values", known)]
+    if not material.deep and min(*cells.size, *material.pixels[0].shape) < LEAST_IMAGE_SIDE:
         least = f"{LEAST_IMAGE_SIDE}x{LEAST_IMAGE_SIDE} pixels"
         raise ValueError(f"--report requires {least} or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):

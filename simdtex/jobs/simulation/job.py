@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Random fields that look like a training image and honour data: `simulate`."""
+"""Random fields that look like a training image and honour data: `simulate`, and `estimate` without a simulation."""
 
 from __future__ import annotations
 
@@ -20,18 +20,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing, digest
 from simdtex.driver import Device, Kept, Seed, drive, run
-from simdtex.inputs import check_inputs
+from simdtex.inputs import check_inputs, check_known
 from simdtex.io.hard_data import HardData
 from simdtex.io.places import Place
-from simdtex.jobs.simulation.cells import Cells, digests, georeferenced, grid_axes, plan_cells
-from simdtex.jobs.simulation.maps import Maps, check_region, missing_value
+from simdtex.jobs.simulation.maps import (
+    Cells,
+    Maps,
+    check_region,
+    digests,
+    georeferenced,
+    grid_axes,
+    missing_value,
+    plan_cells,
+)
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.methods.mrf.density import Data, given_data
 from simdtex.model.given import Given, Soft
 from simdtex.model.guide import GuidePair
 from simdtex.model.light import Light
 from simdtex.model.pictures import Pictures, Turned
-from simdtex.options import resolve, true_or_false, whole
+from simdtex.model.sample import Sample
+from simdtex.options import moderate, real, resolve, true_or_false, whole
 from simdtex.run import Callback, Output, Progress
 
 MOST_TOGETHER = 4
@@ -225,11 +235,9 @@ def plan_simulation(
         found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if own.usable:
         found["mask"] = digest(*own.usable)
-    names = (*("layer", "row", "column")[-len(size) :], *["image"] * (len(own.pixels) > 1)) if source else ()
-    about = {"sources": names, "digests": found, "about": cells.about, "missing": missing, "jobs": jobs}
-    results: Any = {**about, "place": cells.place, "channel_axis": None if channel_axis is None else -1}
-    parts = (training, inputs.given, guide, soft, copies, source)
-    return Simulation(maps.digests(), n, first, size, *parts, chosen, **results)
+    parts = (training, inputs.given, guide, soft, copies, source, chosen)
+    axis = None if channel_axis is None else -1
+    return Simulation(maps.digests(), n, first, size, *parts, cells._replace(given={}), found, missing, jobs, axis)
 
 
 @dataclass(frozen=True)
@@ -237,8 +245,7 @@ class Simulation:
     """The job of `simulate`: a run of one plan for each realisation.
 
     ``maps`` are digests. ``training`` and ``guide`` have the ``copies`` of training images, if these are turned or
-    scaled, and ``soft`` their probabilities. Of the result, ``sources`` are the columns of the source map, ``missing``
-    is the value outside of the region, and ``about`` and ``digests`` are attributes.
+    scaled, and ``soft`` their probabilities. ``missing`` is the value outside of the region.
     """
 
     maps: dict[str, str]
@@ -252,12 +259,10 @@ class Simulation:
     copies: Turned | None
     source: bool
     options: mrf.Options
-    sources: tuple[str, ...] = field(compare=False)
+    cells: Cells = field(compare=False)
     digests: dict[str, str] = field(compare=False)
-    about: dict[str, str] = field(compare=False)
     missing: Any = field(compare=False)
     jobs: int | None = field(compare=False)
-    place: Place | None = field(compare=False)
     channel_axis: int | None = field(compare=False)
     light: Light = field(default=Light(), compare=False)
 
@@ -265,6 +270,12 @@ class Simulation:
     def outside(self) -> NDArray[np.bool_] | None:
         """Cells that take no part; None without a region."""
         return self.known.outside if self.known else None
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The columns of the source map; empty if there is none."""
+        names = (*("layer", "row", "column")[-len(self.shape) :], "image")
+        return names[: len(self.shape) + (len(self.cells.training.pixels) > 1)] if self.source else ()
 
     def plan(self) -> mrf.Plan:
         """Return the plan of all runs."""
@@ -276,19 +287,21 @@ class Simulation:
     ) -> tuple[NDArray[Any], Output]:
         """Make all realisations, and return them; the source of the output is that of all."""
         batch = Batch(self, seed, callback, checkpointing)
+        left = [number for number in range(self.n) if number not in batch.finished]
+        usual = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
+        together = min(self.jobs or usual, self.n)
+        # each has a queue, but a profile is of a single machine
+        info: Any = machine if machine.seconds is not None else getattr(machine, "info", "reference")
+        for one in (machine, *(open_machine(info) for _ in range(together - 1))):
+            batch.free.put(one)
         try:
-            _in_turn(batch.make, batch.left, self.machines(machine))
+            with ThreadPoolExecutor(together) as workers:
+                list(workers.map(batch.make, left))  # the first error cancels those that wait
         except BaseException:
             checkpointing.offer(None, batch.state, now=True)  # those that wait for their turn
             raise
         statistics = {"seed": seed, "device": machine.name, "shares": self.shares(batch)}
         return batch.values, Output(batch.sources, statistics=statistics)
-
-    def machines(self, machine: Machine) -> list[Machine]:
-        """Return a machine, and others of its device, for the realisations that are made at a time."""
-        usual = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
-        info: Any = getattr(machine, "info", "reference")
-        return [machine, *(open_machine(info) for _ in range(min(self.jobs or usual, self.n) - 1))]
 
     def shares(self, batch: Batch) -> dict[str, str]:
         """Return the shares of categories that were asked and those that were reached, as attributes."""
@@ -313,18 +326,21 @@ class Simulation:
 
         lattice = ["realisation", *"zyx"[-len(self.shape) :]]
         dims, numbers = [*lattice, "variable"][: values.ndim], range(self.first, self.first + self.n)
-        along, sides = grid_axes(self.shape, self.place)
+        along, sides = grid_axes(self.shape, self.cells.place)
         seed, device, shares = (output.statistics[name] for name in ("seed", "device", "shares"))
         seeds = np.array([realisation_seed(seed, number) for number in numbers], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
-        attributes = {"seed": seed, "version": version("simdtex"), "device": device, "options": _text(self.options)}
+        attributes = {"seed": seed, "version": version("simdtex"), "device": device}
+        attributes["options"] = json.dumps(
+            vars(self.options), default=lambda one: one.tolist() if isinstance(one, np.generic) else str(one)
+        )
         attributes |= self.digests | self.maps
         if self.outside is not None:
             coordinates["region"] = (lattice[1:], ~self.outside)
             attributes |= {} if values.dtype.kind == "f" else {"missing": self.missing.item()}
-        attributes |= shares | sides | self.about
+        attributes |= shares | sides | self.cells.about
         made = Realisations(values, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
-        found = georeferenced(made, self.place)
+        found = georeferenced(made, self.cells.place)
         if not self.source:
             return found
         assert output.source is not None
@@ -333,14 +349,14 @@ class Simulation:
 
 
 class Batch:
-    """The realisations of a run: their ``values`` and source maps, of which those of the numbers ``finished`` are made.
+    """The realisations of a run, of which those of the numbers ``finished`` are made; threads make one each at a time.
 
-    Threads make one each at a time.
+    ``free`` are the machines that make none.
     """
 
     def __init__(self, job: Simulation, seed: int, callback: Callback | None, checkpointing: Checkpointing) -> None:
         self.job, self.seed, self.callback, self.checkpointing = job, seed, callback, checkpointing
-        self.plan = job.plan()
+        self.plan, self.free = job.plan(), SimpleQueue[Machine]()
         pixels, columns = job.training.pixels[0], len(job.sources)
         values = prod(job.shape) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)
         memory.require_host(job.n * (2 * values + 64))  # realisations are copied once
@@ -354,21 +370,19 @@ class Batch:
             self.sources[self.finished] = checkpointing.found["sources"]
             self.shares[self.finished] = 1
 
-    @property
-    def left(self) -> list[int]:
-        """The numbers of the realisations that are not yet made."""
-        return [number for number in range(self.job.n) if number not in self.finished]
-
     def state(self) -> dict[str, Any]:
         """Return the finished realisations, as plain arrays."""
         done = self.finished
         return {"numbers": list(done), "pictures": self.values[done], "sources": self.sources[done]}
 
-    def make(self, number: int, machine: Machine) -> None:
-        """Make a realisation on a machine."""
-        job, own = self.job, Checkpointing(None, self._offer)
-        told = self.callback and partial(self._tell, number)
-        picture, output = drive(self.plan, machine, realisation_seed(self.seed, job.first + number), told, own)
+    def make(self, number: int) -> None:
+        """Make a realisation on a free machine."""
+        job, own, machine = self.job, Checkpointing(None, self._offer), self.free.get()
+        told, seed = self.callback and partial(self._tell, number), realisation_seed(self.seed, job.first + number)
+        try:
+            picture, output = drive(self.plan, machine, seed, told, own)
+        finally:
+            self.free.put(machine)
         if job.outside is not None:
             picture[job.outside] = job.missing
         with self.lock:
@@ -406,29 +420,167 @@ def realisation_seed(seed: int, number: int) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 
-def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: list[Machine]) -> None:
-    """Call ``one`` for each number on a free machine; the first error ends all calls."""
-    free: SimpleQueue[Machine] = SimpleQueue()
-    for machine in machines:
-        free.put(machine)
+def estimate(
+    training: ArrayLike | Sequence[ArrayLike],
+    *,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    origin: Sequence[float] | None = None,
+    cell: Sequence[float] | None = None,
+    like: Any = None,
+    several: Literal["refuse", "mean", "most"] = "refuse",
+    outside: Literal["refuse", "skip"] = "refuse",
+    shape: tuple[int, ...] | None = None,
+    categorical: bool = False,
+    nearest: int = 8,
+    reach: int | None = None,
+    bandwidth: float = 1.0,
+    device: Device = None,
+    callback: Callback | None = None,
+) -> Any:
+    """Return the probability of each category at each cell given data, or mean and variance: the LCPDF.
 
-    def job(number: int) -> None:
-        machine = free.get()
-        try:
-            one(number, machine)
-        finally:
-            free.put(machine)
+    Parameters
+    ----------
+    training : (rows, cols) or (layers, rows, cols) array, or a list of such
+        The training image, as in `simdtex.simulate`; one variable.
+    known : array of `shape`, HardData, pandas.DataFrame or path
+        The data, as in `simdtex.simulate`.
+    shape : (int, int) or (int, int, int), optional
+        [Layers,] rows and columns of the result. None: those of `known` if an array, else of the training image.
+    mask, origin, cell, like, several, outside, device, callback
+        As in `simdtex.simulate`.
+    categorical : bool
+        Treat values as categories.
+    nearest : int, 0 to 64
+        Use this many data for each cell, the nearest.
+    reach : int, 0 or more, optional
+        Use data up to this many cells away. None: an eighth of the smaller of rows and columns of `training`.
+    bandwidth : float, above 0
+        h in units of h_opt, equation (8).
 
-    with ThreadPoolExecutor(len(machines)) as workers:
-        futures = [workers.submit(job, number) for number in numbers]
-        try:
-            for future in futures:
-                future.result()
-        except BaseException:
-            workers.shutdown(wait=False, cancel_futures=True)
-            raise
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``z`` of a volume, ``y`` and ``x``, with coordinates as in `simdtex.simulate`. With `categorical` the
+        variables ``probability`` (category, [z,] y, x), float64, which adds up to 1, and ``entropy`` ([z,] y, x) in
+        bits; else ``mean`` and ``variance`` in the units of the training image. A cell with a datum has its value with
+        certainty.
+        ``plot()`` draws the maps.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
+
+    Notes
+    -----
+    Equations (6), (7) and (12): neighbours without data have t = 1, so they have no weight, and each datum is compared
+    at its own offset from the cell. h is that of equation (8) for this number of data. The result has no sampling
+    noise, and the same bits on every device. Cost: cells x pixels of the training image x `nearest` fma.
+
+    Examples
+    --------
+    >>> import numpy as np, simdtex
+    >>> training = np.tile([0, 0, 0, 1], (32, 8))
+    >>> known = np.full((4, 6), np.nan)
+    >>> known[2, 1] = 1
+    >>> found = simdtex.estimate(training, known=known, categorical=True)
+    >>> found.probability.sel(category=1)[2].values.round(2).tolist()
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
+    """
+    given = {"like": like, "known": known, "mask": mask}
+    cells = plan_cells(training, shape, given, origin=origin, cell=cell, several=several, outside=outside)
+    job = plan_estimation(cells, categorical, nearest, reach, bandwidth)
+    return job.result(*run("estimate", job, None, device, callback, None))
 
 
-def _text(options: mrf.Options) -> str:
-    """Return options as JSON."""
-    return json.dumps(vars(options), default=lambda one: one.tolist() if isinstance(one, np.generic) else str(one))
+def plan_estimation(
+    cells: Cells, categorical: bool = False, nearest: int = 8, reach: int | None = None, bandwidth: float = 1.0
+) -> Estimation:
+    """Check the arguments of `estimate`, of which ``cells`` has those on the training image, and return its job."""
+    true_or_false("categorical", categorical)
+    whole("nearest", nearest, 0, 64)
+    real("bandwidth", bandwidth, 0, above=True)
+    options = mrf.Options(categorical=categorical)
+    training = options.of(cells.training)
+    least = min(min(one.shape[-3:-1]) for one in training.pixels)
+    reach = least // 8 if reach is None else reach
+    whole("reach", reach, 0, least - 1)
+    if cells.given["known"] is None:
+        raise ValueError("an estimate requires data; give known")
+    cells.check_several(training)
+    known = check_known(cells.given["known"], cells.size, None, training, place=cells.put)
+    mrf.check_categories(training, known)
+    if not categorical:
+        moderate("the training image", *training.pixels)
+    attributes = {"nearest": nearest, "reach": reach, "bandwidth": bandwidth, **digests(training, known)}
+    return Estimation(training, known, cells.size, cells.place, cells.about.get("units", ""), attributes, options)
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """The job of `estimate`; ``attributes`` are those of the result, and ``units`` of its values, "" without."""
+
+    training: Pictures
+    known: Given
+    shape: tuple[int, ...]
+    place: Place | None
+    units: str
+    attributes: dict[str, Any]
+    options: mrf.Options
+    channel_axis: int | None = -1
+    light: Light = field(default=Light())
+
+    def make(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Return the probabilities of a cell, or its mean and variance, as channels."""
+        nearest, cells, there = self.attributes["nearest"], prod(self.shape), self.known.whole
+        sample = Sample(self.training, self.training.channels * (nearest + 1), self.attributes["reach"])
+        positions = sample.places(np.zeros((1, len(self.shape)), np.int32), 1).positions
+        own = sample.own(positions)[:, 0]
+        names, of = np.unique(own if self.options.categorical else sample.working[0, positions], return_inverse=True)
+        data = Data(np.argwhere(there), sample.scale.levels(self.known.values[there]).T)
+        count = len(names) if self.options.categorical else 2
+        memory.require(machine, 0, 8 * cells * ((len(names) if self.options.categorical else 0) + 4))
+        sites = np.argwhere(np.ones(self.shape, bool))
+        found, done = np.full((count, cells), np.nan), 0
+        for here, p in given_data(machine, sample, of, data, sites, nearest, self.attributes["bandwidth"]):
+            found[:, here] = p.T if self.options.categorical else _moments(p, of, own)
+            done += here.size
+            if callback:
+                now, doing = found.T.reshape(*self.shape, -1).copy, f"{done} of {cells} cells"
+                callback(Progress(fraction=done / cells, doing=doing, image=now))
+        told = self.known.values[there][:, 0]
+        certain = names[:, None] == told if self.options.categorical else np.stack([told, np.zeros(len(told))])
+        found[:, there.ravel()] = certain
+        return found.T.reshape(*self.shape, -1), Output(None, statistics={"device": machine.name, "names": names})
+
+    def result(self, values: NDArray[Any], output: Output) -> Any:
+        """Return the dataset of xarray."""
+        from simdtex.figures.show import Results
+
+        dims, maps = tuple("zyx"[-len(self.shape) :]), np.moveaxis(values, -1, 0)
+        along, sides = grid_axes(self.shape, self.place)
+        if self.options.categorical:
+            entropy = 0 - (maps * np.log2(np.where(maps > 0, maps, 1))).cumsum(0)[-1]
+            variables: dict[str, Any] = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
+            along["category"] = output.statistics["names"]
+        else:
+            units = [{"units": one} if self.units else {} for one in (self.units, f"({self.units})\u00b2")]
+            variables = {"mean": (dims, maps[0], units[0]), "variance": (dims, maps[1], units[1])}
+        attributes = {"version": version("simdtex"), "device": output.statistics["device"], **self.attributes, **sides}
+        return georeferenced(Results(variables, along, attributes), self.place)
+
+
+def _moments(
+    probability: NDArray[np.float64], of: NDArray[np.integer], own: NDArray[Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean and variance of sites, (S,), from the probability of each level, (S, levels)."""
+    values = own.astype(np.float64)
+    count = np.bincount(of)
+    level = np.bincount(of, values) / count
+    within = np.bincount(of, (values - level[of]) ** 2) / count
+    mean = (probability * level).cumsum(1)[:, -1]
+    return mean, (probability * (within + (level - mean[:, None]) ** 2)).cumsum(1)[:, -1]

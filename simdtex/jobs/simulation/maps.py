@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The maps of a simulation: a region, probabilities, training images, rotations and scales."""
+"""The cells of an output and where they lie; its maps: region, probabilities, training images, rotations, scales."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from math import prod
 from typing import Any, NamedTuple
 
@@ -12,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import digest
-from simdtex.inputs import Inputs, Placing, check_mask
-from simdtex.io.hard_data import HardData
+from simdtex.driver import check_sides
+from simdtex.inputs import Inputs, Placing, as_known, check_mask, check_samples
+from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.image import AXES, as_array
+from simdtex.io.places import Place, ascending, located
 from simdtex.model.given import Given
 from simdtex.model.pictures import HALVES, Pictures, Turned, turned
-from simdtex.options import check_real
+from simdtex.options import check_real, one_of, require, within_32_bits
 
 SUMS = 1e-3
 """The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
@@ -158,4 +162,122 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
     found = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
     if np.isinf(found).any():
         raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
+    return found
+
+
+class Cells(NamedTuple):
+    """The cells of an output, (``size``).
+
+    ``given`` are arrays and tables by the names of the parameters of `simdtex.simulate`, ``about`` the attributes of
+    the values, and ``place`` is None if nothing says where the cells lie. ``put(table, shape, dtype)`` places a table.
+    """
+
+    training: Pictures
+    given: dict[str, Any]
+    about: dict[str, str]
+    size: tuple[int, ...]
+    place: Place | None
+    several: str
+    put: Placing
+
+    def check_several(self, pictures: Pictures) -> None:
+        """Raise if different data of a table in one cell would become a mean of categories."""
+        if self.several == "mean" and isinstance(self.given["known"], HardData) and any(pictures.categorical or ()):
+            raise ValueError("several is 'mean', which invents categories; give 'most', or 'refuse'")
+
+
+def plan_cells(
+    training: Any,
+    shape: Any,
+    given: dict[str, Any],
+    channel_axis: int | None = None,
+    named: Callable[[str], str] = str,
+    *,
+    origin: Any = None,
+    cell: Any = None,
+    several: str = "refuse",
+    outside: str = "refuse",
+) -> Cells:
+    """Check a training image and what is ``given`` in the cells of an output, and return the cells.
+
+    Arrays of xarray get their axes in ascending order. A training image of three axes, without that of the variables,
+    is a volume. ``named`` returns the name of a parameter in messages.
+    """
+    require("simulate", "xarray")
+    from simdtex.figures.show import described
+
+    training, given = ascending(training), {name: ascending(one) for name, one in given.items()}
+    place = located({named(name): one for name, one in given.items()}, training, origin, cell)
+    if place:
+        origin, cell = place.frame
+    first = training[0] if isinstance(training, (list, tuple)) and training else training
+    axes = 3 if getattr(first, "ndim", 2) - (channel_axis is not None) > 2 else 2
+    pictures = check_samples(training, channel_axis, given["mask"], axes)
+    one_of("several", several, ("refuse", "mean", "most"))
+    one_of("outside", outside, ("refuse", "skip"))
+    for name in ("known", *Maps._fields):
+        if given.get(name) is not None:
+            given[name] = as_known(given[name], name, pictures if name == "known" else None)
+    sides = _size(shape, given, place, axes, channel_axis)
+    size = check_sides(pictures.pixels[0].shape[:-1] if sides is None else sides, ("layers", "rows", "columns")[-axes:])
+    within_32_bits(size, 1)
+    put = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)  # type: ignore[arg-type]
+    return Cells(pictures, given, described(training, given["known"]), size, place, several, put)
+
+
+def _size(shape: Any, given: dict[str, Any], place: Place | None, axes: int, channel_axis: int | None) -> Any:
+    """Return the sides of ``shape``, ``like``, the known values or the first map that is an array; None without any."""
+    like, known = given["like"], given["known"]
+    if axes == 2 and isinstance(shape, (tuple, list)) and len(shape) == 3:
+        raise ValueError("shape is of a volume and the training image is a picture; give a training volume")
+    if like is not None:
+        if not hasattr(like, "sizes") or place is None or not {"x", "y"} <= {*like.sizes}:
+            remedy = "give an array of xarray that has, or shape, origin and cell"
+            raise ValueError(f"like has no coordinates x and y; {remedy}")
+        size = tuple(like.sizes.get(axis, 1) for axis in "zyx"[-axes:])
+        if shape is not None and tuple(shape) != size:
+            raise ValueError(f"shape is {shape} and like has {size}; leave shape out")
+        return size
+    if shape is not None:
+        return shape
+    if isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
+        return known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
+    shapes = (getattr(given.get(name), "shape", ())[-axes:] for name in Maps._fields)
+    return next((one for one in shapes if len(one) == axes), None)
+
+
+def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the coordinates of cells and the sizes of a cell as attributes; without a place, columns and rows."""
+    at, sides = place.frame if place else ((), ())
+    found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
+    for axis, first, side in zip("xyz", at, sides, strict=False):
+        values, about = first + side * found.get(axis, 0), place.about.get(axis, {}) if place else {}
+        found[axis] = ((axis,) if axis in found else (), values, about)
+    return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
+
+
+def georeferenced(made: Any, place: Place | None) -> Any:
+    """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
+    if place is None or not place.crs:
+        return made
+    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
+    with suppress(ImportError):  # the extra rasters
+        from rasterio.crs import CRS
+
+        system = CRS.from_wkt(place.crs)
+        unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
+        for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
+            if axis in found.coords:
+                named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
+                found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
+    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
+    return found
+
+
+def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
+    """Return the digests of hard data and of the training images, with their unknown pixels completed."""
+    found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
+    if given and given.given_mask.any():
+        found["hard_data"] = digest(np.where(given.given_mask, given.values, 0), given.given_mask)
     return found
