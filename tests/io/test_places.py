@@ -112,9 +112,10 @@ def test_known_values_are_the_same_in_every_file():
 
 @pytest.mark.parametrize("flag", ["--region", "--rotation", "--guide"])
 def test_maps_are_the_same_in_every_file(flag, monkeypatch):
-    """The function gets the same array from each file."""
+    """The plan gets the same array from each file."""
     called, own = {}, TRUTH * np.uint8(255 if flag == "--region" else 1)
-    monkeypatch.setattr("simdtex.simulate", lambda *_, **given: called.update(given))
+    planner = "simdtex.jobs.simulation.job.plan_simulation"
+    monkeypatch.setattr(planner, lambda cells, *_, **__: called.update(cells.given))
     for name, write in FILES.items():
         write(name, own)
         run("simulate", "ti.npy", flag, f"ti.npy={name}" if flag == "--guide" else name, "-o", "out.npz", *SIMULATED)

@@ -147,7 +147,7 @@ def axes(*words):
 
 @pytest.mark.parametrize("case", ["a grid that holds no such number", "a grid too far away"])
 def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatch):
-    monkeypatch.setattr("simdtex.simulate", lambda *_, **__: pytest.fail("this takes hours"))
+    monkeypatch.setattr("simdtex.driver.run", lambda *_, **__: pytest.fail("this takes hours"))
     refused(*BAD[case])
 
 
