@@ -9,6 +9,7 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex.checkpoint import read
 from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs.simulation.ensemble import channels
 from simdtex.jobs.simulation.job import realisation_seed
@@ -364,6 +365,29 @@ def test_the_source_map_of_every_realisation(several):
     assert alone.identical(found.simulation)
 
 
+ANOTHER = {
+    "source": {"source": False},
+    "n": {"n": 4},
+    "first": {"first": 1},
+    "sample": {"training": TRAINING[::-1]},
+    "mask": {"mask": TRAINING > 90},
+    "known": {"known": np.where(holed() > 0, 7, np.nan)},
+    "guide": {"guide": (TRAINING, TRAINING[:12, :14])},
+    "region": {"region": np.arange(14) < np.full((12, 1), 9)},
+    "rotation": {"rotation": np.zeros(SHAPE)},
+    "option order": {"order": 1},
+    "shape of the output": {"shape": (9, 14)},
+}
+"""Changes of a call, by what a checkpoint of the call before says of them."""
+
+
+def test_a_stop_does_not_wait_for_the_end_of_a_realisation(tmp_path):
+    kept = simdtex.Checkpoint(tmp_path / "run.ckpt")
+    with pytest.raises(KeyboardInterrupt):
+        simulate(n=3, jobs=1, checkpoint=kept, callback=lambda progress: kept.stop())
+    assert read(kept.path)[1]["numbers"] == []
+
+
 def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):
     path, whole = tmp_path / "run.ckpt", simulate(n=3, source=True)
 
@@ -372,10 +396,9 @@ def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         simulate(n=3, source=True, jobs=1, checkpoint=path, callback=stop)
-    with pytest.raises(ValueError, match="source"):
-        simulate(n=3, checkpoint=path)
-    with pytest.raises(ValueError, match="region"):
-        simulate(n=3, source=True, checkpoint=path, region=np.arange(14) < np.full((12, 1), 9))
+    for what, change in ANOTHER.items():
+        with pytest.raises(ValueError, match=f"is of another {what}[ ;]"):
+            simulate(**{"n": 3, "source": True, "checkpoint": path} | change)
     xarray.testing.assert_identical(simulate(n=3, source=True, checkpoint=path), whole)
 
 
