@@ -241,3 +241,4 @@ def test_arrays_of_xarray():
     other = (known > 5).assign_coords(spatial_ref=((), 0, {"crs_wkt": "EPSG:32633"}))
     with pytest.raises(ValueError, match="known and region have different coordinate reference systems"):
         simdtex.simulate(TRUTH, 1, known=far, region=other, **OPTIONS)
+    assert simdtex.simulate(TRUTH, 1, known=far, **OPTIONS).x.attrs["units"] == "m"

@@ -172,7 +172,7 @@ def simulate(
         if source or data["region"] is not None:
             raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(material, cells)
-    plan = plan_simulation(cells, number, source=source, channel_axis=material.channel_axis, **given(options))
+    plan = plan_simulation(cells, number, source=source, **given(options))
 
     return Task(
         partial(make, "simulate", plan),

@@ -188,19 +188,13 @@ def simulate(
     given |= {"probabilities": probabilities, "image_map": image_map, "rotation": rotation, "scale": scale}
     place: Any = {"origin": origin, "cell": cell, "several": several, "outside": outside}
     cells = plan_cells(training, shape, given, channel_axis, **place)
-    job = plan_simulation(cells, n, first, source, jobs, channel_axis, **options)
+    job = plan_simulation(cells, n, first, source, jobs, **options)
     values, output = run("simulate", job, rng, device, callback, checkpoint)
     return job.result(values, output)
 
 
 def plan_simulation(
-    cells: Cells,
-    n: int,
-    first: int = 0,
-    source: bool = False,
-    jobs: int | None = None,
-    channel_axis: int | None = None,
-    **options: Any,
+    cells: Cells, n: int, first: int = 0, source: bool = False, jobs: int | None = None, **options: Any
 ) -> Simulation:
     """Check the arguments of `simulate`, of which ``cells`` has those on the training image, and return its job."""
     whole("n", n, 1)
@@ -210,7 +204,7 @@ def plan_simulation(
         whole("jobs", jobs, 1)
     own, size, given = cells.training, cells.size, cells.given
     maps = Maps(*(given[name] for name in Maps._fields))
-    inputs = check_inputs(own, size, channel_axis, None, given["known"], None, given["guide"], cells.put)
+    inputs = check_inputs(own, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
     missing: Any = None
     if maps.region is not None:
         inputs, missing = check_region(maps.region, size, inputs), missing_value(own.pixels)
@@ -236,7 +230,7 @@ def plan_simulation(
     if own.usable:
         found["mask"] = digest(*own.usable)
     parts = (training, inputs.given, guide, soft, copies, source, chosen)
-    axis = None if channel_axis is None else -1
+    axis = None if cells.channel_axis is None else -1
     return Simulation(maps.digests(), n, first, size, *parts, cells._replace(given={}), found, missing, jobs, axis)
 
 

@@ -166,13 +166,14 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
 
 
 class Cells(NamedTuple):
-    """The cells of an output, (``size``).
+    """The cells of an output, ``size`` ([layers,] rows, columns).
 
     ``given`` are arrays and tables by the names of the parameters of `simdtex.simulate`, ``about`` the attributes of
     the values, and ``place`` is None if nothing says where the cells lie. ``put(table, shape, dtype)`` places a table.
     """
 
     training: Pictures
+    channel_axis: int | None
     given: dict[str, Any]
     about: dict[str, str]
     size: tuple[int, ...]
@@ -195,8 +196,8 @@ def plan_cells(
     *,
     origin: Any = None,
     cell: Any = None,
-    several: str = "refuse",
-    outside: str = "refuse",
+    several: Any = "refuse",
+    outside: Any = "refuse",
 ) -> Cells:
     """Check a training image and what is ``given`` in the cells of an output, and return the cells.
 
@@ -221,8 +222,8 @@ def plan_cells(
     sides = _size(shape, given, place, axes, channel_axis)
     size = check_sides(pictures.pixels[0].shape[:-1] if sides is None else sides, ("layers", "rows", "columns")[-axes:])
     within_32_bits(size, 1)
-    put = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)  # type: ignore[arg-type]
-    return Cells(pictures, given, described(training, given["known"]), size, place, several, put)
+    put = partial(place_hard_data, origin=origin, cell=cell, several=several, outside=outside)
+    return Cells(pictures, channel_axis, given, described(training, given["known"]), size, place, several, put)
 
 
 def _size(shape: Any, given: dict[str, Any], place: Place | None, axes: int, channel_axis: int | None) -> Any:
@@ -261,10 +262,10 @@ def georeferenced(made: Any, place: Place | None) -> Any:
     if place is None or not place.crs:
         return made
     found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
-    with suppress(ImportError):  # the extra rasters
+    with suppress(ImportError, ValueError):  # the extra rasters; a text that names no system
         from rasterio.crs import CRS
 
-        system = CRS.from_wkt(place.crs)
+        system = CRS.from_user_input(place.crs)
         unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
         for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
             if axis in found.coords:
