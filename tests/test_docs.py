@@ -14,14 +14,14 @@ import pytest
 from skimage import data
 
 import simdtex
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.cli.options import given
 from simdtex.io.image import write
 from simdtex.jobs.classification import options as classifier
 from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
-from simdtex.methods.pyramid.options import solid
+from simdtex.methods.pyramid import solid
 from simdtex.options import preset_values, quoted, resolve
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -24,7 +24,7 @@ import simdtex
 from simdtex.commands import main
 from simdtex.io import image
 from simdtex.jobs.classification.options import Options
-from simdtex.jobs.synthesis.report import confusion_matrix
+from simdtex.jobs.classification.report import confusion_matrix
 from simdtex.model.display import label_colours, read_labels, write_labels
 
 # -- `simdtex.classify` and `simdtex.TextureClassifier`: what goes in, what comes out, and what is refused.

@@ -24,7 +24,7 @@ from simdtex.methods.pyramid.operations_solid import (
     solid_reduce,
     solid_turn,
 )
-from simdtex.methods.pyramid.options import operations_solid as solid
+from simdtex.methods.pyramid import operations_solid as solid
 from simdtex.methods.pyramid.pyramids import most_levels
 from simdtex.methods.pyramid.steerable import ORIENTATIONS, UNIT, filters, steerable_join, steerable_split
 
