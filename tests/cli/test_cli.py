@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from commands import names, refused, run
 
-from simdtex.commands import COMMANDS, job
+from simdtex.cli import job
+from simdtex.commands import COMMANDS
 from simdtex.io import image
 from simdtex.machine import memory
 from simdtex.model.source_map import load_source_map
