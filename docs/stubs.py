@@ -50,7 +50,7 @@ FUNCTIONS = (
     ("explain", "MrfOptions", {}, "", "", "Explanation"),
     ("replay", "MrfOptions", {}, "", "", "Replay"),
 )
-"""The functions: name, options, other types of parameters, and the switch that decides which of two types they return."""
+"""The functions: name, options, types of other parameters, and the switch between two types of results."""
 
 HEAD = '''\
 # SPDX-License-Identifier: BSD-3-Clause
