@@ -352,19 +352,6 @@ def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[
     return found
 
 
-def read_number(text: str, files: Files) -> int:
-    """Return the number, from 0, of the sample that an option names by its path as given or its number from 1."""
-    samples = files.samples.paths
-    if Path(text) in samples:
-        return samples.index(Path(text))
-    if text.isdecimal() and 1 <= int(text) <= len(samples):
-        return int(text) - 1
-    raise ValueError(
-        f"{files.flag} {text} is none of the samples; give the path of one as in the command, or its number, 1 to "
-        f"{len(samples)}"
-    )
-
-
 def read_map(path: Path, files: Files) -> Any:
     """Read a map of a simulation: of probabilities a table, too; any other a picture or a grid, channels in front."""
     from simdtex.io import grids, image
