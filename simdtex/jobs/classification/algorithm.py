@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from simdtex import schedules
 from simdtex.checkpoint import like
+from simdtex.driver import SingleRun
 from simdtex.jobs.classification.model import (
     MEANS,
     UNITS,
@@ -56,8 +57,8 @@ STEPS = 64
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A classification before it has a machine and a seed.
+class Classification(SingleRun):
+    """The job of `classify`: a classification before it has a machine and a seed.
 
     Attributes
     ----------
@@ -76,6 +77,7 @@ class Plan:
     classes: Sequence[Sequence[Region]] | Model
     names: dict[int, str]
     options: Options
+    channel_axis = None  # of labels
 
     def on(self, machine: Machine, seed: int) -> Run:
         """Return the run on a machine, with trained classes; raise if the memory does not suffice."""
@@ -127,7 +129,7 @@ class _Segment(NamedTuple):
 class Run:
     """A classification on a machine: rows are compared with the classes, then labels are relaxed, sweep by sweep."""
 
-    def __init__(self, machine: Machine, plan: Plan, model: Model, seed: int) -> None:
+    def __init__(self, machine: Machine, plan: Classification, model: Model, seed: int) -> None:
         self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
         self.labels = np.array([0, *plan.names], np.uint8)
         self.grid = Grid.of(plan.pixels.shape[:2], torus=False)

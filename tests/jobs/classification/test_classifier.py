@@ -11,7 +11,7 @@ from scipy.special import softmax
 from scipy.stats import multivariate_normal
 
 from simdtex.driver import drive
-from simdtex.jobs.classification.algorithm import Plan
+from simdtex.jobs.classification.algorithm import Classification
 from simdtex.jobs.classification.job import model, patterns
 from simdtex.jobs.classification.model import FEWEST_NEIGHBOURHOODS, MEANS, UNITS, Region, experts_of, learn, windowed
 from simdtex.jobs.classification.operations import (
@@ -249,7 +249,7 @@ CLASSES = [whole(stripes((40, 40))), whole(stripes((40, 44), True))]
 
 def planned(picture, classes=CLASSES, **options):
     names = {c + 1: f"class {c}" for c in range(len(classes))}
-    return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
+    return Classification(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
 
 
 def run_classifier(picture, classes=CLASSES, machine=REFERENCE, seed=1, **options):
@@ -558,7 +558,9 @@ def test_the_fit_compares_measures_with_their_variances():
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]
-    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0))
+    plan = Classification(
+        pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0)
+    )
     found, output = drive(plan, machine, 3)
     expected, theirs = drive(plan, REFERENCE, 3)
     assert (found == expected).all() and found.dtype == np.uint8
