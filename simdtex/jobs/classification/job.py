@@ -26,10 +26,10 @@ Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 def classify(
     image: ArrayLike,
-    textures: Textures | ArrayLike,
+    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike,
     *,
     masks: Mapping[str, Any] | None = None,
-    validation: Textures | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
     channel_axis: int | None = None,
     rng: Seed = None,
     device: Device = None,
@@ -111,10 +111,10 @@ def classify(
 
 def plan_classification(
     image: ArrayLike,
-    textures: Textures | ArrayLike,
+    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike,
     *,
     masks: Mapping[str, Any] | None = None,
-    validation: Textures | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
     channel_axis: int | None = None,
     **options: Any,
 ) -> Classification:

@@ -11,8 +11,8 @@ from scipy.special import softmax
 from scipy.stats import multivariate_normal
 
 from simdtex.driver import drive
+from simdtex.jobs.classification import model, patterns
 from simdtex.jobs.classification.algorithm import Classification
-from simdtex.jobs.classification.job import model, patterns
 from simdtex.jobs.classification.model import FEWEST_NEIGHBOURHOODS, MEANS, UNITS, Region, experts_of, learn, windowed
 from simdtex.jobs.classification.operations import (
     EXEMPLAR_MULTIPLE,
