@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import prod
 from typing import Any, NamedTuple
 
@@ -141,7 +140,9 @@ class Run:
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
         self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
+        self._on_host = [np.asarray(machine.get(one)) for one in self._levels]
         self._exemplars = [known.on(machine) for known in model.exemplars]
+        self._classes = machine.put(np.arange(len(plan.names), dtype=np.int32))
 
     def _check_schedule(self) -> None:
         _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), self._everywhere)
@@ -186,17 +187,12 @@ class Run:
             state.labels[:] = self._evidence(state.logs).argmax(0)
         return state._replace(done=end)
 
-    @cached_property
-    def _host_levels(self) -> list[NDArray[np.uint16]]:
-        """The levels of the picture in NumPy."""
-        return [np.asarray(self.machine.get(one)) for one in self._levels]
-
     def _patterned(self, first: int, end: int) -> NDArray[np.uint16]:
         """Return the logarithms of probabilities by the patterns around the sites of some rows, (classes, n, cols)."""
         slab = slice(max(0, first - len(NEAR) // 2), min(self.grid.rows, end + len(NEAR) // 2))
         here = np.zeros((slab.stop - slab.start, self.grid.cols), bool)
         here[first - slab.start : end - slab.start] = True
-        means, _ = windowed(self.machine, patterns(self._host_levels, slab), np.ones_like(here), NEAR, here)
+        means, _ = windowed(self.machine, patterns(self._on_host, slab), np.ones_like(here), NEAR, here)
         return self.model.discriminant.logarithms(means / float(MEANS)).reshape(-1, end - first, self.grid.cols)
 
     def _single(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
@@ -214,10 +210,6 @@ class Run:
             for one in total:
                 one[:] = blurred(one, gaussian(self.options.smoothing))
         return total
-
-    @cached_property
-    def _classes(self) -> Array:
-        return self.machine.put(np.arange(len(self.plan.names), dtype=np.int32))
 
     def _votes(self, labels: Array) -> Array:
         """Return the votes of the labels around each site for every class."""
@@ -292,7 +284,7 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
-            patterned, segments = patterns(self._host_levels, slab), []
+            patterned, segments = patterns(self._on_host, slab), []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment

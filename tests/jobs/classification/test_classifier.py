@@ -400,6 +400,10 @@ def test_whole_neighbourhoods_lie_within_a_mask_and_centres_of_strokes_alone_do(
     assert model._centres(edge, 2).sum() == 16 * 16
 
 
+def taught(scale, experts, regions, seed=1, **options):
+    return model._Class(REFERENCE, scale, experts, Options(**{"exemplars": 2**16} | options), seed, 0, regions)
+
+
 def test_a_stroke_is_learned_from_what_is_around_it_alone():
     """Its exemplars are those of the whole picture, whatever lies further away."""
     picture = texture((90, 100))
@@ -409,8 +413,8 @@ def test_a_stroke_is_learned_from_what_is_around_it_alone():
     found = []
     for one in (picture, np.where(ndimage.binary_dilation(sites, np.ones((3, 3)), 13), picture, 255 - picture)):
         region = Region(one[..., None], sites, whole=False)
-        known = model._Class(REFERENCE, Scale(Pictures((one[..., None],)), 512), experts, [region])
-        found.append([known.draw(REFERENCE, expert, 2**16, 1, 0) for expert in experts])
+        known = taught(Scale(Pictures((one[..., None],)), 512), experts, [region])
+        found.append([known.draw(expert) for expert in experts])
         assert known.regions[0].sites.sum() == 400 and known.regions[0].sites.shape == (46, 46)
     assert all((a == b).all() for a, b in zip(*found, strict=True))
 
@@ -418,19 +422,16 @@ def test_a_stroke_is_learned_from_what_is_around_it_alone():
 def test_exemplars_of_a_judged_part_and_of_validation_are_not_drawn():
     values = np.repeat(np.arange(40, dtype=np.uint8), 40).reshape(40, 40) * 3
     regions = [*whole(values), *whole(np.full((20, 20), 200, np.uint8), judged=True)]
-    options = Options(levels=1)
-    expert = experts_of(options, 1)[0]
-    scale = Scale(Pictures(tuple(one.pixels for one in regions)), 512)
-    known = model._Class(REFERENCE, scale, [expert], regions)
+    expert = experts_of(Options(), 1)[0]
+    given = Scale(Pictures(tuple(one.pixels for one in regions)), 512), [expert], regions
     upper = np.zeros((40, 40), bool)
     upper[:20] = True
-    drawn = known.draw(REFERENCE, expert, 2**16, 1, 0)
+    drawn = taught(*given).draw(expert)
     assert len(drawn) == 38 * 38 and drawn.max() < 200
-    assert known.draw(REFERENCE, expert, 2**16, 1, 0, model._Part(0, upper))[:, 0].min() == 60
-    few = known.draw(REFERENCE, expert, 50, 1, 0)
+    assert taught(*given).draw(expert, (0, upper))[:, 0].min() == 60
+    few, again, other = (taught(*given, seed, exemplars=50).draw(expert) for seed in (1, 1, 2))
     assert len(few) == 50
-    assert (few == known.draw(REFERENCE, expert, 50, 1, 0)).all()
-    assert (few != known.draw(REFERENCE, expert, 50, 2, 0)).any()
+    assert (few == again).all() and (few != other).any()
 
 
 def test_a_validation_picture_widens_what_is_known():
