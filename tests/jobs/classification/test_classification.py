@@ -280,6 +280,7 @@ BAD = {
         TypeError,
         "unknown option 'orders' of the method 'classification' .did you mean",
     ),
+    "a misspelt input": ({"mask": {}}, TypeError, "did you mean 'masks'"),
     "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),
     "an option out of range": ({"unknown": 2}, ValueError, "unknown is 2; give at most 1"),
     "a schedule of many steps": ({"schedule": "raster"}, ValueError, "takes more than 64 steps"),

@@ -194,6 +194,7 @@ def test_terrain_has_the_texture_of_each_corner():
         (GRAVEL, 15, {}, "give 16 or more"),
         (GRAVEL, (16, 16, 16), {}, "two integers"),
         (GRAVEL, 24, {"colours": 4}, "colours is 4; give 3 or fewer"),
+        (GRAVEL, 24, {"colors": 3}, "did you mean 'colours'"),
         ([GRAVEL, GRASS], 24, {"colours": 3}, "3 colours and 2 samples"),
         ([GRAVEL] * 4, 24, {}, "4 samples"),
         (GRAVEL[:30, :30], 128, {}, "40x40 known pixels"),
