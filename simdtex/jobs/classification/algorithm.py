@@ -59,19 +59,11 @@ STEPS = 64
 class Classification(SingleRun):
     """The job of `classify`: a classification before it has a machine and a seed.
 
-    Attributes
-    ----------
-    pixels : (rows, cols, B) array
-    unknown : (rows, cols) bool array
-        Pixels without a value, which are labelled 0.
-    classes : sequence of sequences of Region, or Model
-        The regions of each class, or a model trained on them.
-    names : dict of int to str
-        The label of each class, 1 to 254, and its name.
-    options : Options
+    ``image`` (rows, cols, B) has no value at the pixels ``unknown`` (rows, cols), which get the label 0. ``classes``
+    are the regions of each class, or a model that is trained on them, and ``names`` those of the labels, 1 to 254.
     """
 
-    pixels: NDArray[Any]
+    image: NDArray[Any]
     unknown: Mask
     classes: Sequence[Sequence[Region]] | Model
     names: dict[int, str]
@@ -80,7 +72,7 @@ class Classification(SingleRun):
 
     def on(self, machine: Machine, seed: int) -> Run:
         """Return the run on a machine, with trained classes; raise if the memory does not suffice."""
-        shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
+        shape, count, bands = self.image.shape[:2], len(self.names), self.image.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
         part = min(sites, max(SITES_AT_ONCE, FEWEST_ROWS * shape[1]))
@@ -131,7 +123,7 @@ class Run:
     def __init__(self, machine: Machine, plan: Classification, model: Model, seed: int) -> None:
         self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
         self.labels = np.array([0, *plan.names], np.uint8)
-        self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
+        self.grid = Grid.of(plan.image.shape[:2], torus=False)
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
         self._everywhere = schedules.Masked(self.grid)
@@ -139,7 +131,7 @@ class Run:
         self._taps, self._coupling = gaussian(plan.options.window), machine.put(gaussian(plan.options.coupling))
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
-        self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
+        self._levels = prepared(machine, model.scale, plan.image, model.experts[-1].level + 1)
         self._on_host = [np.asarray(machine.get(one)) for one in self._levels]
         self._exemplars = [known.on(machine) for known in model.exemplars]
         self._classes = machine.put(np.arange(len(plan.names), dtype=np.int32))
@@ -154,7 +146,7 @@ class Run:
 
     def begin(self) -> State:
         """Return the state before any comparison."""
-        shape = self.plan.pixels.shape[:2]
+        shape = self.plan.image.shape[:2]
         logs = np.zeros((len(self.model.experts) + 1, len(self.plan.names), *shape), np.uint16)
         return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 

@@ -22,14 +22,14 @@ from simdtex.methods.pyramid.stretched import Stretched
 class Mixture:
     """A mixture of pictures (rows, cols, channels) before it has a machine and a seed.
 
-    ``weights`` are those of each picture in the pattern; ``sides`` are the pictures of low and high frequencies, and
-    the split between them.
+    ``average`` are the weights of the pictures in the pattern, and ``sides`` the pictures of low and high frequencies
+    and the split between them.
     """
 
     pictures: list[NDArray[Any]]
     shape: tuple[int, int]
     options: Options
-    weights: list[float]
+    average: list[float]
     sides: tuple[int, int, int | None] | None
     palette: int | None
 
@@ -39,9 +39,9 @@ class Mixture:
         Blended samples are decorrelated together, so that their channels have the same meaning.
         """
         pictures, options = self.pictures, self.options
-        used = [i for i, weight in enumerate(self.weights) if weight]
+        used = [i for i, weight in enumerate(self.average) if weight]
         shown = [] if self.palette is None else [self.palette]
-        weights = [self.weights[i] for i in used]
+        weights = [self.average[i] for i in used]
         sizes = (side for i in (*used, *shown) for side in pictures[i].shape[:2])
         levels = pyramid.number_of_levels(options, *self.shape, *sizes)
         memory.require(machine, max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
