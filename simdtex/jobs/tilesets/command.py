@@ -74,7 +74,7 @@ def tileset(
         partial(tileset, lead.array, (rows, cols), colours=colours, channel_axis=lead.channel_axis, **given(options)),
         f"{colours**4} tiles of {cols}x{rows}",
         str(output),
-        [partial(write, output, maps, names, normals, (rows, cols))],
+        [partial(write, output, maps, names, normals)],
         lead.limits,
         lambda made, run: notes(run),
     )
@@ -112,15 +112,7 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
     return maps
 
 
-def write(
-    output: Path,
-    maps: list[Also],
-    names: list[str],
-    normals: bool,
-    shape: tuple[int, int],
-    made: NDArray[Any],
-    run: Any,
-) -> None:
+def write(output: Path, maps: list[Also], names: list[str], normals: bool, made: NDArray[Any], run: Any) -> None:
     """Write a set into a folder: the packed pictures and the tiles of all maps, and what other programs read."""
     from simdtex.figures.sheet import fitted, rgb
     from simdtex.io import image
@@ -129,8 +121,8 @@ def write(
     from simdtex.jobs.tilesets.corners import corners_of, laid, numbers, plane, torus
     from simdtex.model.source_map import unit_normals
 
-    (rows, cols), colours = shape, len(names)
-    grid = corners_of(torus(colours))
+    colours, grid = len(names), corners_of(torus(len(names)))
+    rows, cols = (side // len(grid) for side in made.shape[:2])
     if normals and made.ndim == 3:
         made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
     corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))
