@@ -104,18 +104,16 @@ def classify(
     if true is not None and true.shape != whole.sizes[0]:
         sizes = f"{truth} is {size_text(true)} and {picture} {size_text(whole.array)}"
         raise ValueError(f"{sizes}; give labels of its size")
-    if bool(textures) == bool(strokes):
-        raise ValueError("give --texture once for each class, or --strokes")
-    if strokes and validation:
-        raise ValueError("--validation requires --texture; leave it out")
-    pixels: NDArray[Any] = whole.array
-    if strokes:
-        known: Any = read_labels(strokes)
-        names = {int(label): str(label) for label in np.unique(known[known > 0])}
-    else:
-        known = read_classes("--texture", textures, whole)
-        names = dict(enumerate(known, 1))
+    known: Any = read_classes("--texture", textures, whole)
     judged = read_classes("--validation", validation, whole)
+    if bool(known) == bool(strokes):
+        raise ValueError("give --texture once for each class, or --strokes")
+    if strokes and judged:
+        raise ValueError("--validation requires --texture; leave it out")
+    names, pixels = dict(enumerate(known, 1)), whole.array
+    if strokes:
+        known = read_labels(strokes)
+        names = {int(label): str(label) for label in np.unique(known[known > 0])}
     image.check_writable(output, np.uint8, 1, labels=True)
     place = whole.metadata and whole.metadata.geo and whole.metadata.geo.place()
     if confidence:
