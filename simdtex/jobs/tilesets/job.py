@@ -19,7 +19,7 @@ from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_cha
 from simdtex.inputs import check_samples
 from simdtex.jobs.tilesets.corners import CYCLE, TORUS, corners_of, torus
 from simdtex.machine import Machine
-from simdtex.maspar.accounting import accounting
+from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
@@ -217,7 +217,7 @@ class Tileset:
                     canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
                 seen = callback and partial(_show, callback, job, begin / every, grid.size / every)
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                plan, account = self.plan(canvas, grid, begin * rows * cols), accounting(self.options.array)
+                plan, account = self.plan(canvas, grid, begin * rows * cols), observers(self.options.array)
                 made, output = drive(plan, machine, seed, seen, now, account)
                 finished.append((Canvas(made, np.asarray(output.source)), output.statistics | {"job": job}))
                 inside = None
