@@ -25,9 +25,9 @@ from skimage.transform import downscale_local_mean, resize
 import simdtex
 from simdtex.figures.sheet import contact_sheet, magnified
 from simdtex.io.image import write
-from simdtex.jobs.studies import report as schedules
 from simdtex.jobs.tilesets.corners import numbers, plane
 from simdtex.jobs.tilesets.files import glsl
+from simdtex.maspar import report as schedules
 from simdtex.model.display import source_colours, temperature_colours
 from simdtex.model.lattice import Grid
 from simdtex.model.source_map import apply_source_map
@@ -259,11 +259,42 @@ def array():
     """A frame of the film of schedules of the array, for gingham, and the pictures that they make."""
     names, frame = ("coloring", "checkerboard", "synchronous", "raster"), 57
     sample = runpy.run_path(str(HERE.parent / "benchmarks" / "drawings.py"))["gingham"]()
-    pictures = {name: schedules.develop(sample, (64, 64), name, order=18, rng=1) for name in names}
+    pictures = {
+        name: schedules.develop(sample, (64, 64), name, channel_axis=None, order=18, rng=1, device=None)
+        for name in names
+    }
     shown = {name: schedules.steps(name, Grid.of((64, 64)), 18, 1) for name in names}
     with PIL.Image.open(io.BytesIO(schedules.film(shown, pictures))) as film:
         film.seek(frame)
         film.convert("RGB").save(HERE / "_static" / "array.png", optimize=True)
+
+
+def house():
+    """The rooms of the package: how often each imports from those above it, and its lines beside its budget."""
+    sys.path.insert(0, str(HERE.parent / "tests"))
+    import test_house as rules
+    from matplotlib.figure import Figure
+
+    names = [" ".join(room).replace("jobs.", "").replace("methods.", "") for room in rules.ROOMS]
+    names[-1] = "the top"
+    knows, lines = np.zeros((len(names), len(names)), int), np.zeros(len(names), int)
+    for path in rules.MODULES:
+        here = rules.room(rules.dotted(path))
+        lines[here] += len(path.read_text(encoding="utf-8").splitlines())
+        for other in rules.imports(path):
+            knows[here, rules.room(other)] += 1
+    figure = Figure((8, 5.6), layout="constrained")
+    table, bars = figure.subplots(1, 2, sharey=True, width_ratios=(3, 1))
+    table.imshow(np.ma.masked_equal(np.log1p(knows), 0), cmap="Blues", aspect="auto")
+    table.set_xticks(range(len(names)), names, rotation=90)
+    table.set_yticks(range(len(names)), names)
+    for (row, col), count in np.ndenumerate(knows):
+        if count:
+            table.text(col, row, count, ha="center", va="center", fontsize=6, color="k" if count < 20 else "w")
+    bars.barh(range(len(names)), list(rules.ROOMS.values()), color="#dde5ee")
+    bars.barh(range(len(names)), lines, height=0.5, color="#3c5c82")
+    bars.set_xlabel("lines, and the budget")
+    figure.savefig(HERE / "_static" / "house.png", dpi=110)
 
 
 def tileset():
@@ -283,7 +314,7 @@ WISHES = (
     *(proportions, shares, methods, alpha, paper),
 )
 READERS = (materials, maps, geoscience, tileset)
-RUN = {"research": research, "reservoir": reservoir, "light": light, "array": array}
+RUN = {"research": research, "reservoir": reservoir, "light": light, "array": array, "house": house}
 
 
 def main():

@@ -1,52 +1,56 @@
-"""The types of the public names for editors and type checkers: writes ``simdtex/__init__.pyi`` from the tables.
+"""The types of the public names for editors and type checkers: writes ``simdtex/__init__.pyi``.
 
+The parameters are those of the functions, and the options those of the methods' tables; only here are they together.
 ``python docs/stubs.py`` writes the file; with ``--check``, as in ``make lint``, it exits with 1 if it would differ.
 """
 
 import sys
-from importlib import import_module
+from inspect import Parameter, signature
 from pathlib import Path
 from textwrap import fill
 
 import simdtex
-from simdtex.declared import inputs, parameter_types
-from simdtex.jobs.why.job import NOT_REPLAYED
+from simdtex.jobs.classification import options as classification
+from simdtex.methods import mrf
+from simdtex.methods.multires import options as multires
+from simdtex.methods.pyramid import options as pyramid
+from simdtex.methods.pyramid import solid
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, table
 from simdtex.schedules import SCHEDULES
 
 FILE = Path(simdtex.__file__).with_name("__init__.pyi")
 
 PAIR = "tuple[float, float]"
-PICTURE, TUPLE = "NDArray[Any]", "tuple[NDArray[Any], {}]"
 
 METHODS = {
-    "Mrf": "methods.mrf",
-    "Multires": "methods.multires.options",
-    "Pyramid": "methods.pyramid.options",
-    "Solid": "methods.pyramid.solid",
-    "Classifier": "jobs.classification.options",
+    "MrfOptions": mrf.Options,
+    "MultiresOptions": multires.Options,
+    "PyramidOptions": pyramid.Options,
+    "SolidOptions": solid.Options,
+    "ClassificationOptions": classification.Options,
 }
-"""The tables of options, by the name of their class here."""
+"""The tables of options, by the name of their type."""
+
+PICTURE, ALSO = "NDArray[Any]", "tuple[NDArray[Any], {}]"
+SOURCE, OUTPUT = ALSO.format("OutputWithSource"), ALSO.format("Output")
+OF_MRF = ("mask", "known", "known_source", "guide", "store")
+"""The parameters of `synthesize` that only the method ``mrf`` has."""
 
 FUNCTIONS = (
-    ("synth", "synthesize", "Mrf", "Synthesize", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),
-    (
-        "synth",
-        "synthesize",
-        "Multires",
-        "SynthesizeMultires",
-        ("full_output", TUPLE.format("OutputWithSource"), PICTURE),
-    ),
-    ("synth", "synthesize", "Pyramid", "SynthesizePyramid", ("full_output", TUPLE.format("Output"), PICTURE)),
-    ("solid", "synthesize_solid", "Solid", "SynthesizeSolid", ("full_output", TUPLE.format("Output"), PICTURE)),
-    ("fill", "fill", "Mrf", "Fill", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),
-    ("extend", "extend", "Mrf", "Extend", ("full_output", TUPLE.format("OutputWithSource"), PICTURE)),
-    ("mix", "mix", "Pyramid", "Mix", ("full_output", TUPLE.format("Output"), PICTURE)),
-    ("classify", "classify", "Classifier", "Classify", ("full_output", TUPLE.format("Output"), PICTURE)),
-    ("simulate", "simulate", "Mrf", "Simulate", ("source", "xarray.Dataset", "xarray.DataArray")),
-    ("estimate", "estimate", "", "Estimate", ("", "", "xarray.Dataset")),
+    ("synthesize", "MrfOptions", {"method": "Literal['mrf'] = ..."}, "full_output", SOURCE, PICTURE),
+    ("synthesize", "MultiresOptions", {"method": "Literal['multires']"}, "full_output", SOURCE, PICTURE),
+    ("synthesize", "PyramidOptions", {"method": "Literal['pyramid']"}, "full_output", OUTPUT, PICTURE),
+    ("synthesize_solid", "SolidOptions", {}, "full_output", OUTPUT, PICTURE),
+    ("fill", "MrfOptions", {}, "full_output", SOURCE, PICTURE),
+    ("extend", "MrfOptions", {}, "full_output", SOURCE, PICTURE),
+    ("mix", "PyramidOptions", {}, "full_output", OUTPUT, PICTURE),
+    ("classify", "ClassificationOptions", {}, "full_output", OUTPUT, PICTURE),
+    ("simulate", "MrfOptions", {}, "source", "xarray.Dataset", "xarray.DataArray"),
+    ("estimate", "", {}, "", "", "xarray.Dataset"),
+    ("explain", "MrfOptions", {}, "", "", "Explanation"),
+    ("replay", "MrfOptions", {}, "", "", "Replay"),
 )
-"""The functions: job, name, options, keywords, and the switch that decides which of two types they return."""
+"""The functions: name, options, types of other parameters, and the switch between two types of results."""
 
 HEAD = '''\
 # SPDX-License-Identifier: BSD-3-Clause
@@ -56,9 +60,8 @@ HEAD = '''\
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Required, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
-import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
@@ -71,10 +74,9 @@ ScheduleName = Literal[
 ]
 '''
 
-
 USED = """\
+from simdtex.driver import Device, Kept, Seed
 from simdtex.io.hard_data import HardData
-from simdtex.machine import Machine
 from simdtex.jobs.why.replay import Replay
 from simdtex.model.explanation import Explanation
 from simdtex.run import Callback, OutputWithSource
@@ -93,75 +95,50 @@ def type_of(one):
     return f"{found} | None" if one.default is None else found
 
 
-def options_of(name, method):
-    """The class of the options of a method."""
-    found = table(import_module(f"simdtex.{method}").Options)
-    known = table(import_module("simdtex.methods.pyramid.options").Options) if name == "Solid" else {}
-    lines = [f"class {name}Options({'PyramidOptions' if known else 'TypedDict'}, total=False):"]
+def options_type(name, options):
+    """The type of the options of a method."""
+    found = table(options)
+    known = table(pyramid.Options) if options is solid.Options else {}
+    lines = [f"class {name}({'PyramidOptions' if known else 'TypedDict'}, total=False):"]
     lines += [f"    preset: {type_of(PRESET)}"] if has_presets(found) and not known else []
     return lines + [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known]
 
 
-def keywords_of(job, options, name, switch):
-    """The class of what a function takes by name."""
-    other = name.removeprefix("Synthesize") if job == "synth" else ""
-    bases = ", ".join([f"{options}Options"] * bool(options)) or "TypedDict"
-    lines = [f"class {name}Keywords({bases}, total=False):"]
-    for one, written in parameter_types(job).items():
-        if inputs(job)[one].positional or one == switch or (other and inputs(job)[one].method):
+def parameters(function, options, types, switch):
+    """The parameters of a function but for the switch: those before the star, and those after it."""
+    before, after = [], []
+    for name, one in signature(getattr(simdtex, function)).parameters.items():
+        alone = types.get("method", "mrf").find("mrf") < 0 and name in OF_MRF
+        if name == switch or alone or one.kind is Parameter.VAR_KEYWORD:
             continue
-        lines.append(f"    {one}: {written}")
-        if one == "method":
-            lines[-1] = f"    method: Required[Literal[{other.lower()!r}]]" if other else "    method: Literal['mrf']"
-    return lines
+        default = "" if one.default is Parameter.empty else " = ..."
+        written = f"{name}: {types.get(name, f'{one.annotation}{default}')}"
+        (after if one.kind is Parameter.KEYWORD_ONLY else before).append(written)
+    return before, after + ([f"**options: Unpack[{options}]"] if options else [])
 
 
-def overloads(job, function, name, switch):
+def overloads(function, options, types, switch, with_it, without):
     """The signatures of a function, one for each value of the switch."""
-    own = inputs(job)
-    given = [
-        f"{one}: {written}{'' if own[one].default is not None else ' = ...'}"
-        for one, written in parameter_types(job).items()
-        if own[one].positional
-    ]
-    by_switch, with_it, without = switch
-    ways = [(f", {by_switch}: Literal[True]", with_it), (f", {by_switch}: Literal[False] = ...", without)]
-    for more, found in ways if by_switch else [("", without)]:
-        star = ", *" if more else ""
-        if by_switch:
+    before, after = parameters(function, options, types, switch)
+    ways = [([f"{switch}: Literal[True]"], with_it), ([f"{switch}: Literal[False] = ..."], without)]
+    for more, found in ways if switch else [([], without)]:
+        if switch:
             yield "@overload"
-        yield f"def {function}({', '.join(given)}{star}{more}, **options: Unpack[{name}Keywords]) -> {found}: ..."
+        yield f"def {function}({', '.join([*before, '*', *more, *after])}) -> {found}: ..."
 
 
 def stub():
     """The text of the file."""
-    public = {function for _, function, *_ in FUNCTIONS} | {"explain", "replay", "ensemble", "quality"}
-    homes = {one: home for home, names in simdtex._NAMES.items() for one in names if one not in public}
-    found = [f"from {home} import {one} as {one}" for one, home in homes.items()]
-    found += [
-        f"from simdtex.jobs.{room} import {one} as {one}"
-        for room, one in (("simulation", "ensemble"), ("studies", "quality"))
-    ]
-    found += [*USED.splitlines()]
+    typed = {function for function, *_ in FUNCTIONS}
+    homes = {one: home for home, names in simdtex._NAMES.items() for one in names if one not in typed}
+    found = [f"from {home} import {one} as {one}" for one, home in homes.items()] + USED.splitlines()
     found.sort(key=lambda line: (line.split()[1], " as " in line, line))
     written = fill(str(list(SCHEDULES))[1:-1], 116).replace("\n", "\n    ")
     lines = [HEAD.replace("IMPORTS", "\n".join(found)).replace("SCHEDULES", written)]
-    for name, method in METHODS.items():
-        lines += [*options_of(name, method), ""]
-    for job, _, options, name, (switch, *_) in FUNCTIONS:
-        lines += [*keywords_of(job, options, name, switch), ""]
-    kept = [one for one in parameter_types("synth") if one not in NOT_REPLAYED]
-    lines += ["class ReplayKeywords(MrfOptions, total=False):"]
-    lines += [f"    {one}: {parameter_types('synth')[one]}" for one in kept if not inputs("synth")[one].positional]
-    lines += [""]
-    for job, function, _, name, switch in FUNCTIONS:
-        lines += overloads(job, function, name, switch)
-    shape = "sample: ArrayLike, shape: tuple[int, int]"
-    lines += [
-        f"def replay({shape}, **options: Unpack[ReplayKeywords]) -> Replay: ...",
-        f"def explain(\n    {shape}, site: tuple[int, int], *, level: int = ..., sweep: int | None = ...,\n"
-        "    **options: Unpack[ReplayKeywords],\n) -> Explanation: ...",
-    ]
+    for name, options in METHODS.items():
+        lines += [*options_type(name, options), ""]
+    for one in FUNCTIONS:
+        lines += overloads(*one)
     return "\n".join(lines).replace("'", '"') + "\n"
 
 
@@ -170,7 +147,7 @@ def main(arguments):
     if "--check" not in arguments:
         FILE.write_text(stub(), encoding="utf-8")
     elif not FILE.exists() or FILE.read_text(encoding="utf-8") != stub():
-        sys.exit(f"{FILE.name} does not follow from the tables of options and inputs; run: python docs/stubs.py")
+        sys.exit(f"{FILE.name} does not follow from the functions and the tables of options; run: python docs/stubs.py")
 
 
 if __name__ == "__main__":

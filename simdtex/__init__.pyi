@@ -5,13 +5,13 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Required, TypedDict, Unpack, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
-import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint as Checkpoint
+from simdtex.driver import Device, Kept, Seed
 from simdtex.figures.show import show as show
 from simdtex.io.grids import read_grid as read_grid
 from simdtex.io.grids import write_grid as write_grid
@@ -25,7 +25,6 @@ from simdtex.jobs.synthesis.job import lcpdf as lcpdf
 from simdtex.jobs.tilesets.job import tileset as tileset
 from simdtex.jobs.why.replay import Replay
 from simdtex.live.widget import Live as Live
-from simdtex.machine import Machine
 from simdtex.machine import open_machine as open_machine
 from simdtex.machine.devices import DeviceError as DeviceError
 from simdtex.machine.devices import devices as devices
@@ -103,7 +102,7 @@ class SolidOptions(PyramidOptions, total=False):
     solids: Literal["turns", "average"]
     slices: Literal["each", "together"]
 
-class ClassifierOptions(TypedDict, total=False):
+class ClassificationOptions(TypedDict, total=False):
     order: int
     levels: int
     exemplars: int
@@ -116,180 +115,42 @@ class ClassifierOptions(TypedDict, total=False):
     unknown: float
     window: float
 
-class SynthesizeKeywords(MrfOptions, total=False):
-    mask: ArrayLike | Sequence[ArrayLike] | None
-    known: ArrayLike | HardData | str | os.PathLike[str] | None
-    guide: tuple[Any, Any] | None
-    light: Literal["keep", "even"]
-    method: Literal["mrf"]
-    known_source: ArrayLike | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class SynthesizeMultiresKeywords(MultiresOptions, total=False):
-    light: Literal["keep", "even"]
-    method: Required[Literal["multires"]]
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class SynthesizePyramidKeywords(PyramidOptions, total=False):
-    light: Literal["keep", "even"]
-    method: Required[Literal["pyramid"]]
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class SynthesizeSolidKeywords(SolidOptions, total=False):
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class FillKeywords(MrfOptions, total=False):
-    grow: int
-    feather: int
-    light: Literal["keep", "even"] | None
-    sample: ArrayLike | None
-    reach: int | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class ExtendKeywords(MrfOptions, total=False):
-    light: Literal["keep", "even"]
-    left: int
-    right: int
-    top: int
-    bottom: int
-    seamless: bool | Literal["x", "y"]
-    band: int | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class MixKeywords(PyramidOptions, total=False):
-    palette: int | None
-    pattern: int | None
-    average: Sequence[float] | None
-    low: int | None
-    high: int | None
-    split: int | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class ClassifyKeywords(ClassifierOptions, total=False):
-    masks: Mapping[str, Any] | None
-    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class SimulateKeywords(MrfOptions, total=False):
-    mask: ArrayLike | Sequence[ArrayLike] | None
-    known: ArrayLike | HardData | str | os.PathLike[str] | None
-    origin: Sequence[float] | None
-    cell: Sequence[float] | None
-    like: Any
-    several: Literal["refuse", "mean", "most"]
-    outside: Literal["refuse", "skip"]
-    guide: tuple[Any, Any] | None
-    first: int
-    shape: tuple[int, ...] | None
-    region: ArrayLike | None
-    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None
-    image_map: ArrayLike | None
-    rotation: ArrayLike | None
-    scale: ArrayLike | None
-    jobs: int | None
-    device: str | Machine | None
-    callback: Callback | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-    checkpoint: str | os.PathLike[str] | Checkpoint | None
-
-class EstimateKeywords(TypedDict, total=False):
-    mask: ArrayLike | Sequence[ArrayLike] | None
-    known: ArrayLike | HardData | str | os.PathLike[str] | None
-    origin: Sequence[float] | None
-    cell: Sequence[float] | None
-    like: Any
-    several: Literal["refuse", "mean", "most"]
-    outside: Literal["refuse", "skip"]
-    shape: tuple[int, ...] | None
-    categorical: bool
-    nearest: int
-    reach: int | None
-    bandwidth: float
-    device: str | Machine | None
-    callback: Callback | None
-
-class ReplayKeywords(MrfOptions, total=False):
-    mask: ArrayLike | Sequence[ArrayLike] | None
-    known: ArrayLike | HardData | str | os.PathLike[str] | None
-    guide: tuple[Any, Any] | None
-    light: Literal["keep", "even"]
-    known_source: ArrayLike | None
-    device: str | Machine | None
-    channel_axis: int | None
-    rng: int | np.random.Generator | None
-
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthesizeKeywords]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthesizeKeywords]) -> NDArray[Any]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthesizeMultiresKeywords]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["multires"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MultiresOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthesizeMultiresKeywords]) -> NDArray[Any]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["multires"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MultiresOptions]) -> NDArray[Any]: ...
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthesizePyramidKeywords]) -> tuple[NDArray[Any], Output]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["pyramid"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[PyramidOptions]) -> tuple[NDArray[Any], Output]: ...
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthesizePyramidKeywords]) -> NDArray[Any]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["pyramid"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[PyramidOptions]) -> NDArray[Any]: ...
 @overload
-def synthesize_solid(sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SynthesizeSolidKeywords]) -> tuple[NDArray[Any], Output]: ...
+def synthesize_solid(sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[SolidOptions]) -> tuple[NDArray[Any], Output]: ...
 @overload
-def synthesize_solid(sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthesizeSolidKeywords]) -> NDArray[Any]: ...
+def synthesize_solid(sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[False] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[SolidOptions]) -> NDArray[Any]: ...
 @overload
-def fill(image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillKeywords]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def fill(image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], grow: int = ..., feather: int = ..., light: Literal["keep", "even"] | None = ..., sample: ArrayLike | Sequence[ArrayLike] | None = ..., reach: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def fill(image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillKeywords]) -> NDArray[Any]: ...
+def fill(image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., grow: int = ..., feather: int = ..., light: Literal["keep", "even"] | None = ..., sample: ArrayLike | Sequence[ArrayLike] | None = ..., reach: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
 @overload
-def extend(image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendKeywords]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def extend(image: ArrayLike, *, full_output: Literal[True], left: int = ..., right: int = ..., top: int = ..., bottom: int = ..., seamless: bool | Literal["x", "y"] = ..., band: int | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def extend(image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendKeywords]) -> NDArray[Any]: ...
+def extend(image: ArrayLike, *, full_output: Literal[False] = ..., left: int = ..., right: int = ..., top: int = ..., bottom: int = ..., seamless: bool | Literal["x", "y"] = ..., band: int | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
 @overload
-def mix(samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixKeywords]) -> tuple[NDArray[Any], Output]: ...
+def mix(samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], palette: int | None = ..., pattern: int | None = ..., average: Sequence[float] | None = ..., low: int | None = ..., high: int | None = ..., split: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[PyramidOptions]) -> tuple[NDArray[Any], Output]: ...
 @overload
-def mix(samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[MixKeywords]) -> NDArray[Any]: ...
+def mix(samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., palette: int | None = ..., pattern: int | None = ..., average: Sequence[float] | None = ..., low: int | None = ..., high: int | None = ..., split: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[PyramidOptions]) -> NDArray[Any]: ...
 @overload
-def classify(image: ArrayLike, textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike, *, full_output: Literal[True], **options: Unpack[ClassifyKeywords]) -> tuple[NDArray[Any], Output]: ...
+def classify(image: ArrayLike, textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike, *, full_output: Literal[True], masks: Mapping[str, Any] | None = ..., validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[ClassificationOptions]) -> tuple[NDArray[Any], Output]: ...
 @overload
-def classify(image: ArrayLike, textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ClassifyKeywords]) -> NDArray[Any]: ...
+def classify(image: ArrayLike, textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike, *, full_output: Literal[False] = ..., masks: Mapping[str, Any] | None = ..., validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[ClassificationOptions]) -> NDArray[Any]: ...
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[True], **options: Unpack[SimulateKeywords]) -> xarray.Dataset: ...
+def simulate(training: ArrayLike | Sequence[ArrayLike], n: int, *, source: Literal[True], mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., origin: Sequence[float] | None = ..., cell: Sequence[float] | None = ..., like: Any = ..., several: Literal["refuse", "mean", "most"] = ..., outside: Literal["refuse", "skip"] = ..., guide: tuple[Any, Any] | None = ..., first: int = ..., shape: tuple[int, ...] | None = ..., region: ArrayLike | None = ..., probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = ..., image_map: ArrayLike | None = ..., rotation: ArrayLike | None = ..., scale: ArrayLike | None = ..., jobs: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> xarray.Dataset: ...
 @overload
-def simulate(training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Unpack[SimulateKeywords]) -> xarray.DataArray: ...
-def estimate(training: ArrayLike, **options: Unpack[EstimateKeywords]) -> xarray.Dataset: ...
-def replay(sample: ArrayLike, shape: tuple[int, int], **options: Unpack[ReplayKeywords]) -> Replay: ...
-def explain(
-    sample: ArrayLike, shape: tuple[int, int], site: tuple[int, int], *, level: int = ..., sweep: int | None = ...,
-    **options: Unpack[ReplayKeywords],
-) -> Explanation: ...
+def simulate(training: ArrayLike | Sequence[ArrayLike], n: int, *, source: Literal[False] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., origin: Sequence[float] | None = ..., cell: Sequence[float] | None = ..., like: Any = ..., several: Literal["refuse", "mean", "most"] = ..., outside: Literal["refuse", "skip"] = ..., guide: tuple[Any, Any] | None = ..., first: int = ..., shape: tuple[int, ...] | None = ..., region: ArrayLike | None = ..., probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = ..., image_map: ArrayLike | None = ..., rotation: ArrayLike | None = ..., scale: ArrayLike | None = ..., jobs: int | None = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> xarray.DataArray: ...
+def estimate(training: ArrayLike | Sequence[ArrayLike], *, mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., origin: Sequence[float] | None = ..., cell: Sequence[float] | None = ..., like: Any = ..., several: Literal["refuse", "mean", "most"] = ..., outside: Literal["refuse", "skip"] = ..., shape: tuple[int, ...] | None = ..., categorical: bool = ..., nearest: int = ..., reach: int | None = ..., bandwidth: float = ..., device: Device = ..., callback: Callback | None = ...) -> xarray.Dataset: ...
+def explain(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], site: tuple[int, int], *, level: int = ..., sweep: int | None = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., **options: Unpack[MrfOptions]) -> Explanation: ...
+def replay(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., **options: Unpack[MrfOptions]) -> Replay: ...

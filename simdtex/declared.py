@@ -337,30 +337,6 @@ class Solid(Common):
 
 
 @declared
-class Tileset(Common, Lit):
-    """The inputs of `simdtex.tileset`."""
-
-    sample: ArrayLike = needed(
-        Data(f"{PICTURE}; or a list of such"),
-        doc="The texture, or a list of two or three of one type, such as grass and sand: those of the corners.",
-        checker="samples",
-        identity="arrays",
-    )
-    size: int | tuple[int, int] = given(
-        Data("int or (int, int)"),
-        doc="Rows and columns of a tile, 16 or more; one number for both. Whole cells of a regular texture should fit.",
-        default=256,
-        positional=True,
-        checker="tile",
-    )
-    colours: int | None = given(
-        Whole(2, 3),
-        "Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81",
-        none="2; with several samples their number",
-    )
-
-
-@declared
 class Fill(Common):
     """The inputs of `simdtex.fill`."""
 
@@ -541,7 +517,7 @@ class Mix(Common):
 SHARED = table(Common)
 """The inputs that most functions share."""
 
-TABLES_OF: dict[str, Any] = {one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Tileset, Classify, Mix)}
+TABLES_OF: dict[str, Any] = {one.__name__.lower(): one for one in (Synth, Solid, Fill, Extend, Classify, Mix)}
 """The tables by job, which has the name of its command."""
 
 MRF = {"mrf": "methods.mrf.options"}

@@ -154,6 +154,18 @@ class Job(Protocol):
         """Return the picture, channels last, and the rest of the output; one run of `drive`, or several in turn."""
 
 
+class SingleRun:
+    """A base of jobs that are the plan of their only run, and take pictures in any light as they are."""
+
+    light = Light()
+
+    def make(
+        self: Plan, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
+        """Run the plan, and return its result."""
+        return drive(self, machine, seed, callback, checkpointing)
+
+
 def run(
     name: str,
     job: Job,

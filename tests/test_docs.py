@@ -14,14 +14,14 @@ import pytest
 from skimage import data
 
 import simdtex
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.cli.options import given
 from simdtex.io.image import write
 from simdtex.jobs.classification import options as classifier
 from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
-from simdtex.methods.pyramid.options import solid
+from simdtex.methods.pyramid import solid
 from simdtex.options import preset_values, quoted, resolve
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -327,12 +327,13 @@ def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
     """Except for options that only concern files and messages."""
     page = (ROOT / "docs" / "reference" / "functions.rst").read_text(encoding="utf-8")
     rows = re.findall(r"^   \* - (.*--.*)$", page.partition("Names on the command line")[2], re.MULTILINE)
-    others = set()
+    others, tables = set(), [*METHODS.values(), *OF_COMMANDS.values()]
+    own = {"preset", *(option for one in tables for option in one.Options.__dataclass_fields__)}
     functions = {"synth": "synthesize", "solid": "synthesize_solid", "tile": "extend"}
     for name in ("synth", "fill", "tile", "extend", "simulate", "estimate", "classify", "solid", "mix", "tileset"):
         function = getattr(simdtex, functions.get(name, name))
         options = {max(p.opts, key=len) for p in cli.load(name).params if isinstance(p, click.Option)}
-        others |= options - {f"--{one.replace('_', '-')}" for one in inspect.signature(function).parameters}
+        others |= options - {f"--{one.replace('_', '-')}" for one in own.union(inspect.signature(function).parameters)}
     assert others - {"--report", "--view", "--truth", "--quiet", "--help-all"} == set(
         re.findall(r"--[\w-]+", "\n".join(rows))
     )

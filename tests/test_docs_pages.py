@@ -24,7 +24,7 @@ LISTINGS = {
         r"^\.\. code-block:: \w+\n   :caption: (.+)\n\n((?:(?:   .*)?\n)+)", PAGE, re.MULTILINE
     )
 }
-FILES = ("kernels/median.cl", "simdtex/methods/mrf/median.py", "tests/test_median.py", "look.py")
+FILES = ("kernels/mrf/median.cl", "simdtex/methods/mrf/median.py", "tests/methods/mrf/test_median.py", "look.py")
 TABLE = "docs/concepts/index.rst"
 
 
@@ -73,7 +73,7 @@ def test_every_listing_has_its_place():
 
 @pytest.mark.slow
 def test_the_operation_passes_its_test_and_those_of_the_house(copy, any_device):
-    done = pytest_in(copy, "tests/test_median.py", device=any_device)
+    done = pytest_in(copy, "tests/methods/mrf/test_median.py", device=any_device)
     assert done.returncode == 0, done.stdout
     assert "OpenCL devices that ran tests" in done.stdout
     words = re.search(r'tests/test_house.py tests/test_docs.py -k "(.+)"', PAGE).group(1)
@@ -90,17 +90,17 @@ def test_it_does_what_the_page_shows(copy, any_device):
 @pytest.mark.slow
 def test_its_test_can_fail(copy, any_device):
     """As the page says: the devices fail, the reference does not."""
-    kernel = copy / "kernels" / "median.cl"
+    kernel = copy / "kernels" / "mrf" / "median.cl"
     right = kernel.read_text(encoding="utf-8")
     assert right.count("rank == 4") == 1
     assert "Write ``rank == 3`` in the kernel" in PAGE
     kernel.write_text(right.replace("rank == 4", "rank == 3"), encoding="utf-8")
     try:
-        done = pytest_in(copy, "tests/test_median.py", device=any_device)
+        done = pytest_in(copy, "tests/methods/mrf/test_median.py", device=any_device)
     finally:
         kernel.write_text(right, encoding="utf-8")
     assert done.returncode == 1, done.stdout
-    failed = re.findall(r"^FAILED tests/test_median.py::(\w+)", done.stdout, re.MULTILINE)
+    failed = re.findall(r"^FAILED tests/methods/mrf/test_median.py::(\w+)", done.stdout, re.MULTILINE)
     assert set(failed) == {"test_a_device_has_the_references_bits", "test_the_shape_of_a_launch_changes_no_bit"}
 
 

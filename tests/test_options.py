@@ -18,7 +18,7 @@ from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
-from simdtex.methods.pyramid.options import solid
+from simdtex.methods.pyramid import solid
 from simdtex.options import GREATEST, MOST, UNSET, Number, Whole, real, resolve, table, whole, within_32_bits
 
 SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)

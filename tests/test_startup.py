@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import simdtex
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.io.image import write
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "rich"}

@@ -1,36 +1,81 @@
-"""An option or an input is declared once: in Python, on the command line, on the live page, and in the types."""
+"""An option is declared once, and a function shows its parameters: in Python, on the command line, and in the types."""
 
+import ast
 import re
 import runpy
 import subprocess
 import sys
 from dataclasses import dataclass
-from inspect import signature
+from inspect import Parameter, getsource, signature
 from pathlib import Path
-from types import SimpleNamespace
+from textwrap import dedent
 
 import click
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import simdtex
-from simdtex import declared as inputs
-from simdtex.checkpoint import Checkpoint, identity, read
-from simdtex.cli import inputs as readers
-from simdtex.cli.job import Task, job
-from simdtex.cli.options import input_options
-from simdtex.jobs import inputs as checks
-from simdtex.jobs.classification import options as classifier
-from simdtex.methods import mrf
+from simdtex.cli.job import job
+from simdtex.commands import load
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.options import Number, documented, option, resolve
 
 ROOT = Path(simdtex.__file__).parents[1]
-SAMPLES = SimpleNamespace(channel_axis=None, ascending=None)
+
+FUNCTIONS = {
+    **{"synth": "synthesize", "solid": "synthesize_solid", "tile": "extend"},
+    **{name: name for name in ("fill", "extend", "simulate", "estimate", "classify", "mix", "tileset")},
+}
+"""The functions of commands."""
+
+FIRST = {"sample", "samples", "image", "training", "picture", "textures"}
+"""Parameters that are arguments of a command, or files that it names in its own way."""
+
+ELSEWHERE = {
+    "callback": "the command shows the progress",
+    "full_output": "the command writes what it is asked for",
+    "channel_axis": "a file says which axis holds channels",
+    "known_source": "no file holds both known values and their sources",
+    "masks": "transparent pixels of the samples are not used",
+    "split": "half of the levels, which is what people want",
+    "store": "--tiles and the name of the output",
+    "categorical": "an option of the method elsewhere",
+    "seamless": "what `tile` does; it has --direction",
+}
+"""Parameters that a command has not, and why."""
+
+NAMES = {"rng": "seed", "shape": "size", "n": "number", "mask": "sample_mask", "textures": "textures"}
+"""Parameters whose option has another name."""
 
 
-def test_the_types_follow_from_the_tables():
+@pytest.mark.parametrize("name", [*dict.fromkeys(FUNCTIONS.values()), "lcpdf", "explain", "replay"])
+def test_a_public_function_is_what_its_source_says(name):
+    function = getattr(simdtex, name)
+    (node,) = ast.parse(dedent(getsource(function))).body
+    assert (node.name, vars(function)) == (name, {})
+    told = [*node.args.args, *node.args.kwonlyargs, *filter(None, [node.args.kwarg])]
+    assert [one.arg for one in told] == [*signature(function).parameters]
+    section = re.search(r"Parameters\n-+\n(.*?)\n\n", dedent(f"    {function.__doc__}"), re.DOTALL)[1]
+    entries = re.findall(r"^([*\w][^:\n]*)(?: :.*)?$", section, re.MULTILINE)
+    assert [name.strip("* ") for entry in entries for name in entry.split(",")] == [one.arg for one in told]
+
+
+@pytest.mark.parametrize("command", FUNCTIONS)
+def test_a_command_has_the_parameters_and_the_defaults_of_its_function(command):
+    options = {name: one for one in load(command).params for name in (one.name, max(one.opts, key=len).strip("-"))}
+    options = {name.replace("-", "_"): one for name, one in options.items()}
+    for one in signature(getattr(simdtex, FUNCTIONS[command])).parameters.values():
+        if one.kind is Parameter.VAR_KEYWORD or one.name in FIRST | ELSEWHERE.keys() - {*options}:
+            continue
+        found = options.get(one.name) or options.get(NAMES.get(one.name, one.name))
+        if command == "tile" and one.name in ("left", "right", "top", "bottom"):
+            continue
+        assert found is not None, f"{command} has no option for {one.name}"
+        if isinstance(one.default, (str, int, float)) and one.default:
+            assert f"[{one.default}]" in found.help or found.default == one.default, one.name
+
+
+def test_the_types_follow_from_functions_and_tables():
     written = (ROOT / "simdtex" / "__init__.pyi").read_text(encoding="utf-8")
     assert written == runpy.run_path(str(ROOT / "docs" / "stubs.py"))["stub"](), "run: python docs/stubs.py"
 
@@ -62,14 +107,6 @@ def test_type_checkers_find_wrong_uses(tmp_path):
     assert re.findall(r"uses.py:(\d+): error", said) == wrong, said
 
 
-def test_signatures_list_options_with_the_defaults_of_the_job():
-    for name, method in {"fill": mrf, "extend": mrf, "simulate": mrf, "mix": pyramid, "classify": classifier}.items():
-        shown = {one.name: one.default for one in signature(getattr(simdtex, name)).parameters.values()}
-        assert vars(resolve(method.Options, name, {})).items() - shown.items() <= {("boundary", "torus")}
-    first, of_lcpdf = signature(simdtex.synthesize).parameters, signature(simdtex.lcpdf).parameters
-    assert (first["edges"].default, of_lcpdf["order"].default) == ("auto", mrf.Options().neighbourhood)
-
-
 def test_an_option_that_is_declared_is_everywhere(monkeypatch):
     """In Python with its default, check and preset, in the docstring, on the command line and on the live page."""
     from simdtex.live import job as page
@@ -84,7 +121,6 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
         glitter: float = option(0.5, Number(0), "Make it glitter", paper=0.25, **how)
 
     Options.__module__ = "simdtex.methods.pyramid.options"
-    monkeypatch.setattr(pyramid, "Options", Options)
     monkeypatch.setitem(page.TABLES, "pyramid", (Options, "mix"))
     given = [
         resolve(Options, job, values).glitter for job, values in [("synth", {}), ("mix", {}), ("mix", {"glitter": 1})]
@@ -98,60 +134,17 @@ def test_an_option_that_is_declared_is_everywhere(monkeypatch):
 
     made = []
 
-    @job()
+    @job(methods=[Options])
     def mix(**options):
         """Mix."""
         made.append(options)
 
+    assert isinstance(mix, click.Command)
     assert CliRunner().invoke(mix, ["--glitter", "0.3"]).exit_code == 0
-    assert made[0]["glitter"] == 0.3 and Task
+    assert made[0]["glitter"] == 0.3
     assert "--glitter FLOAT" in CliRunner().invoke(mix, ["--help"]).output
 
 
-def test_an_input_that_is_declared_is_everywhere(monkeypatch, tmp_path):
-    """A parameter with its default, check, identity and entry in the docstring; an option of the command, and read."""
-
-    @dataclass
-    class Fill(inputs.Fill):
-        """The inputs of a job."""
-
-        frame: object = inputs.given(
-            inputs.Data("(rows, cols) array"),
-            "Use the frame in this file",
-            "The frame of the picture.",
-            checker="frame",
-            takes="file",
-            reader="read_frame",
-        )
-
-    def planned(call):
-        """Fill.
-
-        Returns
-        -------
-        image : array
-        """
-
-        def interrupted(*_):
-            raise KeyboardInterrupt
-
-        return checks.Work(interrupted, mrf.Options(), call.channel_axis)
-
-    monkeypatch.setitem(inputs.TABLES_OF, "fill", Fill)
-    monkeypatch.setitem(checks.CHECKS, "frame", lambda name, value, call: call.image[0] + value)
-    monkeypatch.setattr(readers, "read_frame", lambda path, files: f"{files.flag} {path}", raising=False)
-    filled = checks.public("fill")(planned)
-    assert signature(filled).parameters["frame"].default is None
-    assert "frame : (rows, cols) array, optional\n    The frame of the picture.\n" in filled.__doc__
-    call, _ = filled.prepare(np.ones((2, 2)), frame=2)
-    assert (call.frame == 3).all() and call.grow == 0
-    with pytest.raises(ValueError, match="grow is -1; give 0 or more"):
-        filled.prepare(np.ones((2, 2)), grow=-1)
-    with pytest.raises(KeyboardInterrupt):
-        filled(np.ones((2, 2)), frame=2, checkpoint=Checkpoint(tmp_path / "kept"), device="reference")
-    assert read(tmp_path / "kept")[0]["inputs"]["frame"] == identity(np.full((2, 2, 1), 3.0))
-
-    command = click.command()(input_options("fill")(lambda **given: print(readers.read_inputs("fill", given, SAMPLES))))
-    said = CliRunner().invoke(command, ["--frame", "a.png"]).output
-    assert said == "{'channel_axis': None, 'frame': '--frame a.png'}\n"
-    assert "--frame FILE" in CliRunner().invoke(command, ["--help"]).output
+def test_a_misspelt_parameter_is_answered():
+    with pytest.raises(TypeError, match=r"unknown option 'feathre' of the method 'mrf' \(did you mean 'feather'\?\)"):
+        simdtex.fill([[1]], feathre=2)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The options of commands and methods as reStructuredText, from where they are declared.
 
-A function's signature has ``**options`` in place of them.
-
 ``.. command-options:: synth`` lists the options of ``simdtex synth``. A definition list below it adds to some of them
 what a page has to say beside their help::
 
@@ -12,7 +10,6 @@ what a page has to say beside their help::
 
 import re
 from importlib import import_module
-from inspect import isfunction
 from textwrap import dedent, indent
 
 import click
@@ -58,18 +55,12 @@ def paper_values(method):
     """The options of a method whose values in the paper are known."""
     rows = [".. list-table::", "   :header-rows: 1", "   :widths: 25 20 20 35", "", "   * - Option", "     - Default"]
     rows += ["     - In the paper", "     - Symbol, equation"]
-    for name, one in table(import_module(f"simdtex.{method}").Options).items():
+    for name, one in table(import_module(f"simdtex.methods.{method}.options").Options).items():
         if one.paper is not UNSET or one.symbol:
             paper = "" if one.paper is UNSET else f"``{quoted(one.paper)}``"
             default = "" if one.default is None else f"``{quoted(one.default)}``"
             rows += [f"   * - ``{name}``", f"     - {default}", f"     - {paper}", f"     - {one.symbol}"]
     return rows
-
-
-def as_written(app, function, bound):
-    """Leave the signature as it is written: `inspect` shows all options, which have tables of their own here."""
-    if isfunction(function) and hasattr(function, "written"):
-        function.__signature__ = function.written
 
 
 def setup(app):
@@ -89,7 +80,6 @@ def setup(app):
             self.state.nested_parse(written, self.content_offset, node)
             return node.children
 
-    app.connect("autodoc-before-process-signature", as_written)
     for name, write in (("command-options", command_options), ("paper-values", paper_values)):
         app.add_directive(name, type(name, (Listing,), {"write": staticmethod(write)}))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -353,34 +353,6 @@ def read_masks(paths: Sequence[Path], samples: Material, how: Reading = PLAIN) -
     return masks if samples.several else masks[0]
 
 
-def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[str, list[NDArray[Any]]]:
-    """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
-    found: dict[str, list[NDArray[Any]]] = {}
-    picture = files.samples
-    for name, paths in named:
-        if name in found:
-            raise ValueError(f"{files.flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
-        found[name] = []
-        for file in paths:
-            pixels = without_alpha(read_pixels(file, files.how), channels(picture.array))
-            check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
-            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
-    return found
-
-
-def read_number(text: str, files: Files) -> int:
-    """Return the number, from 0, of the sample that an option names by its path as given or its number from 1."""
-    samples = files.samples.paths
-    if Path(text) in samples:
-        return samples.index(Path(text))
-    if text.isdecimal() and 1 <= int(text) <= len(samples):
-        return int(text) - 1
-    raise ValueError(
-        f"{files.flag} {text} is none of the samples; give the path of one as in the command, or its number, 1 to "
-        f"{len(samples)}"
-    )
-
-
 def in_place(pixels: NDArray[Any], grid: CartesianGrid) -> Any:
     """Return values of a grid, ([layers,] rows, cols, variables), as an array of xarray with its coordinates.
 

@@ -26,6 +26,7 @@ from simdtex.cli.command import (
     WRITE_PAIR,
 )
 from simdtex.declared import SHARED, Input, inputs, options_of
+from simdtex.model.light import LIGHTS
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -283,6 +284,12 @@ GUIDE = option(
 )
 
 
+LIGHT = option(
+    "--light",
+    words=LIGHTS,
+    group="Appearance",
+    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
+)
 MAP = option(
     "--map",
     "roles",

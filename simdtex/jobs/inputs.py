@@ -20,7 +20,7 @@ from simdtex.driver import Plan, check_shape, check_sides, drive, execute
 from simdtex.inputs import as_known, check_mask, check_picture, check_samples, kept
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine
-from simdtex.maspar.accounting import accounting
+from simdtex.maspar import observers
 from simdtex.model.light import Relit
 from simdtex.model.pictures import Pictures, check_alike
 from simdtex.options import UNSET, entries, lists, option_parameters
@@ -67,7 +67,7 @@ class Work(NamedTuple):
         run: Any = (
             self.run
             if callable(self.run)
-            else partial(drive, self.run, others=accounting(vars(self.options).get("array")))
+            else partial(drive, self.run, others=observers(vars(self.options).get("array")))
         )
         relit, seen = self.relit, callback
         if relit and callback:

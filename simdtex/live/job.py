@@ -16,7 +16,6 @@ import PIL.ImageDraw
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.declared import inputs
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import options as classifier
@@ -32,6 +31,7 @@ from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.model.display import label_colours
+from simdtex.model.light import LIGHTS
 from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, one_of, real, shown, table, whole
 from simdtex.run import Output
 
@@ -61,6 +61,14 @@ TABLES: dict[str, tuple[Any, str]] = {
     "classify": (classifier.Options, "classify"),
 }
 """The options and the command of each set of controls: for the methods, and for the jobs with a single method."""
+
+LIGHT = Option(
+    "keep",
+    Choice(LIGHTS),
+    "Keep the sample's light, or take pixels from the sample in even light",
+    group="Appearance",
+)
+"""The control for the parameter ``light``."""
 
 MAX_SIDE = 2**14
 """The most rows or columns of an output."""
@@ -141,9 +149,16 @@ class Job:
             before = result(number)
             self._read(f"result-{number}", before.image, before.maps)
         self.shape: tuple[int, int] = self.sample.shape[:2]
-        for name, one in inputs(self.kind).items():
-            if one.painter:
-                getattr(self, one.painter)(name, one.flag(name), message, picture.pixels.shape, part)
+        if self.kind == "synth":
+            self._size(message)
+            self._add("method", self.method, "--method", self.method)
+            self._guide(message, picture.pixels.shape, part)
+        elif self.kind == "extend":
+            self._add("seamless", True, "--seamless")
+        elif self.kind == "fill":
+            self._hole(message)
+        else:
+            self._classes(message)
         self._add("rng", seed, "--seed", str(seed))
         self._add("channel_axis", picture.channel_axis)
         self.options = _options(message.get("options", {}), self.method if self.kind == "synth" else self.kind)
@@ -208,18 +223,15 @@ class Job:
         self._keywords[name] = value
         self._flags += flags
 
-    # The painters that declarations name: they add an input from the message about a picture of a shape, and its part
+    # These add what the message says to the call and to the command line.
 
-    def _size(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+    def _size(self, message: Message) -> None:
         for side in ("width", "height"):
             whole(side, message.get(side), 1, MAX_SIDE)
         rows, cols = self.shape = (message["height"], message["width"])
-        self._add(name, self.shape, flag, f"{cols}x{rows}")
+        self._add("shape", self.shape, "--size", f"{cols}x{rows}")
 
-    def _method(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
-        self._add(name, self.method, flag, self.method)
-
-    def _guide(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+    def _guide(self, message: Message, shape: tuple[int, ...], part: Part) -> None:
         guide = _painted(message)
         own = paint(guide.get("sample", []), shape)[part]
         wanted = paint(guide.get("output", []), self.shape)
@@ -229,10 +241,11 @@ class Job:
             raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
         transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
         self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
-        self._add(name, (own, np.where(wanted == 0, np.nan, wanted)), flag, "guide-sample.png=guide-texture.png")
+        both = "guide-sample.png=guide-texture.png"
+        self._add("guide", (own, np.where(wanted == 0, np.nan, wanted)), "--guide", both)
         self._add("labels", True)
 
-    def _classes(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+    def _classes(self, message: Message) -> None:
         strokes = paint(_painted(message).get("sample", []), self.shape)
         counts = np.bincount(strokes.ravel())
         self.classes = [label for label in np.flatnonzero(counts).tolist() if label]
@@ -245,19 +258,16 @@ class Job:
         self.output = "labels.png"
         self.files["strokes.png"] = strokes
         self.labelled = (self.output, "strokes.png")
-        self._add(name, strokes, "--strokes", "strokes.png")
+        self._add("textures", strokes, "--strokes", "strokes.png")
 
-    def _hole(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
+    def _hole(self, message: Message) -> None:
         hole = paint(message.get("hole", []), self.shape) > 0
         if not hole.any():
             raise ValueError("there is no hole to fill; paint over what is to be replaced")
         if hole.all():
             raise ValueError("the hole covers the whole picture; leave some of it")
         self.files["hole.png"] = hole * np.uint8(255)
-        self._add(name, hole, flag, "hole.png")
-
-    def _seam(self, name: str, flag: str, message: Message, shape: tuple[int, ...], part: Part) -> None:
-        self._add(name, True, flag)
+        self._add("mask", hole, "--mask", "hole.png")
 
 
 def _painted(message: Message) -> dict[str, Any]:
@@ -342,7 +352,7 @@ def _suffix(pixels: Array) -> str:
 def controls(name: str) -> list[dict[str, Any]]:
     """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider.
 
-    Inputs that are words are options, too.
+    The light of the sample is an option, too.
 
     A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
     ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
@@ -351,11 +361,7 @@ def controls(name: str) -> list[dict[str, Any]]:
     """
     options, job = TABLES[name]
     shown = {name: one for name, one in table(options).items() if job in one.shown}
-    words = {
-        name: one
-        for name, one in inputs(job).items()
-        if isinstance(one.kind, Choice) and not one.painter and one.default is not None  # None: the picture decides
-    }
+    words = {"light": LIGHT} if job in ("synth", "extend") else {}  # elsewhere the picture decides, or it has none
     made = [_control(name, one, one.default_of(job)) for name, one in (shown | words).items()]
     return [control for control in made if "kind" in control]
 

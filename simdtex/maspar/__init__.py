@@ -3,18 +3,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-EXECUTED = (
-    *("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel"),
-    *("free_sweeps", "free_sites"),
-)
-"""The options that `synthesize` executes; all others have the paper's values."""
+if TYPE_CHECKING:
+    from simdtex.run import Observer
+
+
+def observers(array: str | None) -> list[Callable[[Any], Observer]]:
+    """Return what makes the observer that the option ``array`` asks for, see `simdtex.driver.drive`."""
+    if not array:
+        return []
+    from functools import partial
+
+    from simdtex.maspar.accounting import Accounting  # loads the emulator
+
+    return [partial(Accounting, array)]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "synthesize":  # checks its input as other jobs do, and so is one of them
-        from importlib import import_module
+    if name == "synthesize":  # loads the emulator, too
+        from simdtex.maspar import job
 
-        return import_module("simdtex.maspar.job").synthesize
+        return job.synthesize
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,8 +8,6 @@ candidates of any run: one step of it is executed on an array without a machine,
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from functools import partial
 from math import inf
 from typing import Any
 
@@ -132,8 +130,3 @@ class Accounting(Observer):
         if saved["level"] >= 0:
             self._begin(saved["level"])
         self.account.total.update(saved["total"])
-
-
-def accounting(array: str | None) -> tuple[Callable[[Any], Observer], ...]:
-    """Return what makes the observer for the value of the option ``array``, see `simdtex.driver.drive`."""
-    return (partial(Accounting, array),) if array else ()

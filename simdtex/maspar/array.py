@@ -18,6 +18,12 @@ from simdtex.model.array import MAPPINGS
 from simdtex.model.lattice import Grid
 from simdtex.options import one_of
 
+EXECUTED = (
+    *("order", "levels", "overview", "boundary", "edges", "phases", "bandwidth", "xi", "relaxation", "pixel"),
+    *("free_sweeps", "free_sites"),
+)
+"""The options that `synthesize` executes; all others have the paper's values."""
+
 DIRECTIONS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
 """The directions of the X-Net, (rows, columns)."""
 

@@ -26,7 +26,7 @@ from simdtex.cli.options import (
     report_option,
     size_option,
 )
-from simdtex.maspar import EXECUTED
+from simdtex.maspar.array import EXECUTED
 from simdtex.model.array import ARRAYS, MAPPINGS, PREFIX
 
 

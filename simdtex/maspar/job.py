@@ -16,9 +16,8 @@ from simdtex.driver import check_shape, execute
 from simdtex.inputs import check_inputs, kept
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar import EXECUTED
 from simdtex.maspar.algorithm import Level, Problem, Program, by_lane
-from simdtex.maspar.array import ProcessorArray
+from simdtex.maspar.array import EXECUTED, ProcessorArray
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
 from simdtex.methods.mrf.level import Lattices

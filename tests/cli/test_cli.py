@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from commands import names, refused, run
 
-from simdtex.commands import COMMANDS, job
+from simdtex.cli import job
+from simdtex.commands import COMMANDS
 from simdtex.io import image
 from simdtex.machine import memory
 from simdtex.model.source_map import load_source_map
@@ -100,14 +101,14 @@ def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
     assert names(folder) == before
 
 
-SYNTHESIS = "jobs.synthesis.synthesize"
+SYNTHESIS = "jobs.synthesis.job.synthesize"
 
 
 @pytest.mark.parametrize(
     ("function", "args", "writes", "said"),
     [
-        ("experiments.benchmark.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
-        ("extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
+        ("jobs.studies.benchmark.run", ["bench", "-q", "--json", "old.json"], [], "nothing was written"),
+        ("jobs.filling.job.extend", ["extend", "a.png", "-o", "o.png", "--right", "3"], ["o.png"], "o.png"),
         (SYNTHESIS, ["synth", "a.png", "-o", "o.png", "--stages", "st"], ["st/level0.png"], "st"),
         (SYNTHESIS, ["synth", "a.png", "-o", "old.png", "--stages", "st"], ["old.png", "st/level0.png"], "old.png, st"),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from commands import refused, run
 
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.cli.command import Pair, Place
 from simdtex.io import image
 

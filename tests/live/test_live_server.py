@@ -19,7 +19,7 @@ from live import asked, png, texture
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.live import server as serving
 from simdtex.live import session as sessions
 from simdtex.live.server import TOKEN, Pages, is_own_name, listen, serve

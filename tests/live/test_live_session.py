@@ -18,10 +18,10 @@ from live import Fake, asked, png, striped, texture
 from PIL import ImageCms
 
 import simdtex
-from simdtex import cli
+from simdtex import commands as cli
 from simdtex.declared import inputs
 from simdtex.io.image import read_bytes
-from simdtex.jobs.classification.job import algorithm
+from simdtex.jobs.classification import algorithm
 from simdtex.live import frames, results
 from simdtex.live import session as sessions
 from simdtex.live.frames import Layer, Window, parse_window, render

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from simdtex.live.command import render
+from simdtex.general import render
 from simdtex.machine import devices
 from simdtex.machine import devices as device
 from simdtex.machine.devices import DeviceError, DeviceInfo

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import prod
 from typing import Any, NamedTuple
 
@@ -15,6 +14,7 @@ from scipy import ndimage
 
 from simdtex import schedules
 from simdtex.checkpoint import like
+from simdtex.driver import SingleRun
 from simdtex.jobs.classification.model import (
     MEANS,
     UNITS,
@@ -56,30 +56,23 @@ STEPS = 64
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A classification before it has a machine and a seed.
+class Classification(SingleRun):
+    """The job of `classify`: a classification before it has a machine and a seed.
 
-    Attributes
-    ----------
-    pixels : (rows, cols, B) array
-    unknown : (rows, cols) bool array
-        Pixels without a value, which are labelled 0.
-    classes : sequence of sequences of Region, or Model
-        The regions of each class, or a model trained on them.
-    names : dict of int to str
-        The label of each class, 1 to 254, and its name.
-    options : Options
+    ``image`` (rows, cols, B) has no value at the pixels ``unknown`` (rows, cols), which get the label 0. ``classes``
+    are the regions of each class, or a model that is trained on them, and ``names`` those of the labels, 1 to 254.
     """
 
-    pixels: NDArray[Any]
+    image: NDArray[Any]
     unknown: Mask
     classes: Sequence[Sequence[Region]] | Model
     names: dict[int, str]
     options: Options
+    channel_axis = None  # of labels
 
     def on(self, machine: Machine, seed: int) -> Run:
         """Return the run on a machine, with trained classes; raise if the memory does not suffice."""
-        shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
+        shape, count, bands = self.image.shape[:2], len(self.names), self.image.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
         part = min(sites, max(SITES_AT_ONCE, FEWEST_ROWS * shape[1]))
@@ -127,10 +120,10 @@ class _Segment(NamedTuple):
 class Run:
     """A classification on a machine: rows are compared with the classes, then labels are relaxed, sweep by sweep."""
 
-    def __init__(self, machine: Machine, plan: Plan, model: Model, seed: int) -> None:
+    def __init__(self, machine: Machine, plan: Classification, model: Model, seed: int) -> None:
         self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
         self.labels = np.array([0, *plan.names], np.uint8)
-        self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
+        self.grid = Grid.of(plan.image.shape[:2], torus=False)
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
         self._everywhere = schedules.Masked(self.grid)
@@ -138,8 +131,10 @@ class Run:
         self._taps, self._coupling = gaussian(plan.options.window), machine.put(gaussian(plan.options.coupling))
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
-        self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
+        self._levels = prepared(machine, model.scale, plan.image, model.experts[-1].level + 1)
+        self._on_host = [np.asarray(machine.get(one)) for one in self._levels]
         self._exemplars = [known.on(machine) for known in model.exemplars]
+        self._classes = machine.put(np.arange(len(plan.names), dtype=np.int32))
 
     def _check_schedule(self) -> None:
         _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), self._everywhere)
@@ -151,7 +146,7 @@ class Run:
 
     def begin(self) -> State:
         """Return the state before any comparison."""
-        shape = self.plan.pixels.shape[:2]
+        shape = self.plan.image.shape[:2]
         logs = np.zeros((len(self.model.experts) + 1, len(self.plan.names), *shape), np.uint16)
         return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 
@@ -184,17 +179,12 @@ class Run:
             state.labels[:] = self._evidence(state.logs).argmax(0)
         return state._replace(done=end)
 
-    @cached_property
-    def _host_levels(self) -> list[NDArray[np.uint16]]:
-        """The levels of the picture in NumPy."""
-        return [np.asarray(self.machine.get(one)) for one in self._levels]
-
     def _patterned(self, first: int, end: int) -> NDArray[np.uint16]:
         """Return the logarithms of probabilities by the patterns around the sites of some rows, (classes, n, cols)."""
         slab = slice(max(0, first - len(NEAR) // 2), min(self.grid.rows, end + len(NEAR) // 2))
         here = np.zeros((slab.stop - slab.start, self.grid.cols), bool)
         here[first - slab.start : end - slab.start] = True
-        means, _ = windowed(self.machine, patterns(self._host_levels, slab), np.ones_like(here), NEAR, here)
+        means, _ = windowed(self.machine, patterns(self._on_host, slab), np.ones_like(here), NEAR, here)
         return self.model.discriminant.logarithms(means / float(MEANS)).reshape(-1, end - first, self.grid.cols)
 
     def _single(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
@@ -212,10 +202,6 @@ class Run:
             for one in total:
                 one[:] = blurred(one, gaussian(self.options.smoothing))
         return total
-
-    @cached_property
-    def _classes(self) -> Array:
-        return self.machine.put(np.arange(len(self.plan.names), dtype=np.int32))
 
     def _votes(self, labels: Array) -> Array:
         """Return the votes of the labels around each site for every class."""
@@ -290,7 +276,7 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
-            patterned, segments = patterns(self._host_levels, slab), []
+            patterned, segments = patterns(self._on_host, slab), []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,24 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import DATA, OUTPUTS, READ, WRITE
-from simdtex.cli.inputs import read_inputs, read_material, size_text
+from simdtex.cli.command import DATA, OUTPUTS, READ, READ_NAMED, WRITE
+from simdtex.cli.inputs import (
+    Material,
+    Reading,
+    channels,
+    planes,
+    read_material,
+    read_pixels,
+    size_text,
+    without_alpha,
+)
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import PROFILE, given, input_options, option, output_option, report_option
+from simdtex.cli.options import PROFILE, given, option, output_option, report_option
 from simdtex.jobs.classification.options import Options
+from simdtex.model.pictures import check_alike
+
+Named = Sequence[tuple[str, list[Path]]]
+"""What an option ``NAME=FILE0,FILE1`` was given."""
 
 FITS = (".tif", ".tiff", ".npy")
 """The files of fits."""
@@ -32,7 +46,31 @@ UNLABELLED = 255
 )
 @click.argument("picture", type=READ)
 @output_option("Write the labels: 1, 2..., and 0 for unknown.", WRITE)
-@input_options("classify")
+@option(
+    "--texture",
+    "textures",
+    multiple=True,
+    type=READ_NAMED,
+    metavar="NAME=FILE",
+    group=DATA,
+    help="Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
+    "Transparent pixels are not used.",
+)
+@option(
+    "--strokes",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE.",
+)
+@option(
+    "--validation",
+    multiple=True,
+    type=READ_NAMED,
+    metavar="NAME=FILE",
+    group=DATA,
+    help="Measure with this picture of a class how much the class varies.",
+)
 @option("--truth", type=READ, metavar="FILE", group=DATA, help="Compare with these labels; 255 is unknown.")
 @option(
     "--confidence",
@@ -46,7 +84,9 @@ UNLABELLED = 255
 def classify(
     picture: Path,
     output: Path,
+    textures: Named,
     strokes: Path | None,
+    validation: Named,
     truth: Path | None,
     confidence: Path | None,
     **options: Any,
@@ -64,17 +104,16 @@ def classify(
     if true is not None and true.shape != whole.sizes[0]:
         sizes = f"{truth} is {size_text(true)} and {picture} {size_text(whole.array)}"
         raise ValueError(f"{sizes}; give labels of its size")
-    data = read_inputs("classify", options, whole)
-    if bool(data["textures"]) == bool(strokes):
+    known: Any = read_classes("--texture", textures, whole)
+    judged = read_classes("--validation", validation, whole)
+    if bool(known) == bool(strokes):
         raise ValueError("give --texture once for each class, or --strokes")
-    if strokes and data["validation"]:
+    if strokes and judged:
         raise ValueError("--validation requires --texture; leave it out")
-    pixels: NDArray[Any] = whole.array
+    names, pixels = dict(enumerate(known, 1)), whole.array
     if strokes:
-        data["textures"] = labels = read_labels(strokes)
-        names = {int(label): str(label) for label in np.unique(labels[labels > 0])}
-    else:
-        names = dict(enumerate(data["textures"], 1))
+        known = read_labels(strokes)
+        names = {int(label): str(label) for label in np.unique(known[known > 0])}
     image.check_writable(output, np.uint8, 1, labels=True)
     place = whole.metadata and whole.metadata.geo and whole.metadata.geo.place()
     if confidence:
@@ -93,11 +132,29 @@ def classify(
 
         write_classification(folder, pixels, made, run, true, command_line())
 
-    run = partial(classify, pixels, **data, **given(options))
-    summary = f"{size_text(pixels)}, {len(names)} classes"
     return Task(
-        run, summary, str(output), writers, more=lambda made, _: click.echo(_shares(true, names, made)), report=report
+        partial(classify, pixels, known, validation=judged, channel_axis=whole.channel_axis, **given(options)),
+        f"{size_text(pixels)}, {len(names)} classes",
+        str(output),
+        writers,
+        more=lambda made, run: click.echo(_shares(true, names, made)),
+        report=report,
     )
+
+
+def read_classes(flag: str, named: Named, picture: Material) -> dict[str, list[NDArray[Any]]]:
+    """Read the samples of classes, masked where they are transparent; ``flag`` is the option that names them."""
+    found: dict[str, list[NDArray[Any]]] = {}
+    for name, paths in named:
+        if name in found:
+            raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
+        found[name] = []
+        for file in paths:
+            one = read_pixels(file, Reading(ascending=picture.ascending))
+            pixels = without_alpha(one, channels(picture.array))
+            check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
+            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
+    return found
 
 
 def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:

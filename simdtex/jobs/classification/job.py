@@ -10,24 +10,64 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.declared import Classify
-from simdtex.driver import drive
+from simdtex.driver import Device, Kept, Seed, drive, run
 from simdtex.inputs import check_mask, check_picture, is_several
-from simdtex.jobs.classification.algorithm import Plan
+from simdtex.jobs.classification.algorithm import Classification
 from simdtex.jobs.classification.model import BANDS, CLASSES, FEWEST_NEIGHBOURHOODS, Model, Region, learn
 from simdtex.jobs.classification.options import Options
-from simdtex.jobs.inputs import Work, public
 from simdtex.machine import Machine, open_machine
 from simdtex.model.pictures import Mask, check_alike, completed
-from simdtex.options import lists, option_parameters, real_array, resolve, table
+from simdtex.options import real_array, resolve, table
 from simdtex.random import as_seed
+from simdtex.run import Callback
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
-@public("classify")
-def classify(call: Classify) -> Work:
+def classify(
+    image: ArrayLike,
+    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike,
+    *,
+    masks: Mapping[str, Any] | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    full_output: bool = False,
+    **options: Any,
+) -> Any:
     """Return a label for each pixel of a picture: the texture around it, or unknown.
+
+    Parameters
+    ----------
+    image : (rows, cols) or, with `channel_axis`, (rows, cols, bands) array
+        The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.
+    textures : mapping of str to array or list of arrays, or (rows, cols) array of integers
+        The samples of each class, of the picture's type, by the name of the class. Or training regions of the picture
+        itself: 1, 2, ... where a pixel is of a class, and 0 elsewhere.
+    masks : mapping of str to (rows, cols) bool array or list of arrays, optional
+        True for pixels of the samples that may be used; a class without masks is used whole.
+    validation : mapping of str to array or list of arrays, optional
+        Further pictures of a class, from which no exemplars are drawn. They measure how much the class varies, which
+        decides when a pixel is unknown.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+    device : str or Machine, optional
+        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
+        SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
+        run continues from it, to the same bytes. The file is removed when the function returns.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
+    **options
+        See `simdtex.jobs.classification.options.Options`.
 
     Returns
     -------
@@ -35,6 +75,11 @@ def classify(call: Classify) -> Work:
         0 for unknown textures, 1 for the first class, 2 for the second... With training regions, their numbers.
     output : simdtex.run.Output
         Only with ``full_output=True``; it has ``fit`` and ``probability``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -57,19 +102,34 @@ def classify(call: Classify) -> Work:
     >>> float((labels == np.repeat([1, 2], 64)).mean()) > 0.95
     True
     """
-    chosen = resolve(Options, "classify", call.options)
-    pixels, unknown = call.image
-    if isinstance(call.textures, Mapping):
-        named = call.masks or {}, call.validation or {}
-        classes = _sampled(call.textures, *named, pixels, call.channel_axis)
-        names = dict(enumerate(call.textures, 1))
-    elif call.masks or call.validation:
+    about: dict[str, Any] = {"masks": masks, "validation": validation, "channel_axis": channel_axis}
+    labels, output = run(
+        "classify", plan_classification(image, textures, **about, **options), rng, device, callback, checkpoint
+    )
+    return (labels, output) if full_output else labels
+
+
+def plan_classification(
+    image: ArrayLike,
+    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike,
+    *,
+    masks: Mapping[str, Any] | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Classification:
+    """Check the arguments of `classify`, and return its job."""
+    pixels, unknown = check_picture(image, channel_axis)
+    chosen = resolve(Options, "classify", options, classify)
+    if isinstance(textures, Mapping):
+        classes = _sampled(textures, masks or {}, validation or {}, pixels, channel_axis)
+        names = dict(enumerate(textures, 1))
+    elif masks or validation:
         raise ValueError("masks and validation belong to samples by name; leave them out with training regions")
     else:
-        painted = _painted([(pixels, unknown, call.textures)])
+        painted = _painted([(pixels, unknown, textures)])
         names, classes = {label: str(label) for label in painted}, list(painted.values())
-    call.textures = names, [[(*one[:2], one.judged) for one in regions] for regions in classes]
-    return Work(Plan(completed(pixels, unknown), unknown, classes, names, chosen), chosen, None)
+    return Classification(completed(pixels, unknown), unknown, classes, names, chosen)
 
 
 def _sampled(
@@ -161,7 +221,7 @@ class TextureClassifier:
     device : str or Machine, optional
         As in `simdtex.synthesize`.
     **options
-        Of the method ``classifier``: see `simdtex.jobs.classification.options.Options`.
+        See `simdtex.jobs.classification.options.Options`.
 
     Attributes
     ----------
@@ -187,13 +247,12 @@ class TextureClassifier:
 
     _machine: Machine | None = None
 
-    @lists(option_parameters("classify", Options))
     def __init__(
         self,
         *,
         channel_axis: int | None = None,
-        rng: int | np.random.Generator | None = 0,
-        device: str | Machine | None = None,
+        rng: Seed = 0,
+        device: Device = None,
         **options: Any,
     ) -> None:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
@@ -287,7 +346,7 @@ class TextureClassifier:
             raise ValueError("the classifier is not trained; call fit first")
         pixels, unknown = check_picture(image, self.channel_axis)
         check_alike("the picture", pixels, "that of training", self._like)
-        plan = Plan(completed(pixels, unknown), unknown, self._model, self._names, self._chosen)
+        plan = Classification(completed(pixels, unknown), unknown, self._model, self._names, self._chosen)
         self._machine = self._machine or open_machine(self.device)
         labels, output = drive(plan, self._machine, self._seed)
         return labels[..., 0], output

@@ -114,8 +114,7 @@ class Region(NamedTuple):
     judged: bool = False
 
 
-@dataclass(frozen=True)
-class Null:
+class Null(NamedTuple):
     """The differences of a class from itself: mean and variance (M,) of each of M measures over a window."""
 
     mean: NDArray[np.float64]
@@ -190,9 +189,9 @@ def learn(
     scale = Scale(Pictures(tuple(region.pixels for region in regions)), 512)  # values of up to 12 bits
     levels = _levels_of(options, classes, names)
     experts = experts_of(options, levels)
-    taught = [_Class(machine, scale, experts, one) for one in classes]
-    drawn = [[one.draw(machine, e, options.exemplars, seed, c) for e in experts] for c, one in enumerate(taught)]
-    selves = [one.judge(machine, experts, options, seed, c) for c, one in enumerate(taught)]
+    taught = [_Class(machine, scale, experts, options, seed, c, one) for c, one in enumerate(classes)]
+    drawn = [[one.draw(expert) for expert in experts] for one in taught]
+    selves = [one.judge() for one in taught]
     own = np.array([one.mean for one in selves])
     counts = [min(map(len, one)) for one in drawn]
     offsets = []
@@ -241,13 +240,6 @@ def _cropped(region: Region, margin: int) -> Region:
     return region._replace(pixels=region.pixels[box], sites=region.sites[box])
 
 
-class _Part(NamedTuple):
-    """A part of a class to compare with the rest: the number of its region, and its sites there."""
-
-    region: int
-    sites: Mask
-
-
 class OwnDistances(NamedTuple):
     """The distances of the parts of a class from the rest of it.
 
@@ -262,58 +254,64 @@ class OwnDistances(NamedTuple):
 
 
 class _Class:
-    """The regions of a class on a machine."""
+    """The regions of a class on a machine; the ``number`` of the class and the seed are keys of what is drawn."""
 
-    def __init__(self, machine: Machine, scale: Scale, experts: list[Expert], regions: Sequence[Region]) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        scale: Scale,
+        experts: list[Expert],
+        options: Options,
+        seed: int,
+        number: int,
+        regions: Sequence[Region],
+    ) -> None:
+        self._machine, self._experts, self._options, self._seed, self._number = machine, experts, options, seed, number
         margin = experts[-1].reach + len(gaussian(SMOOTHING[experts[-1].level] or 1)) // 2
         self.regions = [_cropped(region, margin) for region in regions]
         self._levels = [prepared(machine, scale, region.pixels, experts[-1].level + 1) for region in self.regions]
 
-    def draw(
-        self, machine: Machine, expert: Expert, most: int, seed: int, number: int, without: _Part | None = None
-    ) -> NDArray[np.float32]:
-        """Return random neighbourhoods of the class, (n, K), outside of the part ``without``."""
-        masks = []
-        for place, region in enumerate(self.regions):
-            mask = _centres(region, expert.reach) & (not region.judged)
-            masks.append(mask & ~without.sites if without and without.region == place else mask)
-        pool = np.concatenate([mask.ravel() for mask in masks])
-        sites = np.flatnonzero(pool)
+    def draw(self, expert: Expert, without: tuple[int, Mask] | None = None) -> NDArray[np.float32]:
+        """Return random neighbourhoods of the class, (n, K), outside of a part: a region's number, and sites there."""
+        masks = [_centres(region, expert.reach) & (not region.judged) for region in self.regions]
+        if without:
+            masks[without[0]] &= ~without[1]
+        sites, most = np.flatnonzero(np.concatenate([mask.ravel() for mask in masks])), self._options.exemplars
         if len(sites) < TOO_FEW and without:  # a small region, whose rest is too small
-            return self.draw(machine, expert, most, seed, number)
+            return self.draw(expert)
         if len(sites) > most:
-            words = random.draw4(seed, expert.level, number, sites, random.SEARCH)[0]
+            words = random.draw4(self._seed, expert.level, self._number, sites, random.SEARCH)[0]
             sites = np.sort(sites[np.argsort(words, kind="stable")[:most]])
         found, first = [], 0
-        for mask, levels in zip(masks, self._levels, strict=True):
+        for place, mask in enumerate(masks):
             own = sites[(sites >= first) & (sites < first + mask.size)] - first
             first += mask.size
             if own.size:
-                found.append(self._features(machine, levels, expert, own).T)
+                found.append(self._features(place, expert, own).T)
         return np.concatenate(found)
 
-    def _features(
-        self, machine: Machine, levels: list[Array], expert: Expert, sites: NDArray[np.intp]
-    ) -> NDArray[np.float32]:
-        placed, offsets = machine.put(sites.astype(np.int32)), machine.put(expert.offsets)
-        return np.asarray(machine.get(features(machine, levels[expert.level], placed, offsets, expert.contrast)))
+    def _features(self, place: int, expert: Expert, sites: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Return the neighbourhoods of sites of a region, (K, S)."""
+        put, levels = self._machine.put, self._levels[place]
+        placed, offsets = put(sites.astype(np.int32)), put(expert.offsets)
+        return np.asarray(
+            self._machine.get(features(self._machine, levels[expert.level], placed, offsets, expert.contrast))
+        )
 
-    def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> OwnDistances:
+    def judge(self) -> OwnDistances:
         """Return the distances of the parts of the class from the rest of it, for each expert, and their measures."""
-        taps = gaussian(options.window)
+        machine, taps = self._machine, gaussian(self._options.window)
         windows, parts, own, near = [], [], [], []
         for place, region in enumerate(self.regions):
-            logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
+            logs = np.zeros((len(self._experts), *region.sites.shape), np.uint16)
             judged = np.zeros(region.sites.shape, bool)
-            levels = [np.asarray(machine.get(one)) for one in self._levels[place]]
-            patterned = patterns(levels, slice(None))
+            patterned = patterns([np.asarray(machine.get(one)) for one in self._levels[place]], slice(None))
             for sites in _quarters(region.sites):
-                part = _Part(place, sites)
                 shown = np.flatnonzero(_boxed(sites))
-                for e, expert in enumerate(experts):
-                    rest = self.draw(machine, expert, options.exemplars, seed, number, part)
-                    values = machine.put(self._features(machine, self._levels[place], expert, shown))
-                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked([rest]).on(machine)))[0]
+                for e, expert in enumerate(self._experts):
+                    rest = stacked([self.draw(expert, (place, sites))]).on(machine)
+                    values = machine.put(self._features(place, expert, shown))
+                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, rest))[0]
                 judged.reshape(-1)[shown] = True
                 sums = [
                     MEANS * planes.reshape(len(planes), -1)[:, shown].sum(1, keepdims=True, dtype=np.int64)

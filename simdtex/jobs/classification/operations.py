@@ -29,7 +29,8 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
     count = offsets.shape[0]
     unit = np.float32(1) / np.float32(SIXTEENTHS * count)
     if machine is None:
-        row, col = (within(axis[:, None] + near, n, False) for axis, near, n in _axes(sites, offsets, rows, cols))
+        axes = zip(np.divmod(sites.astype(np.intp), cols), offsets.T, (rows, cols), strict=True)
+        row, col = (within(axis[:, None] + near, n, False) for axis, near, n in axes)
         values = np.moveaxis(levels[:, row, col], 1, 2).astype(np.int64)  # (B, N, S)
         if not contrast:
             return ((values + 8) >> 4).astype(np.float32).reshape(bands * count, -1)
@@ -46,11 +47,6 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
         *((unit, found) if contrast else (found,)),
     )
     return found
-
-
-def _axes(sites: Array, offsets: Array, rows: int, cols: int) -> tuple[tuple[Array, Array, int], ...]:
-    row, col = np.divmod(sites.astype(np.intp), cols)
-    return (row, offsets[:, 0], rows), (col, offsets[:, 1], cols)
 
 
 EXEMPLAR_MULTIPLE = 4

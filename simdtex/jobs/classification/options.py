@@ -19,7 +19,7 @@ rejection = partial(option, group="Unknown textures")
 @documented
 @dataclass(frozen=True)
 class Options:
-    """The options of the method ``classifier``."""
+    """The options of a classification."""
 
     order: int = comparison(
         2,

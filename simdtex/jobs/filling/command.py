@@ -25,6 +25,7 @@ from simdtex.cli.job import Task, job, notes
 from simdtex.cli.options import (
     DIRECTION,
     DIRECTIONS,
+    LIGHT,
     OUTPUT,
     PREVIEW,
     given,
@@ -51,12 +52,6 @@ BAND = option(
     type=int,
     help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  [the size "
     "of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side]",
-)
-LIGHT = option(
-    "--light",
-    words=LIGHTS,
-    group="Appearance",
-    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
 )
 
 

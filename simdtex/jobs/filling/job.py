@@ -19,7 +19,7 @@ from simdtex.inputs import check_mask, check_picture, check_samples
 from simdtex.io.image import check_sample
 from simdtex.jobs.synthesis.job import Synthesis
 from simdtex.machine import Machine, memory
-from simdtex.maspar.accounting import accounting
+from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, of_palette
 from simdtex.methods.mrf.plan import NEAR
@@ -451,7 +451,7 @@ class Filling:
                 sample = self.sample_of(window)
                 seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                plan, account = self.plan(window, sample), accounting(self.options.array)
+                plan, account = self.plan(window, sample), observers(self.options.array)
                 made, output = drive(plan, machine, seed, seen, now, account)
                 assert output.source is not None and output.temperature is not None
                 about = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex mix`` and ``solid``: pyramid matching, which no other command loads."""
+"""``simdtex mix`` and ``solid``."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ import click
 import numpy as np
 
 from simdtex.cli.command import EITHER, OUTPUTS, READ, WRITE
-from simdtex.cli.inputs import channels, last_iteration, output_shape, read_inputs, read_material, size_text
+from simdtex.cli.inputs import channels, last_iteration, output_shape, read_material, size_text
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import PROFILE, given, input_options, option, output_option, size_option, stages_option
+from simdtex.cli.options import NUMBERS, PROFILE, given, option, output_option, size_option, stages_option
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid import solid as solids
+
+NUMBERED = ("palette", "pattern", "low", "high")
+"""The options that name a sample."""
 
 
 @job(
@@ -27,7 +30,13 @@ from simdtex.methods.pyramid import solid as solids
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @output_option("Write this picture.", WRITE)
 @size_option("twice the first sample", base="the first sample")
-@input_options("mix")
+@option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
+@option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
+@option(
+    "--average", type=NUMBERS, metavar="W,W,...", help="Average the patterns with these weights, one for each sample."
+)
+@option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
+@option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
 @stages_option("every iteration")
 @PROFILE
 def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
@@ -40,18 +49,30 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
     from simdtex.jobs.mixes.job import mix
 
     material = read_material(samples)
-    chosen = read_inputs("mix", options, material)
+    options |= {name: _number(name, options[name], samples) for name in NUMBERED if options[name] is not None}
     pixels, metadata = material.pixels, material.metadata and material.metadata.at()._replace(exif=None)
-    shape = output_shape(size, pixels[0])
-    chosen["channel_axis"] = -1 if any(one.ndim > 2 for one in pixels) else None
+    rows, cols = output_shape(size, pixels[0])
+    axis = -1 if any(one.ndim > 2 for one in pixels) else None
     image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)), metadata=metadata)
     return Task(
-        partial(mix, pixels, shape, **given(options | chosen)),
-        f"{shape[1]}x{shape[0]} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
+        partial(mix, pixels, (rows, cols), channel_axis=axis, **given(options)),
+        f"{cols}x{rows} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
         str(output),
         [lambda made, run: image.write(output, made, metadata)],
         material.limits,
         lambda made, output: click.echo(last_iteration(output.statistics)),
+    )
+
+
+def _number(name: str, text: str, samples: tuple[Path, ...]) -> int:
+    """Return the number, from 0, of the sample that an option names by its path as given or its number from 1."""
+    if Path(text) in samples:
+        return samples.index(Path(text))
+    if text.isdecimal() and 1 <= int(text) <= len(samples):
+        return int(text) - 1
+    raise ValueError(
+        f"--{name} {text} is none of the samples; give the path of one as in the command, or its number, 1 to "
+        f"{len(samples)}"
     )
 
 

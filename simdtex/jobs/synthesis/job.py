@@ -17,13 +17,11 @@ from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_cha
 from simdtex.inputs import check_inputs, check_samples
 from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine, open_machine
-from simdtex.maspar.accounting import accounting
+from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import ORDERS
 from simdtex.methods.multires import options as multires
-from simdtex.methods.multires.algorithm import Plan as DeBonet
 from simdtex.methods.pyramid import options as pyramid
-from simdtex.methods.pyramid.algorithm import Plan as HeegerBergen
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair, Surroundings
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -161,22 +159,24 @@ class Synthesis:
         if self.method == "mrf":
             plan = mrf.plan(self.pictures, self.shape, self.options, self.given, self.guide)
             return replace(plan, remedy=self.remedy)
-        return METHODS[self.method][1](self.pictures.pixels[0], self.shape, self.options)
+        if self.method == "multires":  # each loads what the others do not need
+            from simdtex.methods.multires.algorithm import Plan as Multires
+
+            return Multires(self.pictures.pixels[0], self.shape, self.options)
+        from simdtex.methods.pyramid.algorithm import Plan as Pyramid
+
+        return Pyramid(self.pictures.pixels[0], self.shape, self.options)
 
     def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Run the plan, and return its result."""
-        others = accounting(self.options.array) if self.method == "mrf" else ()
+        others = observers(self.options.array) if self.method == "mrf" else ()
         return drive(self.plan(), machine, seed, callback, checkpointing, others)
 
 
-METHODS: dict[str, tuple[Any, Any]] = {
-    "mrf": (mrf.Options, mrf.Plan),
-    "multires": (multires.Options, DeBonet),
-    "pyramid": (pyramid.Options, HeegerBergen),
-}
-"""The options and the plan of each method."""
+METHODS: dict[str, Any] = {"mrf": mrf.Options, "multires": multires.Options, "pyramid": pyramid.Options}
+"""The options of each method."""
 
 
 def plan_synthesis(
@@ -201,7 +201,7 @@ def plan_synthesis(
             f"the method {method} takes one sample that is known everywhere, no mask, no known values and no "
             'guide; give method="mrf"'
         )
-    chosen: Any = resolve(METHODS[method][0], "synth", with_channels_last(options, channel_axis), synthesize)
+    chosen: Any = resolve(METHODS[method], "synth", with_channels_last(options, channel_axis), synthesize)
     lit, about = in_light(pictures, light, vars(chosen).get("categorical", False))
     return Synthesis(lit, size, method, chosen, inputs.given, inputs.guide, about, channel_axis, TILED)
 

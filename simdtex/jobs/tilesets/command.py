@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from simdtex.cli.command import ENTER, FOLDER
 from simdtex.cli.inputs import SHEET, Also, Folder, Material, Reading, channels, output_shape, read_lead, read_material
 from simdtex.cli.job import Task, job, notes
-from simdtex.cli.options import MAP, PROFILE, given, input_options, output_option, size_option
+from simdtex.cli.options import LIGHT, MAP, PROFILE, given, option, output_option, size_option
 from simdtex.methods.mrf import options as mrf
+from simdtex.options import whole
 
 PLANE = 8
 """Rows and columns of tiles of the plane that shows a set."""
@@ -31,10 +32,18 @@ PLANE = 8
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this folder: pictures, and the set for Tiled, Godot and GLSL.", FOLDER)
 @size_option("256", of="tiles")
-@input_options("tileset")
+@option(
+    "--colours",
+    type=int,
+    help="Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81.  [2; with several samples their "
+    "number]",
+)
+@LIGHT
 @MAP
 @PROFILE
-def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options: Any) -> Task:
+def tileset(
+    samples: tuple[Path, ...], output: Path, size: str | None, roles: Any, colours: int | None, **options: Any
+) -> Task:
     """Make a set of corner tiles with the texture of SAMPLE, for a game.
 
     Tiles fit wherever the colours of their corners agree, so that a plane of them has no period. Two or three samples,
@@ -44,15 +53,16 @@ def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options
     from simdtex.jobs.tilesets.job import tileset
     from simdtex.model.source_map import NORMALS
 
+    if colours is not None:
+        whole("--colours", colours, 2, 3)
     how = Reading(palette=bool(options["categorical"]))
-    roles = options.pop("roles")
     leads = [read_lead([path], output, {"roles": roles}, how) for path in samples]
     lead = leads[0][1] if len(leads) == 1 else read_material([one.paths[0] for _, one in leads], how)
     folders = [one for one, _ in leads if isinstance(one, Folder)]
     maps = read_maps(folders, lead)
-    shape = output_shape("256" if size is None else size, lead.pixels[0])
+    rows, cols = output_shape("256" if size is None else size, lead.pixels[0])
     normals = bool(folders) and folders[0].found.files[folders[0].lead] in NORMALS
-    colours = options.pop("colours") or max(2, len(samples))
+    colours = colours or max(2, len(samples))
     names = [path.stem for path in lead.paths] if len(samples) > 1 else [f"{n}" for n in range(colours)]
     if len({*names}) < len(names):
         names = [f"{name} {n}" for n, name in enumerate(names, 1)]
@@ -61,10 +71,10 @@ def tileset(samples: tuple[Path, ...], output: Path, size: str | None, **options
     own |= {"tiles.tsx", "tiles.tres", "tiles.glsl", "plane.tmx", "plane.png"}
     earlier_files(output, "the tiles", own.__contains__)
     return Task(
-        partial(tileset, lead.array, shape, colours=colours, channel_axis=lead.channel_axis, **given(options)),
-        f"{colours**4} tiles of {shape[1]}x{shape[0]}",
+        partial(tileset, lead.array, (rows, cols), colours=colours, channel_axis=lead.channel_axis, **given(options)),
+        f"{colours**4} tiles of {cols}x{rows}",
         str(output),
-        [partial(write, output, maps, names, normals, shape)],
+        [partial(write, output, maps, names, normals)],
         lead.limits,
         lambda made, run: notes(run),
     )
@@ -102,15 +112,7 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
     return maps
 
 
-def write(
-    output: Path,
-    maps: list[Also],
-    names: list[str],
-    normals: bool,
-    shape: tuple[int, ...],
-    made: NDArray[Any],
-    run: Any,
-) -> None:
+def write(output: Path, maps: list[Also], names: list[str], normals: bool, made: NDArray[Any], run: Any) -> None:
     """Write a set into a folder: the packed pictures and the tiles of all maps, and what other programs read."""
     from simdtex.figures.sheet import fitted, rgb
     from simdtex.io import image
@@ -119,8 +121,8 @@ def write(
     from simdtex.jobs.tilesets.corners import corners_of, laid, numbers, plane, torus
     from simdtex.model.source_map import unit_normals
 
-    (rows, cols), colours = shape, len(names)
-    grid = corners_of(torus(colours))
+    colours, grid = len(names), corners_of(torus(len(names)))
+    rows, cols = (side // len(grid) for side in made.shape[:2])
     if normals and made.ndim == 3:
         made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
     corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))

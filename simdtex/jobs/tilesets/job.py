@@ -4,30 +4,30 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex import random
 from simdtex.checkpoint import Checkpointing
-from simdtex.declared import Tileset
-from simdtex.driver import drive, with_channels_last
-from simdtex.inputs import Inputs
-from simdtex.jobs.inputs import Work, public
+from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_channels_last
+from simdtex.inputs import check_samples
 from simdtex.jobs.tilesets.corners import CYCLE, TORUS, corners_of, torus
 from simdtex.machine import Machine
+from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import sums_around
-from simdtex.model.light import in_light
+from simdtex.model.light import Light, in_light
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import Lattice, Phases, parse_lattice, phases, plain, regular
-from simdtex.options import DataWarning, resolve
+from simdtex.options import DataWarning, resolve, whole
 from simdtex.run import Callback, Output, OutputWithSource, Progress
 
 USUAL = 4
@@ -44,12 +44,53 @@ FREE = 0.25
 """Share of a side, on each side of its middle, in which either of the textures of its two corners may be."""
 
 
-@public("tileset", without="boundary")
-def tileset(call: Tileset) -> Work:
+def tileset(
+    sample: ArrayLike | Sequence[ArrayLike],
+    size: int | tuple[int, int] = 256,
+    *,
+    colours: int | None = None,
+    light: Literal["keep", "even"] = "keep",
+    channel_axis: int | None = None,
+    rng: Seed = None,
+    device: Device = None,
+    callback: Callback | None = None,
+    checkpoint: Kept = None,
+    full_output: bool = False,
+    **options: Any,
+) -> Any:
     """Return a set of corner tiles, from which planes of any size are laid without a period.
 
     Tiles fit wherever the colours of their four corners agree. The set has one tile for each combination of colours, 16
     for two colours and 81 for three, so that corners of a plane may be coloured at random.
+
+    Parameters
+    ----------
+    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
+        The texture, or a list of two or three of one type, such as grass and sand: those of the corners.
+    size : int or (int, int)
+        Rows and columns of a tile, 16 or more; one number for both. Whole cells of a regular texture should fit.
+    colours : int, 2 to 3, optional
+        Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81. None: 2; with several samples their
+        number.
+    light : {"keep", "even"}
+        Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic
+        of row and column.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+    device : str or Machine, optional
+        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
+        SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
+        run continues from it, to the same bytes. The file is removed when the function returns.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
+    **options
+        Those of the method, see `simdtex.methods.mrf.Options`.
 
     Returns
     -------
@@ -59,6 +100,11 @@ def tileset(call: Tileset) -> Work:
     output : simdtex.run.OutputWithSource
         Only with ``full_output=True``; ``source`` is in pixels of the sample. ``statistics["corners"]`` has the colour
         of the top left corner of each tile.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -74,22 +120,36 @@ def tileset(call: Tileset) -> Work:
     >>> tiles.shape
     (128, 128)
     """
-    several = len(call.sample.pixels)
-    colours = call.colours = call.colours or max(2, several)
+    job = plan_tileset(sample, size, colours=colours, light=light, channel_axis=channel_axis, **options)
+    picture, output = run("tileset", job, rng, device, callback, checkpoint)
+    return (picture, output) if full_output else picture
+
+
+def plan_tileset(
+    sample: Any,
+    size: int | tuple[int, int] = 256,
+    *,
+    colours: int | None = None,
+    light: str = "keep",
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Tileset:
+    """Check the arguments of `tileset`, and return its job."""
+    pictures, tile = check_samples(sample, channel_axis), check_shape(size if np.ndim(size) else (size, size), 16)
+    several = len(pictures.pixels)
+    if colours is not None:
+        whole("colours", colours, 2, 3)
+    colours = colours or max(2, several)
     if colours not in TORUS or several not in (1, colours):
         counts = f"{colours} colours and {several} sample{'s' * (several > 1)}"
         raise ValueError(f"a set has 2 or 3 colours, of one sample or each of one sample, and not {counts}; give such")
-    options = with_channels_last(call.options, call.channel_axis)
     if "boundary" in options:
         raise ValueError("tiles are made on a torus; leave boundary out")
-    chosen = resolve(Options, "tileset", options)
+    chosen = resolve(Options, "tileset", with_channels_last(options, channel_axis), tileset)
     if chosen.pixel == "density":
         raise ValueError('tiles continue the sources of their borders, and a density has none; give pixel="source"')
-    pictures, light = in_light(call.sample, call.light, chosen.categorical)
-    call.inputs = Inputs(call.sample)
-    size: Any = call.size
-    tiles: Any = Tiles(pictures, size, colours, replace(chosen, labels=True))
-    return Work(tiles, chosen, call.channel_axis, light=light.about)
+    pictures, lit = in_light(pictures, light, chosen.categorical)
+    return Tileset(pictures, tile, colours, replace(chosen, labels=True), lit, channel_axis)
 
 
 class Canvas(NamedTuple):
@@ -114,7 +174,7 @@ class Canvas(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tiles:
+class Tileset:
     """The job of `tileset`: three runs, which make the horizontal borders, the vertical ones, and all tiles.
 
     ``tile`` are the rows and columns of a tile.
@@ -124,6 +184,8 @@ class Tiles:
     tile: tuple[int, int]
     colours: int
     options: Options
+    light: Light
+    channel_axis: int | None = field(compare=False)
 
     @property
     def narrow(self) -> int:
@@ -135,7 +197,7 @@ class Tiles:
         """Pixels on each side of a corner, in rows and in columns, that are the same in all tiles with it."""
         return self.narrow + min(APART, self.narrow)
 
-    def __call__(
+    def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Make the borders and then the tiles; the state is the finished runs, and the state of the current one."""
@@ -155,7 +217,8 @@ class Tiles:
                     canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
                 seen = callback and partial(_show, callback, job, begin / every, grid.size / every)
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
-                made, output = drive(self.plan(canvas, grid, begin * rows * cols), machine, seed, seen, now)
+                plan, account = self.plan(canvas, grid, begin * rows * cols), observers(self.options.array)
+                made, output = drive(plan, machine, seed, seen, now, account)
                 finished.append((Canvas(made, np.asarray(output.source)), output.statistics | {"job": job}))
                 inside = None
                 if number < 2:

@@ -17,8 +17,6 @@ from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.laplacian import fold, laplacian_band, laplacian_collapse, laplacian_reduce, unfold
 from simdtex.methods.pyramid.steerable import filters, steerable_join, steerable_split
 
-__all__ = ["Transform", "most_levels"]
-
 BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]).astype(np.float32) / 256
 """The filter of the Laplacian pyramid."""
 

@@ -24,7 +24,7 @@ import simdtex
 from simdtex.commands import main
 from simdtex.io import image
 from simdtex.jobs.classification.options import Options
-from simdtex.jobs.synthesis.report import confusion_matrix
+from simdtex.jobs.classification.report import confusion_matrix
 from simdtex.model.display import label_colours, read_labels, write_labels
 
 # -- `simdtex.classify` and `simdtex.TextureClassifier`: what goes in, what comes out, and what is refused.
@@ -275,7 +275,12 @@ BAD = {
         ValueError,
         "order=45 with 2 bands compares 290 values; give a smaller order, so that there are 258 at most",
     ),
-    "an unknown option": ({"orders": 3}, TypeError, "unknown option 'orders' of the method 'classifier' .did you mean"),
+    "an unknown option": (
+        {"orders": 3},
+        TypeError,
+        "unknown option 'orders' of the method 'classification' .did you mean",
+    ),
+    "a misspelt input": ({"mask": {}}, TypeError, "did you mean 'masks'"),
     "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),
     "an option out of range": ({"unknown": 2}, ValueError, "unknown is 2; give at most 1"),
     "a schedule of many steps": ({"schedule": "raster"}, ValueError, "takes more than 64 steps"),

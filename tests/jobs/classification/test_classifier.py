@@ -11,8 +11,8 @@ from scipy.special import softmax
 from scipy.stats import multivariate_normal
 
 from simdtex.driver import drive
-from simdtex.jobs.classification.algorithm import Plan
-from simdtex.jobs.classification.job import model, patterns
+from simdtex.jobs.classification import model, patterns
+from simdtex.jobs.classification.algorithm import Classification
 from simdtex.jobs.classification.model import FEWEST_NEIGHBOURHOODS, MEANS, UNITS, Region, experts_of, learn, windowed
 from simdtex.jobs.classification.operations import (
     EXEMPLAR_MULTIPLE,
@@ -249,7 +249,7 @@ CLASSES = [whole(stripes((40, 40))), whole(stripes((40, 44), True))]
 
 def planned(picture, classes=CLASSES, **options):
     names = {c + 1: f"class {c}" for c in range(len(classes))}
-    return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
+    return Classification(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
 
 
 def run_classifier(picture, classes=CLASSES, machine=REFERENCE, seed=1, **options):
@@ -400,6 +400,10 @@ def test_whole_neighbourhoods_lie_within_a_mask_and_centres_of_strokes_alone_do(
     assert model._centres(edge, 2).sum() == 16 * 16
 
 
+def taught(scale, experts, regions, seed=1, **options):
+    return model._Class(REFERENCE, scale, experts, Options(**{"exemplars": 2**16} | options), seed, 0, regions)
+
+
 def test_a_stroke_is_learned_from_what_is_around_it_alone():
     """Its exemplars are those of the whole picture, whatever lies further away."""
     picture = texture((90, 100))
@@ -409,8 +413,8 @@ def test_a_stroke_is_learned_from_what_is_around_it_alone():
     found = []
     for one in (picture, np.where(ndimage.binary_dilation(sites, np.ones((3, 3)), 13), picture, 255 - picture)):
         region = Region(one[..., None], sites, whole=False)
-        known = model._Class(REFERENCE, Scale(Pictures((one[..., None],)), 512), experts, [region])
-        found.append([known.draw(REFERENCE, expert, 2**16, 1, 0) for expert in experts])
+        known = taught(Scale(Pictures((one[..., None],)), 512), experts, [region])
+        found.append([known.draw(expert) for expert in experts])
         assert known.regions[0].sites.sum() == 400 and known.regions[0].sites.shape == (46, 46)
     assert all((a == b).all() for a, b in zip(*found, strict=True))
 
@@ -418,19 +422,16 @@ def test_a_stroke_is_learned_from_what_is_around_it_alone():
 def test_exemplars_of_a_judged_part_and_of_validation_are_not_drawn():
     values = np.repeat(np.arange(40, dtype=np.uint8), 40).reshape(40, 40) * 3
     regions = [*whole(values), *whole(np.full((20, 20), 200, np.uint8), judged=True)]
-    options = Options(levels=1)
-    expert = experts_of(options, 1)[0]
-    scale = Scale(Pictures(tuple(one.pixels for one in regions)), 512)
-    known = model._Class(REFERENCE, scale, [expert], regions)
+    expert = experts_of(Options(), 1)[0]
+    given = Scale(Pictures(tuple(one.pixels for one in regions)), 512), [expert], regions
     upper = np.zeros((40, 40), bool)
     upper[:20] = True
-    drawn = known.draw(REFERENCE, expert, 2**16, 1, 0)
+    drawn = taught(*given).draw(expert)
     assert len(drawn) == 38 * 38 and drawn.max() < 200
-    assert known.draw(REFERENCE, expert, 2**16, 1, 0, model._Part(0, upper))[:, 0].min() == 60
-    few = known.draw(REFERENCE, expert, 50, 1, 0)
+    assert taught(*given).draw(expert, (0, upper))[:, 0].min() == 60
+    few, again, other = (taught(*given, seed, exemplars=50).draw(expert) for seed in (1, 1, 2))
     assert len(few) == 50
-    assert (few == known.draw(REFERENCE, expert, 50, 1, 0)).all()
-    assert (few != known.draw(REFERENCE, expert, 50, 2, 0)).any()
+    assert (few == again).all() and (few != other).any()
 
 
 def test_a_validation_picture_widens_what_is_known():
@@ -558,7 +559,9 @@ def test_the_fit_compares_measures_with_their_variances():
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]
-    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0))
+    plan = Classification(
+        pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0)
+    )
     found, output = drive(plan, machine, 3)
     expected, theirs = drive(plan, REFERENCE, 3)
     assert (found == expected).all() and found.dtype == np.uint8

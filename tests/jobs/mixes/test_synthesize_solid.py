@@ -183,6 +183,12 @@ def test_a_callback_sees_every_part_of_a_turn():
         ((4.0, 5, 6), {}, TypeError, "depth of the output must be an integer, not 4.0"),
         ((2**11, 2**11, 2**11), {}, ValueError, "a block of 2048 x 2048 x 2048 is beyond 2"),
         ((4, 5, 6), {"slices": "all"}, ValueError, "unknown slices 'all'; choose one of: each, together"),
+        (
+            (4, 5, 6),
+            {"slice": "all"},
+            TypeError,
+            "unknown option 'slice' of the method 'pyramid' .did you mean 'slices'",
+        ),
         ((4, 5, 6), {"levels": 3}, ValueError, "levels=3 is too many for a side of 4 pixels; give at most 2"),
         ((4, 5, 6), {"start": np.zeros((5, 6))}, ValueError, r"start has shape \(5, 6\); give one of 4 x 5 x 6 pixels"),
     ],

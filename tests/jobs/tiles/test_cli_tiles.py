@@ -245,7 +245,7 @@ STOPPED = """
 import os, signal, sys
 from pathlib import Path
 from simdtex.jobs import tiles as distributed
-from simdtex import cli
+from simdtex import commands as cli
 
 async def begun_by_zarr():
     pass

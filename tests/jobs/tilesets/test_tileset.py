@@ -17,7 +17,7 @@ from simdtex.commands import main
 from simdtex.io import image
 from simdtex.jobs.tilesets import files as tilesets
 from simdtex.jobs.tilesets.corners import CYCLE, TORUS, corners_of, numbers, plane, torus
-from simdtex.jobs.tilesets.job import Tiles
+from simdtex.jobs.tilesets.job import Tileset
 from simdtex.options import DataWarning
 
 GRAVEL, GRASS = data.gravel()[:64, :64], data.grass()[:60, :64]
@@ -65,7 +65,7 @@ def around_borders(packed, side, half):
 
 def test_a_border_is_the_same_in_all_tiles_that_have_it(tiles):
     (packed, output), size = tiles, 24
-    half = Tiles(None, (size, size), 2, None).narrow
+    half = Tileset(None, (size, size), 2, *[None] * 3).narrow
     for picture in (packed, output.source):
         borders = around_borders(picture, size, half)
         assert len(borders) == 8
@@ -73,7 +73,7 @@ def test_a_border_is_the_same_in_all_tiles_that_have_it(tiles):
             assert len(those) == 4
             for one in those[1:]:
                 assert_same_bits(those[0], one)
-    wide = Tiles(None, (size, size), 2, None).wide
+    wide = Tileset(None, (size, size), 2, *[None] * 3).wide
     rolled = np.roll(packed, (wide, wide), (0, 1))
     for colour in (0, 1):
         squares = [rolled[y * size :, x * size :][: 2 * wide, : 2 * wide] for y, x in np.argwhere(torus(2) == colour)]
@@ -82,8 +82,8 @@ def test_a_border_is_the_same_in_all_tiles_that_have_it(tiles):
 
 
 def test_the_three_runs_share_no_random_number(monkeypatch):
-    plans, plan = [], Tiles.plan
-    monkeypatch.setattr(Tiles, "plan", lambda *given: plans.append(plan(*given)) or plans[-1])
+    plans, plan = [], Tileset.plan
+    monkeypatch.setattr(Tileset, "plan", lambda *given: plans.append(plan(*given)) or plans[-1])
     simdtex.tileset(texture((14, 15)), 16, order=1, levels=2, rng=1, device=REFERENCE)
     grids = [one.grid(0) for one in plans]
     keys = np.concatenate([grid.places(np.arange(grid.size)) for grid in grids])
@@ -94,9 +94,10 @@ def test_all_pixels_are_from_the_sample(tiles):
     _, output = tiles
     assert output.source.shape == (96, 96, 2) and (output.source >= 0).all()
     assert output.statistics["corners"] == torus(2).tolist()
-    exact, more = made(finish=0)
+    exact, more = made(finish=0, array="64x64")
     assert_same_bits(exact, GRAVEL[more.source[..., 0], more.source[..., 1]])
     assert [one["job"] for one in more.statistics["runs"]][-1] == "tiles" and len(more.statistics["runs"]) == 3
+    assert all(one["accounting"]["steps"] for one in more.statistics["runs"])
 
 
 def test_a_plane_is_made_of_the_tiles(tiles):
@@ -192,7 +193,8 @@ def test_terrain_has_the_texture_of_each_corner():
     [
         (GRAVEL, 15, {}, "give 16 or more"),
         (GRAVEL, (16, 16, 16), {}, "two integers"),
-        (GRAVEL, 24, {"colours": 4}, "colours"),
+        (GRAVEL, 24, {"colours": 4}, "colours is 4; give 3 or fewer"),
+        (GRAVEL, 24, {"colors": 3}, "did you mean 'colours'"),
         ([GRAVEL, GRASS], 24, {"colours": 3}, "3 colours and 2 samples"),
         ([GRAVEL] * 4, 24, {}, "4 samples"),
         (GRAVEL[:30, :30], 128, {}, "40x40 known pixels"),
@@ -260,6 +262,7 @@ def test_the_files_of_a_set(folder):
         assert_same_bits(image.read(f"out/gravel-{a}{b}{c}{d}.png").pixels, tile)
     assert len([*(folder / "out").iterdir()]) == 1 + 16 + 5
     assert run("gravel.png", "-o", "out", *SMALL).exit_code == 0  # files of its own are replaced
+    assert "--colours is 99; give 3 or fewer" in run("gravel.png", "-o", "out", "--colours", 99).output
     (folder / "out" / "mine.txt").write_text("mine")
     done = run("gravel.png", "-o", "out", *SMALL)
     assert done.exit_code == 2 and "holds other files (mine.txt)" in done.output

@@ -387,6 +387,7 @@ def test_a_start_and_a_callback_are_those_of_the_method():
         ({"palette": 2}, ValueError, "palette is 2; give the number of a sample, 0 to 1"),
         ({"palette": True}, ValueError, "palette is True; give the number"),
         ({"pattern": -1}, ValueError, "pattern is -1; give the number"),
+        ({"patern": 0}, TypeError, "unknown option 'patern' of the method 'pyramid' .did you mean 'pattern'"),
         ({"low": 0}, ValueError, "low and high go together; give both, or neither"),
         ({"low": 0, "high": 9}, ValueError, "high is 9; give the number"),
         ({"pattern": 0, "average": [1, 1]}, ValueError, "a mixture has one pattern; give pattern, average, or low and"),

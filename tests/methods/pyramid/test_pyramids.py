@@ -15,6 +15,7 @@ from subbands import decompose
 from tolerances import HALF, PYRTOOLS, RECONSTRUCTION, UNIT32
 
 from simdtex import random
+from simdtex.methods.pyramid import operations_solid as solid
 from simdtex.methods.pyramid.laplacian import fold, noise, unfold
 from simdtex.methods.pyramid.operations_solid import (
     above,
@@ -24,7 +25,6 @@ from simdtex.methods.pyramid.operations_solid import (
     solid_reduce,
     solid_turn,
 )
-from simdtex.methods.pyramid.options import operations_solid as solid
 from simdtex.methods.pyramid.pyramids import most_levels
 from simdtex.methods.pyramid.steerable import ORIENTATIONS, UNIT, filters, steerable_join, steerable_split
 
