@@ -319,22 +319,38 @@ def read_inputs(job: str, options: dict[str, Any], samples: Material, how: Readi
     for name, one in inputs(job).items():
         if one.reader:
             given, files = options.pop(one.parameter(name)), Files(samples, how, options, name, one.flag(name))
-            found[name] = globals()[one.reader](given, files) if given else None
+            found[name] = (_OLD.get(one.reader) or globals()[one.reader])(given, files) if given else None
     return found
 
 
-def read_masks(paths: Sequence[Path], files: Files) -> Any:
-    """Read the masks of samples."""
+def _old_known(path: Path, files: Files) -> Any:
+    found, files.options["geo"] = read_known(path, files.samples, files.how)
+    return found
+
+
+def _old_guides(pair: tuple[list[Path], Path], files: Files) -> Any:
+    found, files.options["labels"] = read_guides(pair, files.samples, files.how, files.options["labels"])
+    return found
+
+
+_OLD: dict[str, Callable[[Any, Files], Any]] = {
+    "read_masks": lambda given, files: read_masks(given, files.samples, files.how),
+    "read_known": _old_known,
+    "read_guides": _old_guides,
+}
+
+
+def read_masks(paths: Sequence[Path], samples: Material, how: Reading = PLAIN) -> Any:
+    """Read the masks of samples, of ``--sample-mask``; None without paths."""
     from simdtex.io import image
 
-    _check_flat(files)
-    check_each(files.flag, paths, files.samples)
-    ascending = files.how.ascending
-    masks = [
-        image.read_mask(path, shape, ascending=ascending)
-        for path, shape in zip(paths, files.samples.sizes, strict=True)
-    ]
-    return masks if files.samples.several else masks[0]
+    if not paths:
+        return None
+    _check_flat(samples)
+    check_each("--sample-mask", paths, samples)
+    sizes = zip(paths, samples.sizes, strict=True)
+    masks = [image.read_mask(path, shape, ascending=how.ascending) for path, shape in sizes]
+    return masks if samples.several else masks[0]
 
 
 def read_classes(named: Sequence[tuple[str, list[Path]]], files: Files) -> dict[str, list[NDArray[Any]]]:
@@ -365,32 +381,6 @@ def read_number(text: str, files: Files) -> int:
     )
 
 
-def read_map(path: Path, files: Files) -> Any:
-    """Read a map of a simulation: of probabilities a table, too; any other a picture or a grid, channels in front."""
-    from simdtex.io import grids, image
-
-    name, how = files.name, files.how._replace(channels=not files.samples.deep)
-    if name == "probabilities" and (table := read_table(path, files)) is not None:
-        return table
-    if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
-        return image.read_mask(path, image.read(path).pixels.shape, ascending=how.ascending)
-    found, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
-    pixels = planes(found) > 0 if name == "region" else planes(found)
-    several = pixels.shape[-1] > 1
-    values: Any = in_place(pixels, grid) if grid else pixels if several else pixels[..., 0]
-    if several:
-        return values.transpose("variable", ...) if grid else np.moveaxis(values, -1, 0)
-    return values
-
-
-def read_like(path: Path, files: Files) -> Any:
-    """Read the grid that says where the output lies."""
-    found, _, grid = read_pixels(path, files.how._replace(variables=()))
-    if grid is None or not grid.frame.told:
-        raise ValueError(f"{path} does not say where its cells lie; give a grid or a raster with coordinates")
-    return in_place(found[..., :1], grid)
-
-
 def in_place(pixels: NDArray[Any], grid: CartesianGrid) -> Any:
     """Return values of a grid, ([layers,] rows, cols, variables), as an array of xarray with its coordinates.
 
@@ -409,47 +399,60 @@ def in_place(pixels: NDArray[Any], grid: CartesianGrid) -> Any:
     return xarray.DataArray(values, coordinates, dims, name, sizes | grid.about.get(name or "", {}))
 
 
-def read_table(path: Path, files: Files, valid: tuple[float, float] | None = None) -> HardData | None:
-    """Read a table of data, and say of a picture where y = 0 is.
+def read_table(
+    path: Path,
+    samples: Material,
+    how: Reading,
+    origin: Sequence[float] | None = None,
+    like: Path | None = None,
+    valid: tuple[float, float] | None = None,
+) -> HardData | None:
+    """Read a table of data, and say of a picture where y = 0 is: at the ``origin``, or as in the grid ``like``.
 
     None if a file is no table, by its content if that is a grid or a point set, else by its name.
     """
     from simdtex.io import grids
     from simdtex.io.hard_data import SUFFIXES, read_hard_data
 
-    kind, how = grids.kind_of(path), files.how
+    kind = grids.kind_of(path)
     if kind != "points" and (kind is not None or path.suffix.lower() not in SUFFIXES):
         return None
     found = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
-    origin, like = files.options.get("origin"), files.options.get("like")
     if found.from_top:
         note(f"{path}: rows count from the top of the output, from 0 on")
-    elif files.samples.grid is None:
+    elif samples.grid is None:
         bottom = f"as in {like}" if like else f"and y = {origin[1] if origin else 0:g} is the bottom row of the output"
         note(f"{path}: y points north, {bottom}")
     return found
 
 
-def read_known(path: Path, files: Files) -> Any:
-    """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
+def read_known(
+    path: Path | None,
+    samples: Material,
+    how: Reading = PLAIN,
+    origin: Sequence[float] | None = None,
+    like: Path | None = None,
+) -> tuple[Any, Any]:
+    """Read the known values of an output, and the georeference of a raster or a grid; None for what there is not.
 
-    Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
-    Where a raster or a grid lies goes to ``geo`` of the options. If values are ``categorical`` and the samples have one
-    channel, a palette is categories.
+    They are a table, recognised by its name, a point set, a grid, a picture or, of a volume, a volume. A picture is
+    unknown where it is transparent, if it has alpha and the samples have none. If values are ``categorical`` and the
+    samples have one channel, a palette is categories.
     """
-    samples, how = files.samples, files.how
+    if path is None:
+        return None, None
     variables = tuple((how.columns or {}).get("value", ()))
-    if (table := read_table(path, files, samples.limits)) is not None:
-        return table
+    if (table := read_table(path, samples, how, origin, like, samples.limits)) is not None:
+        return table, None
     how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     how = how._replace(palette=how.palette and samples.channel_axis is None)
     one = read_pixels(path, how)
     check_profiles([samples.paths[0], path], [samples.metadata, one.metadata])
     if one.grid is not None and how.deep:
-        return in_place(one.pixels, one.grid)
-    files.options["geo"] = one.metadata and one.metadata.geo and one.metadata.geo.place()
+        return in_place(one.pixels, one.grid), None
     found = without_alpha(one, channels(samples.pixels[0]))
-    return found.reshape(found.shape[:2]) if channels(found) == 1 else found
+    place = one.metadata and one.metadata.geo and one.metadata.geo.place()
+    return found.reshape(found.shape[:2]) if channels(found) == 1 else found, place
 
 
 def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
@@ -469,15 +472,17 @@ def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
     )
 
 
-def _check_flat(files: Files) -> None:
+def _check_flat(samples: Material) -> None:
     """Raise if pictures of samples are asked for, which are no pictures."""
-    if files.samples.deep:
-        path = files.samples.paths[0]
+    if samples.deep:
+        path = samples.paths[0]
         raise ValueError(f"{path} is a volume; --sample-mask and --guide are pictures: use simdtex.simulate in Python")
 
 
-def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
-    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``; whether it is of labels goes to ``labels`` of the options.
+def read_guides(
+    pair: tuple[list[Path], Path] | None, samples: Material, how: Reading = PLAIN, labels: bool | None = None
+) -> tuple[Any, bool | None]:
+    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and ``labels``: whether it is of labels; None without a pair.
 
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
     palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
@@ -487,11 +492,13 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
     from simdtex.methods.mrf.plan import LABELS
     from simdtex.model.pictures import CATEGORIES, few
 
-    _check_flat(files)
-    (paths, out), samples, labels = pair, files.samples, files.options["labels"]
-    check_each(files.flag, paths, samples)
-    how = Reading(files.how.deep, palette=True, channels=True, ascending=files.how.ascending)
-    found = [read_pixels(path, how) for path in (*paths, out)]
+    if pair is None:
+        return None, labels
+    _check_flat(samples)
+    paths, out = pair
+    check_each("--guide", paths, samples)
+    as_labels = Reading(how.deep, palette=True, channels=True, ascending=how.ascending)
+    found = [read_pixels(path, as_labels) for path in (*paths, out)]
     pictures = tuple(one.pixels for one in found)
     if volumes := [path for path, one in zip((*paths, out), pictures, strict=True) if one.ndim > 3]:
         raise ValueError(f"{volumes[0]} is a volume; give a guide of one layer")
@@ -519,10 +526,9 @@ def read_guides(pair: tuple[list[Path], Path], files: Files) -> tuple[Any, Any]:
     if free.any():
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
-    files.options["labels"] = labels
     grid = found[-1].grid
-    output = in_place(planes(wanted), grid) if files.how.deep and grid else wanted
-    return (own if samples.several else own[0], output)
+    output = in_place(planes(wanted), grid) if how.deep and grid else wanted
+    return (own if samples.several else own[0], output), labels
 
 
 def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:

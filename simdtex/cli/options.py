@@ -87,6 +87,8 @@ def pairs(text: str) -> list[tuple[str, str]]:
 
 
 NUMBERS = Parsed(lambda text: tuple(map(float, text.split(","))), "numbers separated by commas, such as 0.1,0.2")
+COLUMNS = Parsed(pairs, "AXIS=NAME,...")
+CATEGORIES = Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,...")
 DIRECTIONS = {"both": True, "x": "x", "y": "y"}
 DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 
@@ -96,8 +98,8 @@ TYPES: dict[str, Any] = {
     **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float, "integer": int},
     "new file": WRITE,
     "direction": DIRECTION,
-    "columns": Parsed(pairs, "AXIS=NAME,..."),
-    "categories": Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,..."),
+    "columns": COLUMNS,
+    "categories": CATEGORIES,
 }
 """The types of the options of inputs, by what a declaration says that it takes."""
 
@@ -220,6 +222,65 @@ PREVIEW = option(
     help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
+SAMPLE_MASK = option(
+    "--sample-mask",
+    multiple=True,
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    method="mrf",
+    help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
+)
+KNOWN_OPTIONS = together(
+    option(
+        "--known",
+        type=READ,
+        metavar="FILE",
+        group=DATA,
+        method="mrf",
+        help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
+        "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
+    ),
+    option(
+        "--columns",
+        type=COLUMNS,
+        metavar="x=NAME,...",
+        group=DATA,
+        method="mrf",
+        help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
+        "number; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others are "
+        "values]",
+    ),
+    option(
+        "--categories",
+        type=CATEGORIES,
+        metavar="NAME=NUMBER,...",
+        group=DATA,
+        method="mrf",
+        help="Take these numbers for the texts in the table of --known, as sand=1,shale=0.",
+    ),
+    option(
+        "--missing",
+        multiple=True,
+        type=float,
+        metavar="VALUE",
+        group=DATA,
+        method="mrf",
+        help="Take this number in tables and grids as unknown, too; may be repeated.  [codes such as -999, outside of "
+        "the values of the sample]",
+    ),
+)
+"""Known values of the output, and how their file is read, see `simdtex.cli.inputs.take_reading`."""
+
+GUIDE = option(
+    "--guide",
+    type=READ_PAIR,
+    metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
+    group=DATA,
+    method="mrf",
+    help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of labels or "
+    "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
+)
 
 
 MAP = option(
