@@ -16,7 +16,8 @@ import distributed
 from distributed import Client, Worker, WorkerPlugin
 
 from simdtex.jobs.tiles.store import Store, Turn
-from simdtex.jobs.tiles.turns import Execute, do
+from simdtex.jobs.tiles.tasks import do
+from simdtex.jobs.tiles.turns import Execute
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
 from simdtex.options import whole

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.jobs.tiles.windows import Tile
 from simdtex.methods.mrf.finish import gaussian_offsets
 from simdtex.methods.mrf.plan import Plan
 from simdtex.model.lattice import Grid
@@ -40,8 +39,41 @@ PIXEL = 400, 40
 Maps = dict[str, list[NDArray[Any]]]
 """Further maps of the material by name: (rows, cols[, channels]), one for each picture of the sample."""
 
-Arrays = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
-"""The axes after rows and columns, and the types, of arrays of the output, by name."""
+
+class Outputs(NamedTuple):
+    """The arrays of an output: the image, with an axis for its ``channels``; the ``source`` map; further ``maps``."""
+
+    channels: bool
+    source: bool
+    maps: Maps
+
+    def arrays(self, plan: Plan) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Return the axes after rows and columns, and the type, of each array by name."""
+        sample = plan.sample
+        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
+        found |= {"source": ((2 + (len(sample.boxes) > 1),), np.dtype(np.int32))} if self.source else {}
+        return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in self.maps.items()}
+
+
+class Tile(NamedTuple):
+    """A tile or a window of a lattice: its first row and column, and its numbers of rows and columns."""
+
+    top: int
+    left: int
+    rows: int
+    cols: int
+
+
+class Framed(NamedTuple):
+    """A tile in a window of its lattice: the window, and the tile's rows and columns in the window."""
+
+    window: Tile
+    rows: slice
+    cols: slice
+
+    def cut(self, array: NDArray[Any]) -> NDArray[Any]:
+        """Return the tile's part of an array (..., rows, cols) over the window."""
+        return np.ascontiguousarray(array[..., self.rows, self.cols])
 
 
 @dataclass(frozen=True)
@@ -84,20 +116,29 @@ class LevelLayout:
         """Number of tasks of a turn."""
         return ceil(self.count / self.together)
 
-    def task(self, number: int) -> range:
-        """Return the numbers of the tiles of a task."""
-        return range(number * self.together, min(self.count, (number + 1) * self.together))
-
-    @property
-    def lattice(self) -> Grid:
-        """The lattice of the whole level."""
-        return Grid((self.rows, self.cols), self.torus)
+    def task(self, number: int) -> list[Tile]:
+        """Return the tiles of a task."""
+        return [*map(self.tile, range(number * self.together, min(self.count, (number + 1) * self.together)))]
 
     def tile(self, number: int) -> Tile:
         """Return a tile by its number, row by row."""
         i, j = divmod(number, self.across)
         top, left = i * self.side, j * self.side
         return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
+
+    def frame(self, tile: Tile, halo: int) -> Framed:
+        """Return a tile in the window that holds it and all sites of the level within ``halo`` sites of it."""
+        sides = []
+        for first, size, every in ((tile.top, tile.rows, self.rows), (tile.left, tile.cols, self.cols)):
+            if size + 2 * halo >= every:
+                begin, end = 0, every
+            elif self.torus:
+                begin, end = first - halo, first + size + halo
+            else:
+                begin, end = max(0, first - halo), min(every, first + size + halo)
+            sides.append((begin % every, end - begin, slice(first - begin, first - begin + size)))
+        (top, rows, down), (left, cols, right) = sides
+        return Framed(Tile(top, left, rows, cols), down, right)
 
     @property
     def chunk(self) -> int:
@@ -159,33 +200,28 @@ class Layout:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def further(plan: Plan, source: bool, maps: Maps) -> Arrays:
-    """Return the arrays of the output in addition to the picture: the source map if ``source``, and ``maps``."""
-    found: Arrays = {"source": ((2 + (len(plan.sample.boxes) > 1),), np.dtype(np.int32))} if source else {}
-    return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in maps.items()}
-
-
-def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Layout:
-    """Return the layout of an output in tiles of at most ``tile`` sites on a side, with ``more`` arrays.
+def planned(plan: Plan, seed: int, side: int, outputs: Outputs) -> Layout:
+    """Return the layout of ``outputs`` in tiles of at most ``side`` sites on a side.
 
     Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
     """
-    whole("tiles", tile, 1)
+    whole("side of tiles", side, 1)
     options, schedule = plan.options, plan.schedule
+    if not isinstance(options.schedule, str):
+        raise TypeError("workers know schedules by their names; give schedule the name of one")
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
-        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or leave tiles out")
-    count = ceil(plan.shape[0] / tile) * ceil(plan.shape[1] / tile)
+        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or make no tiles")
+    count = ceil(plan.shape[0] / side) * ceil(plan.shape[1] / side)
     if count > TILES:
-        raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
-    levels = tuple(_level(plan, seed, number, tile) for number in range(plan.levels))
-    sample, channels, sd = plan.sample, plan.sample.working.shape[0], plan.options.finish or 0
-    shown = tile + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
+        raise ValueError(f"tiles of {side}x{side} pixels are {count}, more than {TILES}; give larger ones")
+    levels = tuple(_level(plan, seed, number, side) for number in range(plan.levels))
+    sample, channels, sd = plan.sample, plan.sample.working.shape[0], options.finish or 0
+    shown = side + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
     window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    arrays = [((sample.shown,), sample.pixels.dtype), *(more or {}).values()]
-    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in arrays)
+    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in outputs.arrays(plan).values())
     disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + shown_bytes))
     return Layout(levels, channels, memory, disk)
 
