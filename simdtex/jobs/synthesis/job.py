@@ -140,6 +140,8 @@ def synthesize(
     about: dict[str, Any] = {"method": method, "mask": mask, "known": known, "known_source": known_source}
     job = plan_synthesis(sample, shape, guide=guide, light=light, channel_axis=channel_axis, **about, **options)
     if store is not None:
+        if not isinstance(store, TileStore):
+            raise TypeError(f"store is a {type(store).__name__}; give simdtex.TileStore(path)")
         if checkpoint is not None or full_output:
             raise ValueError(
                 "a store keeps the state and the source map of its run; leave checkpoint and full_output out"

@@ -101,9 +101,14 @@ class TileStore:
         check_workers(self.workers, device)
         if self.workers is None or isinstance(self.workers, int):
             memory.require_host(layout.memory * (self.workers or 1), "give smaller tiles or fewer workers")
+        path = Path(self.path)
+        if path.exists():
+            raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
+        if not path.parent.is_dir():
+            raise ValueError(f"the folder {path.parent} does not exist; make it first")
         with connected(self.workers) as client:
-            with _made(self.path) as temporary:
-                Store.create(temporary, plan, seed, outputs, layout, command=self.command, light=job.light.about)
+            with atomic_folder(path) as new:
+                Store.create(str(new), plan, seed, outputs, layout, command=self.command, light=job.light.about)
             return replace(self, workers=client).resume(device, callback, channel_axis=job.channel_axis)
 
     def resume(self, device: Device = None, callback: Callback | None = None, *, channel_axis: int | None = -1) -> Any:
@@ -153,10 +158,9 @@ class TileStore:
                         self.ended(store.samples(), image, output, about["command"])
                     store.finish()
             store.clean()
-        image = import_module("dask.array").from_zarr(store.where, component="image")
-        if channel_axis is None or image.ndim == 2:
-            return image
-        return import_module("dask.array").moveaxis(image, -1, channel_axis)
+        dask: Any = import_module("dask.array")
+        image = dask.from_zarr(store.where, component="image")
+        return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)
 
     @property
     def finished(self) -> bool:
@@ -206,18 +210,6 @@ def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
         apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
         found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
     return found
-
-
-@contextmanager
-def _made(store: PathLike) -> Iterator[str]:
-    """Yield a path for making a store, so that it exists completely or not at all."""
-    path = Path(store)
-    if path.exists():
-        raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
-    if not path.parent.is_dir():
-        raise ValueError(f"the folder {path.parent} does not exist; make it first")
-    with atomic_folder(path) as temporary:
-        yield str(temporary)
 
 
 @contextmanager

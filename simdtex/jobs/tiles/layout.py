@@ -92,11 +92,6 @@ class LevelLayout:
     torus: bool
 
     @property
-    def down(self) -> int:
-        """Number of tiles from top to bottom."""
-        return ceil(self.rows / self.side)
-
-    @property
     def across(self) -> int:
         """Number of tiles from left to right."""
         return ceil(self.cols / self.side)
@@ -104,7 +99,7 @@ class LevelLayout:
     @property
     def count(self) -> int:
         """Number of tiles."""
-        return self.down * self.across
+        return ceil(self.rows / self.side) * self.across
 
     @property
     def together(self) -> int:

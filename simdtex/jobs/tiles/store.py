@@ -321,15 +321,13 @@ class Store:
             for name, (after, dtype) in arrays.items():
                 self._sites(name, level, dtype, after=after)
             count, side = len(arrays), -(-level.side // level.chunk)
-            shape = (count, *self._at("image").counts[:2])
-            axes = ("array", "chunk_y", "chunk_x")
-            self._array("checksums", shape, (count, side, side), np.dtype(np.uint32), axes)
+            self._array("checksums", (count, *self._at("image").counts[:2]), (count, side, side), np.uint32)
         else:
             for name, kind in zip(Field._fields, ("uint16", "int32", "uint16"), strict=True):
                 before = (self.work.layout.channels,) if name == "values" else ()
                 self._sites(f"work/level{level.number}/{turn.number}/{name}", level, kind, before)
         row = 2 + candidates
-        self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
+        self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.int64)
 
     def picture(self, turn: Turn) -> tuple[Any, Any]:
         """Return the picture of a written output, and its source map, even if that is not written."""
@@ -404,7 +402,7 @@ class Store:
             self._at(f"work/tally{turn.number}")[task]
             for tile in level.task(task):
                 if turn.phase != "show":
-                    self.read(level, turn.number, tile)
+                    self.read(turn.level, turn.number, tile)
                     continue
                 for name in names:
                     self._at(name)[spans(tile)]
@@ -422,21 +420,21 @@ class Store:
         rows = (tally[first : first + some] for first in range(0, tally.shape[0], some))
         return np.asarray(sum(part.sum(0) for part in rows))
 
-    def read(self, level: LevelLayout, turn: int, window: Tile) -> Field:
+    def read(self, number: int, turn: int, window: Tile) -> Field:
         """Return the state of a level's sites after the turn of a number, in a window, which may cross the seam."""
-        here = f"work/level{level.number}/{turn}"
-        return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in Field._fields))
+        return Field(*(self._cut(f"work/level{number}/{turn}/{name}", number, window) for name in Field._fields))
+
+    def held(self, number: int, window: Tile) -> Held | None:
+        """Return the data and guides of a level's sites in a window; None if there are none."""
+        if not self.work.held:
+            return None
+        return Held(*(self._cut(f"work/given/held{number}/{name}", number, window) for name in Held._fields))
 
     def write(self, turn: Turn, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites after a turn."""
         here = f"work/level{turn.level}/{turn.number}"
         for name, plane in field._asdict().items():
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
-
-    def held(self, level: LevelLayout, window: Tile) -> Held:
-        """Return the conditioning data of a level's sites in a window."""
-        here = f"work/given/held{level.number}"
-        return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the known values of the output in a tile, and their mask."""
@@ -482,6 +480,15 @@ class Store:
     def _chunk(self, name: str, row: int, col: int) -> str:
         return "/".join((name, "c", str(row), str(col), *("0" for _ in self._at(name).shape[2:])))
 
+    def _cut(self, name: str, number: int, window: Tile) -> NDArray[Any]:
+        """Return a window of an array (..., rows, cols) over the sites of a level, which may cross the seam."""
+        array, level = self._at(name), self.work.layout.levels[number]
+        found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
+        for rows, down in _parts(window.top, window.rows, level.rows):
+            for cols, right in _parts(window.left, window.cols, level.cols):
+                found[..., down, right] = array[..., rows, cols]
+        return found
+
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
 
@@ -522,10 +529,10 @@ class Store:
         """Return an array with rows and columns of sites, and further axes ``before`` and ``after`` these."""
         shape, chunks = ((*before, *sides, *after) for sides in ((level.rows, level.cols), (level.chunk, level.chunk)))
         axes = (*("channel",) * len(before), "y", "x", *("channel",) * len(after))
-        return self._array(name, shape, chunks, np.dtype(dtype), axes)
+        return self._array(name, shape, chunks, dtype, axes)
 
     def _array(
-        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
+        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: Any, axes: Any = None
     ) -> Checked:
         """Return an array; unless this process has it open, make it or rewrite its description."""
         if name in self._arrays:
@@ -548,14 +555,11 @@ class Stored(Conditions):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store.work.confidences)
-        self._store, self._work = store, store.work
+        self._store = store
 
     def at(self, number: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level's sites in a window; None if there are none."""
-        if not self._work.held:
-            return None
-        window = Tile(*grid.first, *grid.shape)
-        return self._store.held(self._work.layout.levels[number], window)
+        return self._store.held(number, Tile(*grid.first, *grid.shape))
 
     def coarser(self, plan: Input) -> Stored:
         """Return the conditions of the levels that have a reduced input: the store has those of all levels."""
@@ -563,7 +567,7 @@ class Stored(Conditions):
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        return self._work.scattered.get(str(number))
+        return self._store.work.scattered.get(str(number))
 
 
 def phase_of(level: LevelLayout) -> str:
@@ -576,19 +580,11 @@ def spans(tile: Tile) -> tuple[slice, slice]:
     return slice(tile.top, tile.top + tile.rows), slice(tile.left, tile.left + tile.cols)
 
 
-def cut(array: Any, level: LevelLayout, window: Tile) -> NDArray[Any]:
-    """Return a window of a stored array (..., rows, cols), which may cross the seam."""
-
-    def parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
-        at = 0
-        while at < size:
-            begin = (first + at) % whole
-            end = min(whole, begin + size - at)
-            yield slice(begin, end), slice(at, at + end - begin)
-            at += end - begin
-
-    found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
-    for rows, down in parts(window.top, window.rows, level.rows):
-        for cols, right in parts(window.left, window.cols, level.cols):
-            found[..., down, right] = array[..., rows, cols]
-    return found
+def _parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
+    """Yield the parts of a window of a line of ``whole`` sites, from ``first`` on, and their places in the window."""
+    at = 0
+    while at < size:
+        begin = (first + at) % whole
+        end = min(whole, begin + size - at)
+        yield slice(begin, end), slice(at, at + end - begin)
+        at += end - begin

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from threading import Lock
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,23 +24,15 @@ from simdtex.model.source_map import apply_source_map
 from simdtex.schedules.schedule import Trimmed
 from simdtex.schedules.sites import survey
 
-
-class Context(NamedTuple):
-    """The data that a process keeps from one tile to the next."""
-
-    store: Store
-    run: Run
-
-
 _one = Lock()
 """A process has one device, which two tiles would share."""
 
 
 @lru_cache(1)
-def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """Return the context of a store, which is put on a device once; only the latest is kept."""
+def context(where: str, name: str, device: str | Machine | None) -> tuple[Store, Run]:
+    """Return a store and its run, which is put on a device once; only those of the latest store are kept."""
     store = Store(where)
-    return Context(store, Run(store.work.plan, open_machine(device), store.work.seed, Stored(store)))
+    return store, Run(store.work.plan, open_machine(device), store.work.seed, Stored(store))
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
@@ -50,59 +41,56 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: in
     ``where`` and ``name`` are the store's path and name, since the path may later hold another store.
     """
     with _one:
-        here = context(where, name, device)
-        if not here.store.done(turn, task):
-            tiles = here.store.work.layout.levels[turn.level].task(task)
-            tallies = [PHASES[turn.phase](here, turn, tile) for tile in tiles]
-            here.store.note(turn, task, np.stack(tallies).sum(0))
+        store, run = context(where, name, device)
+        if not store.done(turn, task):
+            tiles = store.work.layout.levels[turn.level].task(task)
+            store.note(turn, task, np.stack([PHASES[turn.phase](store, run, turn, tile) for tile in tiles]).sum(0))
     return task
 
 
-def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
+def _begin(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a tile before the first sweep of its level."""
-    level = here.run.level(turn.level, tile)
-    field = first_field(here.run, level, _above(here, turn, tile))
-    here.store.write(turn, tile, _off(here.run.machine, field))
+    level = run.level(turn.level, tile)
+    field = first_field(run, level, _above(store, run, turn, tile))
+    store.write(turn, tile, _off(run.machine, field))
     return _tally(level, field, level.grid)
 
 
-def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
+def _whole(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a level that is a single tile, after all its sweeps."""
-    run = here.run
-    state = run.enter(turn.level, _above(here, turn, tile), here.store.penalty(turn))
+    state = run.enter(turn.level, _above(store, run, turn, tile), store.penalty(turn))
     while not run.at_equilibrium(state):
         state, _ = run.step(state)
-    here.store.write(turn, tile, _off(run.machine, state.field))
+    store.write(turn, tile, _off(run.machine, state.field))
     _, kinds = run.of(turn.level).fair_use(turn.level).split(state.penalty)
     return np.append([0, 0], kinds).astype(np.int64)  # whole steps
 
 
-def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
+def _sweep(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a tile after a sweep."""
-    run, machine, level = here.run, here.run.machine, here.store.work.layout.levels[turn.level]
-    frame = level.frame(tile, level.halo)
-    window, penalty = run.level(turn.level, frame.window), here.store.penalty(turn)
+    machine, whole, penalty = run.machine, store.work.layout.levels[turn.level], store.penalty(turn)
+    frame = whole.frame(tile, whole.halo)
+    level = run.level(turn.level, frame.window)
     assert penalty is not None
-    if frame.window.rows < level.rows:  # otherwise rows wrap around, and all are near
-        window = replace(window, schedule=Trimmed(window.schedule, frame.rows.start, frame.rows.stop))
+    if frame.window.rows < whole.rows:  # otherwise rows wrap around, and all are near
+        level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
     sweeps = turn.cooling + turn.free  # the only part of the schedule's state that persists
-    memory = window.schedule.init(window.setting)._replace(sweep=sweeps)
-    before = _on(machine, here.store.read(level, turn.number - 1, frame.window))
-    found, *_ = run_steps(window, State(*before, penalty, memory, turn.level, active=turn.active))
+    memory = level.schedule.init(level.setting)._replace(sweep=sweeps)
+    before = _on(machine, store.read(turn.level, turn.number - 1, frame.window))
+    found, *_ = run_steps(level, State(*before, penalty, memory, turn.level, active=turn.active))
     inside = Field(*map(frame.cut, _off(machine, found)))
-    here.store.write(turn, tile, inside)
-    return _tally(window, _on(machine, inside), run.grid(turn.level).window(*tile))
+    store.write(turn, tile, inside)
+    return _tally(level, _on(machine, inside), run.grid(turn.level).window(*tile))
 
 
-def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
+def _show(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a tile of the arrays of the output."""
-    run, store, work = here.run, here.store, here.store.work
-    level, outputs, sd = work.layout.levels[0], work.outputs, run.options.finish or 0
-    frame = level.frame(tile, int(gaussian_offsets(sd)[0].max()) if sd else 0)
-    state = store.read(level, turn.number - 1, frame.window)
-    known = store.held(level, frame.window).known if work.held else None
+    work, outputs, sd = store.work, store.work.outputs, run.options.finish or 0
+    frame = work.layout.levels[0].frame(tile, int(gaussian_offsets(sd)[0].max()) if sd else 0)
+    state, held = store.read(0, turn.number - 1, frame.window), store.held(0, frame.window)
     field, grid = _on(run.machine, state), run.grid(0).window(*frame.window)
-    shown = finished_picture(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
+    seen, known = state.source[frame.rows], held and held.known
+    shown = finished_picture(run, grid, field, known, seen, frame.rows.start)[:, frame.cols]
     if work.given:
         values, given = store.given(tile)
         shown = np.where(given, values, shown)
@@ -119,14 +107,12 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
 
 
-def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
+def _above(store: Store, run: Run, turn: Turn, tile: Tile) -> Field | None:
     """Return the sites of the level above in a tile, on the machine; None at the coarsest level."""
-    levels = here.store.work.layout.levels
-    if turn.reads == len(levels):
+    if turn.reads == len(store.work.layout.levels):
         return None
-    (top, rows), (left, cols) = here.run.grid(turn.level).window(*tile).above
-    above = here.store.read(levels[turn.reads], turn.number - 1, Tile(top, left, rows, cols))
-    return _on(here.run.machine, above)
+    (top, rows), (left, cols) = run.grid(turn.level).window(*tile).above
+    return _on(run.machine, store.read(turn.reads, turn.number - 1, Tile(top, left, rows, cols)))
 
 
 def _tally(level: Level, field: Field, grid: Grid) -> Tally:

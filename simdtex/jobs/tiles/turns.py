@@ -159,8 +159,7 @@ class Watch(Observer):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         found = []
         for row in range(0, levels[number].rows, step):
-            values, source, _ = self._run.store.read(
-                levels[number], turn.number - 1, Tile(row, 0, 1, levels[number].cols)
-            )
+            line = Tile(row, 0, 1, levels[number].cols)
+            values, source, _ = self._run.store.read(number, turn.number - 1, line)
             found.append(sample.picture(values[..., ::step], source[:, ::step]))
         return np.concatenate(found)

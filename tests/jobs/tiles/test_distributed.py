@@ -238,6 +238,11 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
         assert store.turn.number == 1
 
 
+def test_a_path_is_no_store():
+    with pytest.raises(TypeError, match=r"store is a str; give simdtex.TileStore\(path\)"):
+        simdtex.synthesize(SAMPLE, (20, 20), store="o.zarr")
+
+
 def test_a_schedule_of_ones_own_is_not_known_to_workers(tmp_path):
     with pytest.raises(TypeError, match="workers know schedules by their names"):
         store, schedule = TileStore(tmp_path / "o.zarr"), simdtex.schedules.get("coloring")
