@@ -91,10 +91,11 @@ def make_in_tiles(store: TileStore, job: Any) -> None:
 
 def resume_tiles(store: TileStore, device: str | None, quiet: bool) -> None:
     """Go on with an output in tiles."""
-    if finished := store.finished:
-        click.echo(f"{store.path} is finished already")
+    finished = store.finished
     with _going_on(store, quiet or finished) as callback:
         store.resume(device, callback)
+    if finished:
+        click.echo(f"{store.path} is finished already")
 
 
 @contextmanager

@@ -83,12 +83,12 @@ class TileStore:
     ended: Ended | None = None
     command: Any = None
 
-    def layout(self, job: Any, seed: int = 0) -> Layout:
+    def layout(self, job: Any) -> Layout:
         """Return the tiles of a job of `simdtex.jobs.synthesis.job.plan_synthesis`, and the memory and disk they need.
 
         Nothing is written.
         """
-        return self._planned(job, seed)[-1]
+        return self._planned(job, 0)[-1]
 
     def make(self, job: Any, rng: Seed, device: Device = None, callback: Callback | None = None) -> Any:
         """Make the output of a job, and return it; the parameters are those of `layout` and `simdtex.synthesize`."""

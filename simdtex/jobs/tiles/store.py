@@ -341,11 +341,10 @@ class Store:
     def finish(self) -> None:
         """Note that the output is complete, with its description."""
         about, plan = self.about, self.work.plan
-        kept = {name: about[name] for name in ("format", "version", "name", "seed")} | {
-            "light": about["light"]["light"]
-        }
+        kept = {name: about[name] for name in ("format", "version", "name", "seed")}
         arrays = {name: self._description(name) for name in self.work.outputs.arrays(plan)}
-        self.root.attrs["simdtex"] = kept | {"options": asdict(plan.options), "arrays": arrays}
+        more = {"light": about["light"]["light"], "options": asdict(plan.options), "arrays": arrays}
+        self.root.attrs["simdtex"] = kept | more
 
     def check(self) -> None:
         """Raise Damaged if a chunk of a complete output is missing or in the wrong place; its content is not read."""
