@@ -64,18 +64,6 @@ class Tile(NamedTuple):
     cols: int
 
 
-class Framed(NamedTuple):
-    """A tile in a window of its lattice: the window, and the tile's rows and columns in the window."""
-
-    window: Tile
-    rows: slice
-    cols: slice
-
-    def cut(self, array: NDArray[Any]) -> NDArray[Any]:
-        """Return the tile's part of an array (..., rows, cols) over the window."""
-        return np.ascontiguousarray(array[..., self.rows, self.cols])
-
-
 @dataclass(frozen=True)
 class LevelLayout:
     """A level in tiles of ``side`` x ``side`` sites; the last row and column of tiles may be smaller.
@@ -121,8 +109,8 @@ class LevelLayout:
         top, left = i * self.side, j * self.side
         return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
 
-    def frame(self, tile: Tile, halo: int) -> Framed:
-        """Return a tile in the window that holds it and all sites of the level within ``halo`` sites of it."""
+    def frame(self, tile: Tile, halo: int) -> tuple[Tile, slice, slice]:
+        """Return the window of a tile and all sites within ``halo`` of it, and the tile's rows and columns in it."""
         sides = []
         for first, size, every in ((tile.top, tile.rows, self.rows), (tile.left, tile.cols, self.cols)):
             if size + 2 * halo >= every:
@@ -133,7 +121,7 @@ class LevelLayout:
                 begin, end = max(0, first - halo), min(every, first + size + halo)
             sides.append((begin % every, end - begin, slice(first - begin, first - begin + size)))
         (top, rows, down), (left, cols, right) = sides
-        return Framed(Tile(top, left, rows, cols), down, right)
+        return Tile(top, left, rows, cols), down, right
 
     @property
     def chunk(self) -> int:
@@ -142,11 +130,10 @@ class LevelLayout:
         return max(fitting, default=self.side)
 
     @property
-    def window(self) -> int:
-        """Number of sites of the largest window."""
-        sides = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
-        down, across = sides if self.count > 1 else (self.rows, self.cols)
-        return down * across
+    def window(self) -> tuple[int, int]:
+        """Rows and columns of the largest window."""
+        side = self.side + 2 * self.halo if self.count > 1 else self.side
+        return min(side, self.rows), min(side, self.cols)
 
     @property
     def redundant(self) -> float:
@@ -154,10 +141,7 @@ class LevelLayout:
 
         A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
         """
-        if self.count == 1:
-            return 0.0
-        rows, cols = (min(self.side, n) for n in (self.rows, self.cols))
-        down, across = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
+        rows, cols, (down, across) = min(self.side, self.rows), min(self.side, self.cols), self.window
         return (down if down == self.rows else (rows + down) // 2) * across / (rows * cols) - 1
 
 
@@ -213,7 +197,7 @@ def planned(plan: Plan, seed: int, side: int, outputs: Outputs) -> Layout:
     levels = tuple(_level(plan, seed, number, side) for number in range(plan.levels))
     sample, channels, sd = plan.sample, plan.sample.working.shape[0], options.finish or 0
     shown = side + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
-    window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
+    window = max(*(prod(one.window) for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
     shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in outputs.arrays(plan).values())

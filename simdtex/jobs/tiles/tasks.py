@@ -69,16 +69,16 @@ def _whole(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
 def _sweep(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a tile after a sweep."""
     machine, whole, penalty = run.machine, store.work.layout.levels[turn.level], store.penalty(turn)
-    frame = whole.frame(tile, whole.halo)
-    level = run.level(turn.level, frame.window)
+    window, rows, cols = whole.frame(tile, whole.halo)
+    level = run.level(turn.level, window)
     assert penalty is not None
-    if frame.window.rows < whole.rows:  # otherwise rows wrap around, and all are near
-        level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
+    if window.rows < whole.rows:  # otherwise rows wrap around, and all are near
+        level = replace(level, schedule=Trimmed(level.schedule, rows.start, rows.stop))
     sweeps = turn.cooling + turn.free  # the only part of the schedule's state that persists
     memory = level.schedule.init(level.setting)._replace(sweep=sweeps)
-    before = _on(machine, store.read(turn.level, turn.number - 1, frame.window))
+    before = _on(machine, store.read(turn.level, turn.number - 1, window))
     found, *_ = run_steps(level, State(*before, penalty, memory, turn.level, active=turn.active))
-    inside = Field(*map(frame.cut, _off(machine, found)))
+    inside = Field(*(np.ascontiguousarray(plane[..., rows, cols]) for plane in _off(machine, found)))
     store.write(turn, tile, inside)
     return _tally(level, _on(machine, inside), run.grid(turn.level).window(*tile))
 
@@ -86,17 +86,18 @@ def _sweep(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
 def _show(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     """Write a tile of the arrays of the output."""
     work, outputs, sd = store.work, store.work.outputs, run.options.finish or 0
-    frame = work.layout.levels[0].frame(tile, int(gaussian_offsets(sd)[0].max()) if sd else 0)
-    state, held = store.read(0, turn.number - 1, frame.window), store.held(0, frame.window)
-    field, grid = _on(run.machine, state), run.grid(0).window(*frame.window)
-    seen, known = state.source[frame.rows], held and held.known
-    shown = finished_picture(run, grid, field, known, seen, frame.rows.start)[:, frame.cols]
+    halo = int(gaussian_offsets(sd)[0].max()) if sd else 0
+    window, rows, cols = work.layout.levels[0].frame(tile, halo)
+    state, held = store.read(0, turn.number - 1, window), store.held(0, window)
+    field, grid = _on(run.machine, state), run.grid(0).window(*window)
+    seen, known = state.source[rows], held and held.known
+    shown = finished_picture(run, grid, field, known, seen, rows.start)[:, cols]
     if work.given:
         values, given = store.given(tile)
         shown = np.where(given, values, shown)
     arrays = {"image": shown if outputs.channels else shown[..., 0]}
     if outputs.source or outputs.maps:
-        place = run.sample.place(frame.cut(state.source))
+        place = run.sample.place(np.ascontiguousarray(seen[:, cols]))
         arrays |= {"source": place} if outputs.source else {}
         for name, maps in outputs.maps.items():
             arrays[name] = apply_source_map(place, maps if len(maps) > 1 else maps[0])

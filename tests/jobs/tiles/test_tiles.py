@@ -181,9 +181,9 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     run = Run(plan, REFERENCE, 1)
     sites = 0
     for tile in map(level.tile, range(level.count)):
-        frame = level.frame(tile, level.halo)
-        window = run.level(0, frame.window)
-        schedule = Trimmed(window.schedule, frame.rows.start, frame.rows.stop)
+        where, rows, _ = level.frame(tile, level.halo)
+        window = run.level(0, where)
+        schedule = Trimmed(window.schedule, rows.start, rows.stop)
         active = Active(window, np.zeros((1, 1)), True)
         _, info = schedule.step(window.setting, schedule.init(window.setting), active)
         sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
