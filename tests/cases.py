@@ -380,7 +380,8 @@ def sweeps(run, state=None, watch=ignore):
 
 def analyse(machine, pixels, **options):
     """The analysis of a sample by options of ``multires``."""
-    from simdtex.methods.multires.options import Options, analysis
+    from simdtex.methods.multires import analysis
+    from simdtex.methods.multires.options import Options
 
     return analysis.analyse(machine, pixels, Options(**options))
 
