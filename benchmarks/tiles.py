@@ -23,7 +23,7 @@ import psutil
 from skimage import data
 
 import simdtex
-from simdtex.jobs import tiles as distributed
+from simdtex.jobs.synthesis.job import plan_synthesis
 
 SAMPLE = data.brick()[:128, :128]
 
@@ -35,8 +35,8 @@ def run(way, size, tiles, workers, folder, device):
     def job():
         if way == "whole":
             return simdtex.synthesize(SAMPLE, shape, **given)
-        tiled = {"tiles": tiles, "workers": workers if way == "workers" else None}
-        return distributed.synthesize(SAMPLE, shape, Path(folder) / "out.zarr", **given, **tiled)
+        store = simdtex.TileStore(Path(folder) / "out.zarr", tiles, workers if way == "workers" else None)
+        return simdtex.synthesize(SAMPLE, shape, store=store, **given)
 
     (picture, seconds), digest = common.timed(job), hashlib.sha256()
     for top in range(0, size, 2048):
@@ -63,7 +63,7 @@ def main(size=2048, tiles=1024, workers=2, ways="whole,here,workers", folder="",
     if folder:  # the process of one way
         run(ways, size, tiles, workers, folder, device)
         return
-    print("\n".join(distributed.plan(SAMPLE, (size, size), tiles=tiles).lines()))
+    print("\n".join(simdtex.TileStore("", tiles).layout(plan_synthesis(SAMPLE, (size, size))).lines()))
     words, rows = [f"--size={size}", f"--tiles={tiles}", f"--workers={workers}"], []
     for way in ways.split(","):
         found = watched([*words, *([f"--device={device}"] if device else []), "--ways", way])

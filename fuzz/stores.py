@@ -15,9 +15,8 @@ import numpy as np
 
 import simdtex
 from fuzz.corpus import damaged, put
-from simdtex.jobs import tiles as distributed
 from simdtex.jobs.tiles import layout
-from simdtex.jobs.tiles.turns import context
+from simdtex.jobs.tiles.tasks import context
 
 SHAPE = 20, 21
 GREY = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]
@@ -54,7 +53,8 @@ class Run:
             shutil.copytree(place, self.moments[-1], ignore=shutil.ignore_patterns("*.lock", ".simdtex-*"))
 
         given = SMALL | options
-        distributed.synthesize(sample, SHAPE, place / "o.zarr", tiles=tile, source_map=True, callback=keep, **given)
+        store = simdtex.TileStore(place / "o.zarr", tile, source_map=True)
+        simdtex.synthesize(sample, SHAPE, store=store, callback=keep, **given)
         keep(None)  # the finished store
         self.expected = simdtex.synthesize(sample, SHAPE, **given)
 
@@ -63,7 +63,7 @@ class Run:
         for _ in range(RESUMES):
             context.cache_clear()
             try:
-                made = distributed.resume(folder / "o.zarr", device="reference").compute()
+                made = simdtex.TileStore(folder / "o.zarr").resume("reference").compute()
                 return "the bytes", "" if np.array_equal(made, self.expected) else "another picture"
             except ValueError as error:
                 said = str(error)

@@ -14,6 +14,7 @@ _NAMES = {
     "simdtex.jobs.simulation.job": ("estimate", "simulate"),
     "simdtex.jobs.studies": ("quality",),
     "simdtex.jobs.synthesis.job": ("lcpdf", "synthesize"),
+    "simdtex.jobs.tiles.job": ("TileStore",),
     "simdtex.jobs.tilesets.job": ("tileset",),
     "simdtex.jobs.why.job": ("explain", "replay"),
     "simdtex.live.widget": ("Live",),

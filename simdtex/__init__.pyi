@@ -22,6 +22,7 @@ from simdtex.jobs.classification.job import TextureClassifier as TextureClassifi
 from simdtex.jobs.simulation import ensemble as ensemble
 from simdtex.jobs.studies import quality as quality
 from simdtex.jobs.synthesis.job import lcpdf as lcpdf
+from simdtex.jobs.tiles.job import TileStore as TileStore
 from simdtex.jobs.tilesets.job import tileset as tileset
 from simdtex.jobs.why.replay import Replay
 from simdtex.live.widget import Live as Live
@@ -116,9 +117,9 @@ class ClassificationOptions(TypedDict, total=False):
     window: float
 
 @overload
-def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: TileStore | None = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: TileStore | None = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
 @overload
 def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["multires"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MultiresOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload

@@ -204,41 +204,6 @@ def identities(job: Any) -> dict[str, Any]:
     return {one.name: getattr(job, one.name) for one in fields(job) if one.compare}
 
 
-def execute(
-    name: str,
-    run: Callable[[Machine, int, Callback | None, Checkpointing], tuple[NDArray[Any], Output]],
-    inputs: Callable[[], dict[str, Any]],
-    channel_axis: int | None,
-    rng: int | np.random.Generator | None,
-    device: str | Machine | None,
-    callback: Callback | None,
-    full_output: bool,
-    checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None,
-) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Run a public function whose input is validated on a device, and return its result.
-
-    ``name`` is the public function; ``run`` is `drive` with its plan, or a function that drives several plans in turn;
-    ``inputs()`` returns everything but the seed that determines the result, by the parameters' names; and
-    ``channel_axis`` is that of the returned picture. All other parameters are those that all public functions share; a
-    `Checkpointing` as ``checkpoint`` keeps states in memory.
-    """
-    machine = open_machine(device)
-    machine.profile()  # forget what was before
-
-    def seen(progress: Progress) -> Any:
-        assert callback
-        return callback(replace(progress, image=lambda: restored(progress.image(), channel_axis)))
-
-    with begin_run(checkpoint, name, rng, inputs, machine.name) as (seed, checkpointing):
-        image, output = run(machine, seed, callback and seen, checkpointing)
-    output.statistics.update(machine.profile() or {})
-    picture = restored(image, channel_axis)
-    if not full_output:
-        return picture
-    stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
-    return picture, replace(output, stages=stages, made=image)
-
-
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
     """Return a picture (rows, cols, channels) with the axes of the sample."""
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)

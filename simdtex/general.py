@@ -6,23 +6,19 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import chdir
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from simdtex.cli.command import FOLDER, command
+from simdtex.cli.command import ENTER, FOLDER, command, note
 from simdtex.cli.job import watching
 from simdtex.cli.options import DEVICE, QUIET, output_option
-from simdtex.jobs.tiles.command import resume_tiles, workers_option
+from simdtex.jobs.tiles.command import WORKERS, resume_tiles
 
 if TYPE_CHECKING:
     from simdtex.machine.devices import DeviceInfo
-
-from contextlib import chdir
-from typing import Any
-
-from simdtex.cli.command import ENTER
 
 
 @command(
@@ -30,7 +26,7 @@ from simdtex.cli.command import ENTER
     ("resume more.zarr --workers 4", "Continue an output in tiles with four processes."),
 )
 @click.argument("path", metavar="FILE", type=ENTER)
-@workers_option
+@WORKERS
 @DEVICE
 @QUIET
 def resume(path: Path, workers: int | str | None, device: str | None, quiet: bool) -> None:
@@ -42,7 +38,10 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
     from simdtex.commands import COMMANDS, load
 
     if (path / "zarr.json").is_file() or (path / "work").is_dir():
-        resume_tiles(path, workers, device, quiet)
+        from simdtex.jobs.synthesis.command import write_tiled_page
+        from simdtex.jobs.tiles.job import TileStore
+
+        resume_tiles(TileStore(path, workers=workers, note=note, ended=write_tiled_page), device, quiet)
         return
     if workers is not None:
         raise ValueError("--workers requires the .zarr store of --tiles; leave it out")

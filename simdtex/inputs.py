@@ -6,8 +6,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from copy import deepcopy
 from math import prod
 from typing import Any, NamedTuple
 
@@ -21,14 +19,6 @@ from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
 from simdtex.options import DataWarning, check_real
-
-
-def kept(value: Any) -> Any:
-    """Return a copy of an argument, whose arrays a callback may change; itself if it is of a type without copies."""
-    with suppress(Exception):
-        return deepcopy(value)
-    return value
-
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or a function that also knows the origin and the cells of the grid."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from importlib.util import find_spec
-from inspect import Parameter, signature
+from inspect import signature
 from math import isfinite, prod
 from numbers import Integral, Real
 from textwrap import indent, wrap
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
-F = TypeVar("F", bound=Callable[..., Any])
 
 MOST = 2**31 - 1
 """The default maximum of an integer option, since kernels count in 32 bits."""
@@ -284,39 +283,6 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any], function: Call
     values |= {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     values.pop("preset", None)
     return options(**values)
-
-
-def option_parameters(job: str, *methods: Any, without: str = "") -> list[Parameter]:
-    """Return the parameters that ``**options`` stands for in the function of a job, but for the one `without`.
-
-    ``methods`` are classes of options. An option has the default of the first class that has it, and the types of all.
-    """
-    declared = [("preset", PRESET, "str")] * any(has_presets(table(one)) for one in methods)
-    declared += [(one.name, one.metadata["option"], str(one.type)) for each in methods for one in fields(each)]
-    found: dict[str, Parameter] = {}
-    for name, one, type_ in declared:
-        type_ = f"Literal{list(one.kind.valid)}" if isinstance(one.kind, Choice) else type_
-        new = Parameter(name, Parameter.KEYWORD_ONLY, default=one.default_of(job), annotation=type_)
-        old = found.setdefault(name, new)
-        found[name] = old.replace(annotation=" | ".join(dict.fromkeys([old.annotation, type_])))
-    found.pop(without, None)
-    return list(found.values())
-
-
-def lists(parameters: Iterable[Parameter]) -> Callable[[F], F]:
-    """Return a decorator that lists parameters in a function's signature in the place of ``**options``.
-
-    The signature as it is written is kept as the attribute ``written``, for pages that describe options elsewhere.
-    """
-
-    def decorate(function: F) -> F:
-        written = signature(function)
-        own = [one for one in written.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
-        more = [one for one in parameters if one.name not in written.parameters]
-        vars(function).update(written=written, __signature__=written.replace(parameters=[*own, *more]))
-        return function
-
-    return decorate
 
 
 def documented(options: type[T]) -> type[T]:

@@ -68,7 +68,7 @@ class Progress(Brief):
     `simdtex.classify`, after every step, has a picture of the labels so far: 1 is the first class, and 0 a pixel not
     yet compared.
 
-    `simdtex.jobs.tiles.synthesize`, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
+    `simdtex.synthesize` with a store, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
     ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or ``"show"``, write the picture. ``sweep`` is that of
     the level, from 1; ``tile`` and ``tiles`` are the numbers of finished tiles and of all. The image has every n-th
     site of the level before the turn, about 1000 on a side. Reading it is slow.

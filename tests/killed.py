@@ -17,8 +17,8 @@ import numpy as np
 from cases import REFERENCE
 from runs import RUNS, SEED, digest, outcome
 
+import simdtex
 from simdtex.checkpoint import Checkpoint
-from simdtex.jobs import tiles as distributed
 
 JOBS = ("more", "known", "multires", "pyramid", "solid", "fill", "extend", "mix", "classify", "soft", "volume", "tiles")
 """Runs of the table, and tiles in a store beside the checkpoint's file."""
@@ -33,10 +33,10 @@ def made(job, checkpoint=None):
     if checkpoint is None:
         return digest(outcome("more", REFERENCE)[0][:1])
     given, options = RUNS["more"].inputs()
-    store = checkpoint.path.with_name("o.zarr")
-    if store.exists():
-        return digest([distributed.resume(store, device=REFERENCE).compute()])
-    return digest([distributed.synthesize(*given, store, tiles=6, rng=SEED, device=REFERENCE, **options).compute()])
+    store = simdtex.TileStore(checkpoint.path.with_name("o.zarr"), 6)
+    if store.path.exists():
+        return digest([store.resume(REFERENCE).compute()])
+    return digest([simdtex.synthesize(*given, store=store, rng=SEED, device=REFERENCE, **options).compute()])
 
 
 def child(job, folder, result):

@@ -155,15 +155,14 @@ def test_a_run_that_is_stopped_on_a_device_has_the_same_end(machine, reference, 
 )
 def test_tiles_have_the_bytes_of_the_whole(reference, tmp_path, name):
     zarr = pytest.importorskip("zarr")
-    from simdtex.jobs import tiles as distributed
-    from simdtex.jobs.tiles.turns import context
+    from simdtex.jobs.tiles.tasks import context
 
     (image, source, *_), _ = reference(name)
     given, options = RUNS[name].inputs()
-    store, options = tmp_path / "out.zarr", options | {"rng": SEED, "device": REFERENCE}
-    ours = distributed.synthesize(*given, store, tiles=RUNS[name].tiles, source_map=True, **options)
+    store = simdtex.TileStore(tmp_path / "out.zarr", RUNS[name].tiles, source_map=True)
+    ours = simdtex.synthesize(*given, store=store, **options, rng=SEED, device=REFERENCE)
     assert_same_bits(ours.compute(), image)
-    assert_same_bits(zarr.open_group(store)["source"][...], source)
+    assert_same_bits(zarr.open_group(store.path)["source"][...], source)
     context.cache_clear()
 
 

@@ -22,7 +22,7 @@ ROOMS = {
     ("methods.mrf",): 0,
     ("methods.pyramid",): 0,
     ("methods.multires",): 0,
-    ("inputs", "declared", "jobs.inputs"): 0,
+    ("inputs",): 0,
     ("figures",): 0,
     ("cli",): 0,
     ("maspar",): 0,

@@ -11,7 +11,6 @@ import xarray
 from cases import assert_same_bits, texture
 
 import simdtex
-import simdtex.jobs.tiles
 from simdtex.inputs import check_inputs, check_samples, is_several
 from simdtex.io import image, volume
 from simdtex.io.hard_data import HardData
@@ -493,7 +492,7 @@ READERS = {
     "several": lambda one: simdtex.synthesize([one, one], (6, 7), **OPTIONS),
     "mask": lambda one: simdtex.synthesize(PHOTO, (6, 7), mask=one, **OPTIONS),
     "guide": lambda one: simdtex.synthesize(PHOTO, (6, 7), guide=(PHOTO, one), **OPTIONS),
-    "tiles": lambda one: simdtex.jobs.tiles.synthesize(one, (6, 7), "no.zarr", **OPTIONS),
+    "tiles": lambda one: simdtex.synthesize(one, (6, 7), store=simdtex.TileStore("no.zarr"), **OPTIONS),
     "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
     "fill": lambda one: simdtex.fill(one, HOLE, **OPTIONS),
     "hole": lambda one: simdtex.fill(PHOTO, one, **OPTIONS),

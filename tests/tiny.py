@@ -32,12 +32,10 @@ MIXED = {"iterations": 1, "levels": 1, "rng": 1}
 
 def tiles(on):
     """A picture in tiles, with known pixels."""
-    from simdtex.jobs import tiles as distributed
-
     known = np.ma.MaskedArray(texture((12, 11)), np.indices((12, 11)).sum(0) % 3 > 0)
     with tempfile.TemporaryDirectory() as folder:
-        whole = distributed.synthesize(SMALL, (12, 11), f"{folder}/a.zarr", tiles=6, known=known, **TWO, **on)
-        return whole.compute()
+        store = simdtex.TileStore(f"{folder}/a.zarr", 6)
+        return simdtex.synthesize(SMALL, (12, 11), known=known, store=store, **TWO, **on).compute()
 
 
 JOBS = {

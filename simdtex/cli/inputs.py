@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import Named, check_input, note, preview_of
-from simdtex.declared import inputs
 from simdtex.model.pictures import check_alike, unknown_in
 
 if TYPE_CHECKING:
@@ -291,53 +290,6 @@ def last_iteration(statistics: dict[str, Any]) -> str:
     if not moved:  # no iteration, or a constant sample
         return text
     return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
-
-
-class Files(NamedTuple):
-    """What the readers of files know of a command.
-
-    ``samples`` are its pictures, ``how`` the way to read, ``options`` the others; ``name`` is that of the input, and
-    ``flag`` its option.
-    """
-
-    samples: Material
-    how: Reading
-    options: dict[str, Any]
-    name: str
-    flag: str
-
-
-def read_inputs(job: str, options: dict[str, Any], samples: Material, how: Reading = PLAIN) -> dict[str, Any]:
-    """Return the inputs of a job that are in files, and the channel axis, by the parameters of its function.
-
-    Their options are taken out; ``labels`` is set if guides decide it. `simdtex.declared` names the readers
-    ``reader(given, files)`` below.
-    """
-    found: dict[str, Any] = {"channel_axis": samples.channel_axis}
-    if not how.deep:
-        how = how._replace(ascending=samples.ascending)
-    for name, one in inputs(job).items():
-        if one.reader:
-            given, files = options.pop(one.parameter(name)), Files(samples, how, options, name, one.flag(name))
-            found[name] = (_OLD.get(one.reader) or globals()[one.reader])(given, files) if given else None
-    return found
-
-
-def _old_known(path: Path, files: Files) -> Any:
-    found, files.options["geo"] = read_known(path, files.samples, files.how)
-    return found
-
-
-def _old_guides(pair: tuple[list[Path], Path], files: Files) -> Any:
-    found, files.options["labels"] = read_guides(pair, files.samples, files.how, files.options["labels"])
-    return found
-
-
-_OLD: dict[str, Callable[[Any, Files], Any]] = {
-    "read_masks": lambda given, files: read_masks(given, files.samples, files.how),
-    "read_known": _old_known,
-    "read_guides": _old_guides,
-}
 
 
 def read_masks(paths: Sequence[Path], samples: Material, how: Reading = PLAIN) -> Any:

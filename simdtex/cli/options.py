@@ -25,7 +25,6 @@ from simdtex.cli.command import (
     WRITE,
     WRITE_PAIR,
 )
-from simdtex.declared import SHARED, Input, inputs, options_of
 from simdtex.model.light import LIGHTS
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
@@ -127,18 +126,11 @@ def job_options(job: str, *methods: Any) -> Callable[[Command], Command]:
     return together(*(_option(job, name, methods) for name, methods in found.items()))
 
 
-def paper_options(*names: str) -> Callable[[Command], Command]:
-    """Return a decorator that adds to a command options of the method mrf, whose defaults are the paper's."""
-    declared = table(options_of("synth")["mrf"])
+def paper_options(method: Any, *names: str) -> Callable[[Command], Command]:
+    """Return a decorator that adds to a command options of a class of options, whose defaults are the paper's."""
+    declared = table(method)
     paper = {name: declared[name].default if declared[name].paper is UNSET else declared[name].paper for name in names}
     return together(*(_option("", name, {"": replace(declared[name], default=paper[name])}) for name in names))
-
-
-def input_options(job: str, *names: str) -> Callable[[Command], Command]:
-    """Return a decorator that adds to a command the options of the inputs of a job alone, or of those of ``names``."""
-    wanted = names or inputs(job).keys() - SHARED.keys()
-    found = {name: one for name, one in inputs(job).items() if one.help and name in wanted}
-    return together(*(_option(job, name, {"": one}) for name, one in found.items()))
 
 
 def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[Command], Command]:
@@ -152,12 +144,6 @@ def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[C
     flags = [f"{flag}/--no-{flag[2:]}" if is_flag(kind) and first.default is None else flag]
     type_: Any = kinds.get(type(kind), str)
     words = [word for one in methods.values() if isinstance(one.kind, (Choice, Other)) for word in one.kind.valid]
-    if isinstance(first, Input):
-        flags, type_ = first.named(name), TYPES.get(first.takes, type_)
-        how |= {"metavar": first.metavar or ("FILE" if first.takes == "file" else None), "method": first.method}
-        how |= {"multiple": first.multiple, "default": None if first.default is UNSET else first.default or None}
-        if type_ is DIRECTION:
-            words, how["is_flag"], how["flag_value"] = [*DIRECTIONS], False, "both"
     if is_flag(kind):
         return option(*flags, is_flag=True, **{**how, "default": None})
     return option(*flags, type=type_, words=words, **how)
@@ -166,9 +152,9 @@ def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[C
 def _help(job: str, one: Declared) -> str:
     """Return the help of an option, with its default in the job."""
     default = one.default_of(job)
-    if default is None or (isinstance(one, Input) and one.none):
+    if default is None:
         shown = one.none.replace("`", "")
-    elif default is False or (isinstance(one, Input) and default in (0, UNSET)):
+    elif default is False:
         shown = ""
     else:
         shown = f"{default:g}" if isinstance(default, float) else str(default)

@@ -27,6 +27,7 @@ from simdtex.cli.options import (
     size_option,
 )
 from simdtex.maspar.array import EXECUTED
+from simdtex.methods.mrf.options import Options
 from simdtex.model.array import ARRAYS, MAPPINGS, PREFIX
 
 
@@ -62,7 +63,7 @@ from simdtex.model.array import ARRAYS, MAPPINGS, PREFIX
     words=("16K", "64K"),
     help="Give each PE this memory; what does not fit is refused.",
 )
-@paper_options(*EXECUTED)
+@paper_options(Options, *EXECUTED)
 @option(
     "--film",
     default="coloring,checkerboard,synchronous,raster",

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.driver import check_shape, execute
-from simdtex.inputs import check_inputs, kept
+from simdtex.driver import Device, Seed, check_shape, run
+from simdtex.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
 from simdtex.maspar.algorithm import Level, Problem, Program, by_lane
@@ -25,6 +25,8 @@ from simdtex.methods.mrf.problem import Input
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.square import LANES
 from simdtex.model.array import MAPPINGS, parse_array
+from simdtex.model.light import Light
+from simdtex.model.pictures import Pictures
 from simdtex.options import one_of, resolve
 from simdtex.run import Callback, Output, Progress, Stage
 
@@ -74,8 +76,8 @@ def synthesize(
     mapping: str = MAPPINGS[0],
     memory: str = "64K",
     channel_axis: int | None = None,
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
+    rng: Seed = None,
+    device: Device = None,
     callback: Callback | None = None,
     full_output: bool = False,
     **options: Any,
@@ -133,7 +135,7 @@ def synthesize(
     one_of("memory", memory, tuple(MEMORY))
     one_of("mapping", mapping, MAPPINGS)
     pes, size = ProcessorArray(*parse_array(array, mapping)), check_shape(shape)
-    inputs = check_inputs(kept(sample), size, channel_axis)
+    inputs = check_inputs(sample, size, channel_axis)
     if not inputs.pictures.clean:
         raise ValueError("the array takes one sample without unknown pixels; use simdtex.synthesize for others")
     chosen: Any = resolve(mrf.Options, "synth", {"preset": "paper"} | options)
@@ -143,9 +145,30 @@ def synthesize(
             raise ValueError(
                 f"the program of the array does not execute {name}={value!r}; leave it out, or use simdtex.synthesize"
             )
-    made = mrf.plan(inputs.pictures, size, chosen)
-    run = partial(_run, made, pes, MEMORY[memory])
-    return execute("maspar.synthesize", run, dict, channel_axis, rng, device, callback, full_output, None)
+    job = Emulation(inputs.pictures, size, chosen, pes, MEMORY[memory], channel_axis)
+    picture, output = run("maspar.synthesize", job, rng, device, callback, None)
+    return (picture, output) if full_output else picture
+
+
+@dataclass(frozen=True)
+class Emulation:
+    """The job of `synthesize`: the program on an ``array`` whose PEs have ``memory`` bytes each."""
+
+    pictures: Pictures
+    shape: tuple[int, int]
+    options: mrf.Options
+    array: ProcessorArray
+    memory: int
+    channel_axis: int | None
+    light = Light()
+
+    def make(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Execution]:
+        """Run the program, and return the picture, channels last, and the rest of the output."""
+        return emulated(
+            mrf.plan(self.pictures, self.shape, self.options), self.array, self.memory, machine, seed, callback
+        )
 
 
 def problem(run: Lattices) -> Problem:
@@ -169,14 +192,8 @@ def level_of(run: Lattices, number: int) -> Level:
     return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
 
 
-def _run(
-    plan: Input,
-    array: ProcessorArray,
-    memory: int,
-    machine: Machine,
-    seed: int,
-    callback: Callback | None,
-    _: Checkpointing,
+def emulated(
+    plan: Input, array: ProcessorArray, memory: int, machine: Machine, seed: int, callback: Callback | None
 ) -> tuple[NDArray[Any], Execution]:
     """Run the program, and return the picture, channels last, and the rest of the output."""
     run = Lattices(plan, machine, seed)

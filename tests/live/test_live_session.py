@@ -19,13 +19,12 @@ from PIL import ImageCms
 
 import simdtex
 from simdtex import commands as cli
-from simdtex.declared import inputs
 from simdtex.io.image import read_bytes
 from simdtex.jobs.classification import algorithm
 from simdtex.live import frames, results
 from simdtex.live import session as sessions
 from simdtex.live.frames import Layer, Window, parse_window, render
-from simdtex.live.job import LABELS, TABLES, Picture, controls, paint
+from simdtex.live.job import LABELS, LIGHT, TABLES, Picture, controls, paint
 from simdtex.live.results import BARS, FILM_FRAMES, SET_COLOURS, Results
 from simdtex.live.session import FILMED, Levels
 from simdtex.methods import mrf
@@ -1027,7 +1026,7 @@ def test_several_holes_are_not_looked_into():
 def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
     options, command = TABLES[name]
     flags = {flag for one in cli.load(command).params if isinstance(one, click.Option) for flag in one.opts}
-    own = {other: one for other, one in table(options).items() if command in one.shown} | inputs(command)
+    own = {other: one for other, one in table(options).items() if command in one.shown} | {"light": LIGHT}
     found = json.loads(json.dumps(controls(name), allow_nan=False))  # as the page gets them
     assert {one["name"] for one in found} <= own.keys()
     for control in found:

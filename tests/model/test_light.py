@@ -160,13 +160,13 @@ NATURAL = {
 
 
 def test_tiles_and_the_store_have_it(tmp_path):
-    zarr, distributed = pytest.importorskip("zarr"), pytest.importorskip("simdtex.jobs.tiles")
+    zarr = pytest.importorskip("zarr")
     sample, how = shaded(GRAIN)[:24, :26], QUICK | {"light": "even", "order": 1, "levels": 1}
-    made = distributed.synthesize(sample, (12, 14), tmp_path / "out.zarr", tiles=8, **how).compute()
-    assert_same_bits(made, simdtex.synthesize(sample, (12, 14), **how))
+    made = simdtex.synthesize(sample, (12, 14), store=simdtex.TileStore(tmp_path / "out.zarr", 8), **how)
+    assert_same_bits(made.compute(), simdtex.synthesize(sample, (12, 14), **how))
     assert zarr.open_group(tmp_path / "out.zarr", mode="r").attrs["simdtex"]["light"] == "even"
     with pytest.raises(ValueError, match="unknown light 'dim'"):
-        distributed.plan(sample, (18, 20), light="dim")
+        simdtex.synthesize(sample, (18, 20), light="dim")
 
 
 def test_the_page_asks_for_it_and_starts_anew():

@@ -3,39 +3,46 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import click
 
-from simdtex.cli.command import ENTER
+from simdtex.cli.command import ENTER, RESUME, note
 from simdtex.cli.inputs import (
     Folder,
     arranged,
     last_iteration,
     output_shape,
     read_also,
-    read_inputs,
+    read_guides,
+    read_known,
     read_lead,
+    read_masks,
     take_reading,
 )
 from simdtex.cli.job import Task, command_line, job, notes
 from simdtex.cli.options import (
+    GUIDE,
+    KNOWN_OPTIONS,
     PREVIEW,
     PROFILE,
+    SAMPLE_MASK,
     given,
-    input_options,
     material_options,
+    option,
     output_option,
     report_option,
     size_option,
     stages_option,
 )
-from simdtex.jobs.tiles.command import check_tiles, synthesize_in_tiles, tiles_options
+from simdtex.jobs.tiles.command import TILES, check_tiles, make_in_tiles
 from simdtex.methods.mrf import options as mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
+from simdtex.model.light import LIGHTS
 
 
 @job(
@@ -49,10 +56,25 @@ from simdtex.methods.pyramid import options as pyramid
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
 @output_option("Write this picture, or a folder of maps; with --tiles a .zarr store.")
 @size_option("that of --known or of the output guide, else twice the first sample")
-@input_options("synth")
+@option(
+    "--method",
+    words=("mrf", "multires", "pyramid"),
+    default="mrf",
+    help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).  [mrf]",
+)
+@SAMPLE_MASK
+@KNOWN_OPTIONS
+@GUIDE
+@option(
+    "--light",
+    words=LIGHTS,
+    default="keep",
+    group="Appearance",
+    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
+)
 @material_options
 @PREVIEW
-@tiles_options
+@TILES
 @stages_option("every level, sweep or iteration")
 @report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @PROFILE
@@ -64,28 +86,34 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     """
     from simdtex.io.decode import NOTHING
     from simdtex.io.hard_data import HardData
-    from simdtex.jobs.synthesis.job import synthesize
+    from simdtex.jobs.synthesis.job import plan_synthesis, synthesize
+    from simdtex.jobs.tiles.job import TileStore
 
-    context, kind = click.get_current_context(), cast(Any, method)
-    check_tiles(context)
+    context = click.get_current_context()
+    check_tiles(context.params)
     how = take_reading(options)
     target, material = read_lead(samples, output, options, how)
     if method == "pyramid" and (options["source_map"] or options["also"] or isinstance(target, Folder)):
         remedy = "give one picture, and leave --source-map and --also out"
         raise ValueError(f"the method pyramid takes no pixel from the sample; {remedy}")
-    pixels = material.pixels[0]
-    data = read_inputs("synth", options, material, how)
-    place = options.pop("geo", None)  # of the known pixels; a new picture was taken nowhere else
-    known, guide = data["known"], data["guide"]
-    shape = output_shape(size, pixels, known, guide and guide[1])
+    pixels, how = material.pixels[0], how._replace(ascending=material.ascending)
+    mask = read_masks(options.pop("sample_mask"), material, how)
+    known, place = read_known(options.pop("known"), material, how)  # a new picture was taken nowhere else
+    guide, options["labels"] = read_guides(options.pop("guide"), material, how, options["labels"])
+    rows, cols = output_shape(size, pixels, known, guide and guide[1])
     if isinstance(known, HardData) and not known.from_top:
-        data["known"] = known.upside_down(shape[0])
-    if context.params["report"] and (material.several or known is not None or not material.known):
+        known = known.upside_down(rows)
+    report = context.params["report"]
+    if report and (material.several or known is not None or not material.known):
         raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
-    if options["tiles"] is not None:
-        others = read_also(options["also"], material, files=False)
-        left_out = ("tiles", "workers", "also", "source_map", "preview")
-        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, data | given(options, left_out))
+    data = {"method": method, "mask": mask, "known": known, "guide": guide, "channel_axis": material.channel_axis}
+    side, workers = options.pop("tiles"), options.pop("workers")
+    if side is not None:
+        maps = {one.out.name: one.maps.array for one in read_also(options["also"], material, files=False)}
+        kept = report and {"report": os.path.realpath(report), "line": command_line()}
+        store = TileStore(output, side, workers, bool(options["source_map"]), maps, note, write_tiled_page, kept)
+        chosen = given(options, ("also", "source_map", "preview"))
+        make_in_tiles(store, plan_synthesis(material.array, (rows, cols), **data, **chosen))
         return None
     like = (material.metadata or NOTHING).at(place and NOTHING._replace(geo=place))._replace(exif=None)
     foreign = "" if known is None else "the maps have no values for known pixels, which are not from the sample"
@@ -107,8 +135,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     height, width = material.sizes[0]
     by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
     return Task(
-        partial(synthesize, material.array, (shape[0], shape[1]), method=kind, **data | given(options)),
-        f"{shape[1]}x{shape[0]} from {by}",
+        partial(synthesize, material.array, (rows, cols), **data, **given(options)),
+        f"{cols}x{rows} from {by}",
         str(target),
         writers,
         material.limits,
@@ -122,3 +150,18 @@ def write_page(sample: Any, folder: Path, made: Any, output: Any, **how: Any) ->
     from simdtex.jobs.synthesis.report import write_synthesis
 
     write_synthesis(folder, sample, made, output, command_line(), **how)
+
+
+def write_tiled_page(samples: list[Any], image: Any, output: Any, command: dict[str, str] | None) -> None:
+    """Write the page of an output in tiles that is complete, if the command that began it has ``--report``."""
+    if command is None:
+        return
+    from simdtex.figures.page import check_folder
+    from simdtex.jobs.synthesis.report import write_synthesis
+
+    try:
+        check_folder(command["report"])
+    except ValueError as error:
+        store = click.get_current_context().meta[RESUME]
+        raise ValueError(f"{error}; then go on with: simdtex resume {store}") from None
+    write_synthesis(command["report"], samples[0], image, output, command["line"])

@@ -16,6 +16,7 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_channels_last
 from simdtex.inputs import check_inputs, check_samples
 from simdtex.io.hard_data import HardData
+from simdtex.jobs.tiles.job import TileStore
 from simdtex.machine import Machine, open_machine
 from simdtex.maspar import observers
 from simdtex.methods import mrf
@@ -31,7 +32,7 @@ from simdtex.model.sample import Sample
 from simdtex.options import SMALLER, one_of, real, real_array, resolve, whole
 from simdtex.run import Callback, Output
 
-TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.jobs.tiles"
+TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or store=simdtex.TileStore(path)"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
 
 
@@ -50,6 +51,7 @@ def synthesize(
     device: Device = None,
     callback: Callback | None = None,
     checkpoint: Kept = None,
+    store: TileStore | None = None,
     full_output: bool = False,
     **options: Any,
 ) -> Any:
@@ -93,6 +95,9 @@ def synthesize(
     checkpoint : path or simdtex.Checkpoint, optional
         A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
         run continues from it, to the same bytes. The file is removed when the function returns.
+    store : simdtex.TileStore, optional
+        ``mrf``: make the output in tiles in this Zarr store, for outputs larger than one machine. The store keeps the
+        state of the run, which `TileStore.resume` continues.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -102,7 +107,7 @@ def synthesize(
     Returns
     -------
     image : array of the sample's type
-        `shape` plus the channel axis, if the sample has one.
+        `shape` plus the channel axis, if the sample has one. With `store` a dask array, read on demand.
     output : simdtex.run.Output
         Only with ``full_output=True``.
 
@@ -132,6 +137,14 @@ def synthesize(
     """
     about: dict[str, Any] = {"method": method, "mask": mask, "known": known, "known_source": known_source}
     job = plan_synthesis(sample, shape, guide=guide, light=light, channel_axis=channel_axis, **about, **options)
+    if store is not None:
+        if not isinstance(store, TileStore):
+            raise TypeError(f"store is a {type(store).__name__}; give simdtex.TileStore(path)")
+        if checkpoint is not None or full_output:
+            raise ValueError(
+                "a store keeps the state and the source map of its run; leave checkpoint and full_output out"
+            )
+        return store.make(job, rng, device, callback)
     picture, output = run("synthesize", job, rng, device, callback, checkpoint)
     return (picture, output) if full_output else picture
 

@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import islice
+from functools import partial
 from logging import CRITICAL, getLogger
 from threading import Event, Thread, current_thread, main_thread
 from typing import Any
@@ -16,13 +16,11 @@ import distributed
 from distributed import Client, Worker, WorkerPlugin
 
 from simdtex.jobs.tiles.store import Store, Turn
-from simdtex.jobs.tiles.turns import Execute, do
+from simdtex.jobs.tiles.tasks import do
+from simdtex.jobs.tiles.turns import Execute
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
 from simdtex.options import whole
-
-AHEAD = 3
-"""Tasks per worker that the scheduler holds: one is always ready, and the scheduler's memory is bounded."""
 
 WAIT = 10.0
 """Seconds between two checks for workers."""
@@ -47,21 +45,10 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
     what = store.where, store.about["name"], None if device is None else str(device)
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:
-        token, todo = os.urandom(8).hex(), iter(range(tasks))
-
-        def begun(count: int) -> list[Any]:
-            return [
-                client.submit(do, *what, turn, number, key=f"tile-{token}-{turn.number}-{number}", pure=False)
-                for number in islice(todo, count)
-            ]
-
-        first = begun(AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"])))
-        running = distributed.as_completed(first, loop=client.loop)
+        futures = client.map(partial(do, *what, turn), range(tasks), key="tile", pure=False)
         try:
             with _waiting(client, note):
-                for future in running:
-                    for another in begun(1):
-                        running.add(another)
+                for future in distributed.as_completed(futures, loop=client.loop):
                     yield future.result()
         except distributed.KilledWorker:
             raise DeviceError(
@@ -74,7 +61,7 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
                 f"simdtex resume {store.where}"
             ) from None
         finally:
-            client.cancel(list(running.futures))
+            client.cancel(futures)
 
     return execute
 

@@ -1,42 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`synthesize` for outputs of any size, `resume`, and `plan`."""
+"""`TileStore`: outputs of any size in tiles, by any number of workers, with the bytes of an output without tiles."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import check_version, warn
-from simdtex.declared import Lit
-from simdtex.driver import check_shape, drive
-from simdtex.inputs import Inputs, check_inputs
+from simdtex.driver import Device, Seed, drive
 from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
-from simdtex.jobs.tiles.layout import Layout, Maps, further, planned
-from simdtex.machine import Machine, memory
+from simdtex.jobs.tiles.layout import Layout, Maps, Outputs, planned
+from simdtex.machine import memory
 from simdtex.machine.reference import Reference
-from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
-from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.model.light import in_light, unevenness
 from simdtex.model.source_map import apply_source_map
-from simdtex.options import require, resolve, table
+from simdtex.options import require
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from distributed import Client
-
-TILES = 2048
-"""Sites to the side of a tile by default."""
 
 TAKEN = ("image", "source", "checksums", "work")
 """Reserved names in a store, which no map may have."""
@@ -47,40 +37,18 @@ Ended = Callable[[list[Any], Any, Output, Any], object]
 """A function of the samples, the image, the rest of the output, and the ``command`` that the store keeps."""
 
 
-def synthesize(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    store: PathLike,
-    *,
-    tiles: int = TILES,
-    workers: int | str | Client | None = None,
-    source_map: bool = False,
-    maps: dict[str, Any] | None = None,
-    channel_axis: int | None = None,
-    mask: ArrayLike | Sequence[ArrayLike] | None = None,
-    known: ArrayLike | None = None,
-    known_source: ArrayLike | None = None,
-    guide: tuple[Any, Any] | None = None,
-    light: str = "keep",
-    rng: int | np.random.Generator | None = None,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    note: Callable[[str], None] | None = None,
-    ended: Ended | None = None,
-    command: Any = None,
-    **options: Any,
-) -> Any:
-    """Synthesise an output larger than one machine, with the bytes of `simdtex.synthesize` with ``method="mrf"``.
+@dataclass(frozen=True, eq=False)
+class TileStore:
+    """A Zarr store in which `simdtex.synthesize` makes an output larger than one machine, tile by tile.
+
+    The bytes are those of an output without tiles. Only the method ``mrf``, with a schedule that relaxes a window like
+    the whole.
 
     Parameters
     ----------
-    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
-        As in `simdtex.synthesize`.
-    shape : (int, int)
-        Rows and columns of the output.
-    store : path
-        Folder of the Zarr store to make, which every worker can reach. `resume` continues an interrupted run.
-    tiles : int
+    path : path
+        Folder of the store, which every worker can reach.
+    side : int
         Sites on a side of a tile. The size determines the memory of a worker, and not the result.
     workers : int, str or distributed.Client, optional
         The workers that make the tiles: a number of processes on this machine, which share its cores; the address of a
@@ -91,158 +59,141 @@ def synthesize(
         Further maps of the material, of the sample's size, which are written in the same arrangement into arrays of
         these names. With several samples a list of maps for each name, as in
         `simdtex.model.source_map.apply_source_map`.
-    mask, known, known_source, guide, light, rng
-        As in `simdtex.synthesize`. This process copies known values and guides into the store.
-    device : str, optional
-        As in `simdtex.synthesize`, on every worker.
-    callback : callable, optional
-        Called with a `simdtex.run.Progress` after every tile.
     note : callable, optional
-        Receives a sentence while the run waits for workers. None: a warning.
+        Receives a sentence while the run waits for workers; by default a warning.
     ended : callable, optional
         ``ended(samples, image, output, command)`` is called when the output is written. ``samples`` are a list; the
         image, and the source map of the `simdtex.run.Output`, are arrays of the store; slicing reads a part. If it
         raises an error, the run is not finished, and `resume` calls it again.
     command : optional
         Texts, numbers, lists and dicts that the store keeps for ``ended``.
-    **options
-        Options of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window like the whole.
-
-    Returns
-    -------
-    dask.array.Array, (rows, cols[, channels])
-        The array ``image`` of the store, read on demand; `channel_axis` is the axis of its channels.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An argument is invalid; the message names the remedy.
-    DeviceError
-        One worker after another ends at the same tile.
 
     Notes
     -----
-    A tile relaxes in a window that is larger by the reach of a sweep, so the cost is that of `simdtex.synthesize` plus
-    the redundant work in `plan`. The memory of a worker is that in `plan`, for any size of output.
+    A tile relaxes in a window that is larger by the reach of a sweep, so the cost is that of an output without tiles
+    plus the redundant work in `layout`. The memory of a worker is that in `layout`, for any size of output.
     """
-    size = check_shape(shape)
-    inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
-    run, seed = _plan(inputs, size, options, light), as_seed(rng)
-    layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
-    require("distributed", "zarr", "dask", "distributed")
-    from simdtex.jobs.tiles.cluster import check_workers, connected
-    from simdtex.jobs.tiles.store import Store
 
-    check_workers(workers, device)
-    if workers is None or isinstance(workers, int):
-        memory.require_host(layout.memory * (workers or 1), "give smaller tiles or fewer workers")
-    with connected(workers) as client:
-        with _made(store) as temporary:
-            channels = channel_axis is not None
-            about = {"command": command, "light": light}
-            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, **about)
-        how: dict[str, Any] = {"device": device, "callback": callback, "note": note, "ended": ended}
-        return resume(store, workers=client, channel_axis=channel_axis, **how)
+    path: PathLike
+    side: int = 2048
+    workers: int | str | Client | None = None
+    source_map: bool = False
+    maps: dict[str, Any] | None = None
+    note: Callable[[str], None] = warn
+    ended: Ended | None = None
+    command: Any = None
 
+    def layout(self, job: Any) -> Layout:
+        """Return the tiles of a job of `simdtex.jobs.synthesis.job.plan_synthesis`, and the memory and disk they need.
 
-def resume(
-    store: PathLike,
-    *,
-    workers: int | str | Client | None = None,
-    channel_axis: int | None = -1,
-    device: str | Machine | None = None,
-    callback: Callback | None = None,
-    note: Callable[[str], None] | None = None,
-    ended: Ended | None = None,
-) -> Any:
-    """Resume an interrupted output, and return it; the bytes are those of a run without an interruption.
+        Nothing is written.
+        """
+        return self._planned(job, 0)[-1]
 
-    Parameters
-    ----------
-    store : path
-        As in `synthesize`.
-    workers, device, callback, note, ended
-        As in `synthesize`; they may differ from those of the first run.
-    channel_axis : int, optional
-        The axis of the channels of the result, if it has any.
+    def make(self, job: Any, rng: Seed, device: Device = None, callback: Callback | None = None) -> Any:
+        """Make the output of a job, and return it; the parameters are those of `layout` and `simdtex.synthesize`."""
+        seed = as_seed(rng)
+        plan, outputs, layout = self._planned(job, seed)
+        require("distributed", "zarr", "dask", "distributed")
+        from simdtex.jobs.tiles.cluster import check_workers, connected
+        from simdtex.jobs.tiles.store import Store
 
-    Returns
-    -------
-    dask.array.Array, (rows, cols[, channels])
-        As in `synthesize`; also if the output is already finished.
+        check_workers(self.workers, device)
+        if self.workers is None or isinstance(self.workers, int):
+            memory.require_host(layout.memory * (self.workers or 1), "give smaller tiles or fewer workers")
+        path = Path(self.path)
+        if path.exists():
+            raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
+        if not path.parent.is_dir():
+            raise ValueError(f"the folder {path.parent} does not exist; make it first")
+        with connected(self.workers) as client:
+            with atomic_folder(path) as new:
+                Store.create(str(new), plan, seed, outputs, layout, command=self.command, light=job.light.about)
+            return replace(self, workers=client).resume(device, callback, channel_axis=job.channel_axis)
 
-    Raises
-    ------
-    ValueError
-        There is no such store, it has another version, another process is using it, or a part of it is damaged; the
-        message names the remedy.
-    """
-    opened = _opened(store)
-    from simdtex.jobs.tiles.cluster import across, check_workers, connected, here
-    from simdtex.jobs.tiles.turns import Tiles
+    def resume(self, device: Device = None, callback: Callback | None = None, *, channel_axis: int | None = -1) -> Any:
+        """Resume an interrupted output, and return it; the bytes are those of a run without an interruption.
 
-    check_workers(workers, device)
-    with exclusive(store):
-        if opened.finished:
-            with _mending(opened):
-                opened.check()
-        else:
-            with connected(workers) as client:
-                each = here(opened, device) if client is None else across(client, opened, device, note or warn)
-                with _mending(opened):
-                    image, output = drive(Tiles(opened, each), Reference(), opened.about["seed"], callback)
+        Parameters
+        ----------
+        device : str, optional
+            As in `simdtex.synthesize`, on every worker; it may differ from that of the first run, as may ``workers``,
+            ``note`` and ``ended``. Everything else is what the store keeps.
+        callback : callable, optional
+            Called with a `simdtex.run.Progress` after every tile.
+        channel_axis : int, optional
+            The axis of the channels of the result, if it has any.
+
+        Returns
+        -------
+        dask.array.Array, (rows, cols[, channels])
+            The array ``image`` of the store, read on demand; also if the output is already finished.
+
+        Raises
+        ------
+        ValueError
+            There is no such store, it has another version, another process is using it, or a part of it is damaged;
+            the message names the remedy.
+        DeviceError
+            One worker after another ends at the same tile.
+        """
+        store = self._opened()
+        from simdtex.jobs.tiles.cluster import across, check_workers, connected, here
+        from simdtex.jobs.tiles.turns import Tiles
+
+        check_workers(self.workers, device)
+        with exclusive(self.path):
+            if store.finished:
+                with _mending(store):
+                    store.check()
+            else:
+                with connected(self.workers) as client, _mending(store):
+                    each = here(store, device) if client is None else across(client, store, device, self.note)
+                    about = store.about
+                    image, output = drive(Tiles(store, each), Reference(), about["seed"], callback)
                     for name in ("device", "device_seconds"):  # of the leading process
                         del output.statistics[name]
-                    pixels = opened.work.plan.sample.pictures.pixels[0]
-                    output.statistics["light"] = {"light": opened.about["light"], **unevenness(pixels)}
-                    if ended:
-                        ended(opened.samples(), image, output, opened.about["command"])
-                    opened.finish(opened.work)
-        opened.clean()
-    return _array(opened.where, channel_axis)
+                    output.statistics["light"] = about["light"]
+                    if self.ended:
+                        self.ended(store.samples(), image, output, about["command"])
+                    store.finish()
+            store.clean()
+        dask: Any = import_module("dask.array")
+        image = dask.from_zarr(store.where, component="image")
+        return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)
 
+    @property
+    def finished(self) -> bool:
+        """Whether the output is complete; raises ValueError if the store holds none, as `resume` does."""
+        return bool(self._opened().finished)
 
-def finished(store: PathLike) -> bool:
-    """Return whether an output is complete; raise ValueError if the store holds none, as `resume` does."""
-    return bool(_opened(store).finished)
+    def _planned(self, job: Any, seed: int) -> tuple[Plan, Outputs, Layout]:
+        """Return the plan of a job, the arrays of its output, and its tiles."""
+        if job.method != "mrf":
+            raise ValueError(f"the method {job.method} needs the whole output at once; give mrf, or make no tiles")
+        plan = job.plan()
+        outputs = Outputs(job.channel_axis is not None, self.source_map, _maps(self.maps or {}, plan))
+        return plan, outputs, planned(plan, seed, self.side, outputs)
 
+    def _opened(self) -> Any:
+        """Return the store; raise ValueError unless this version can continue it."""
+        require("distributed", "zarr", "dask", "distributed")
+        from simdtex.jobs.tiles.store import FORMAT, Store
 
-def plan(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    *,
-    tiles: int = TILES,
-    channel_axis: int | None = None,
-    source_map: bool = False,
-    maps: dict[str, Any] | None = None,
-    light: str = "keep",
-    **options: Any,
-) -> Layout:
-    """Return the layout of an output in tiles, and the memory and disk that it needs.
-
-    Parameters
-    ----------
-    sample, shape, tiles, channel_axis, source_map, maps, light, **options
-        As in `synthesize`; the options may include ``mask``, ``known``, ``known_source`` and ``guide``.
-
-    Returns
-    -------
-    simdtex.jobs.tiles.Layout
-        Tiles, halos and redundant work of each level, and bytes of memory and of disk.
-    """
-    size = check_shape(shape)
-    given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
-    run = _plan(check_inputs(sample, size, channel_axis, **given), size, options, light)
-    return planned(run, 0, tiles, further(run, source_map, _maps(maps or {}, run)))
-
-
-def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any], light: str) -> Plan:
-    table(Lit)["light"].check("light", light)
-    chosen = resolve(Options, "synth", options)
-    if not isinstance(chosen.schedule, str):
-        raise TypeError("workers know schedules by their names; give schedule the name of one")
-    sample, _ = in_light(inputs.pictures, light, chosen.categorical)
-    return planned_run(sample, size, chosen, inputs.given, inputs.guide)
+        where = os.path.abspath(self.path)
+        if not os.path.isdir(where):
+            raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun")
+        try:
+            store = Store(where)
+        except Damaged:
+            raise ValueError(f"{where} is no Zarr store, or its zarr.json is damaged; give another one") from None
+        if store.finished:
+            return store
+        if not os.path.isdir(os.path.join(where, "work")):
+            raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
+        with _mending(store):
+            check_version(where, store.about, FORMAT)
+        return store
 
 
 def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
@@ -259,40 +210,6 @@ def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
         apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
         found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
     return found
-
-
-@contextmanager
-def _made(store: PathLike) -> Iterator[str]:
-    """Yield a path for making a store, so that it exists completely or not at all."""
-    path = Path(store)
-    if path.exists():
-        raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
-    if not path.parent.is_dir():
-        raise ValueError(f"the folder {path.parent} does not exist; make it first")
-    with atomic_folder(path) as temporary:
-        yield str(temporary)
-
-
-def _opened(path: PathLike) -> Any:
-    """Return the store at a path; raise ValueError unless this version can continue it."""
-    require("distributed", "zarr", "dask", "distributed")
-    from simdtex.jobs.tiles.store import FORMAT, Store
-
-    where = os.path.abspath(path)
-    if not os.path.isdir(where):
-        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun")
-    try:
-        store = Store(where)
-    except Damaged:
-        raise ValueError(f"{where} is no Zarr store, or its zarr.json is damaged; give another one") from None
-    if store.finished:
-        return store
-    if not os.path.isdir(os.path.join(where, "work")):
-        raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
-    with _mending(store):
-        about = store.about
-    check_version(where, about, FORMAT)
-    return store
 
 
 @contextmanager
@@ -315,9 +232,3 @@ def _mending(store: Any) -> Iterator[None]:
         if again is None:
             raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None
         raise ValueError(f"{wrong}; {again} with: simdtex resume {where}") from None
-
-
-def _array(where: str, channel_axis: int | None) -> Any:
-    dask: Any = import_module("dask.array")
-    image = dask.from_zarr(where, component="image")
-    return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)

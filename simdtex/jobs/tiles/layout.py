@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.jobs.tiles.windows import Tile
 from simdtex.methods.mrf.finish import gaussian_offsets
 from simdtex.methods.mrf.plan import Plan
 from simdtex.model.lattice import Grid
@@ -40,8 +39,29 @@ PIXEL = 400, 40
 Maps = dict[str, list[NDArray[Any]]]
 """Further maps of the material by name: (rows, cols[, channels]), one for each picture of the sample."""
 
-Arrays = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
-"""The axes after rows and columns, and the types, of arrays of the output, by name."""
+
+class Outputs(NamedTuple):
+    """The arrays of an output: the image, with an axis for its ``channels``; the ``source`` map; further ``maps``."""
+
+    channels: bool
+    source: bool
+    maps: Maps
+
+    def arrays(self, plan: Plan) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Return the axes after rows and columns, and the type, of each array by name."""
+        sample = plan.sample
+        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
+        found |= {"source": ((2 + (len(sample.boxes) > 1),), np.dtype(np.int32))} if self.source else {}
+        return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in self.maps.items()}
+
+
+class Tile(NamedTuple):
+    """A tile or a window of a lattice: its first row and column, and its numbers of rows and columns."""
+
+    top: int
+    left: int
+    rows: int
+    cols: int
 
 
 @dataclass(frozen=True)
@@ -60,11 +80,6 @@ class LevelLayout:
     torus: bool
 
     @property
-    def down(self) -> int:
-        """Number of tiles from top to bottom."""
-        return ceil(self.rows / self.side)
-
-    @property
     def across(self) -> int:
         """Number of tiles from left to right."""
         return ceil(self.cols / self.side)
@@ -72,7 +87,7 @@ class LevelLayout:
     @property
     def count(self) -> int:
         """Number of tiles."""
-        return self.down * self.across
+        return ceil(self.rows / self.side) * self.across
 
     @property
     def together(self) -> int:
@@ -84,20 +99,29 @@ class LevelLayout:
         """Number of tasks of a turn."""
         return ceil(self.count / self.together)
 
-    def task(self, number: int) -> range:
-        """Return the numbers of the tiles of a task."""
-        return range(number * self.together, min(self.count, (number + 1) * self.together))
-
-    @property
-    def lattice(self) -> Grid:
-        """The lattice of the whole level."""
-        return Grid((self.rows, self.cols), self.torus)
+    def task(self, number: int) -> list[Tile]:
+        """Return the tiles of a task."""
+        return [*map(self.tile, range(number * self.together, min(self.count, (number + 1) * self.together)))]
 
     def tile(self, number: int) -> Tile:
         """Return a tile by its number, row by row."""
         i, j = divmod(number, self.across)
         top, left = i * self.side, j * self.side
         return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
+
+    def frame(self, tile: Tile, halo: int) -> tuple[Tile, slice, slice]:
+        """Return the window of a tile and all sites within ``halo`` of it, and the tile's rows and columns in it."""
+        sides = []
+        for first, size, every in ((tile.top, tile.rows, self.rows), (tile.left, tile.cols, self.cols)):
+            if size + 2 * halo >= every:
+                begin, end = 0, every
+            elif self.torus:
+                begin, end = first - halo, first + size + halo
+            else:
+                begin, end = max(0, first - halo), min(every, first + size + halo)
+            sides.append((begin % every, end - begin, slice(first - begin, first - begin + size)))
+        (top, rows, down), (left, cols, right) = sides
+        return Tile(top, left, rows, cols), down, right
 
     @property
     def chunk(self) -> int:
@@ -106,11 +130,10 @@ class LevelLayout:
         return max(fitting, default=self.side)
 
     @property
-    def window(self) -> int:
-        """Number of sites of the largest window."""
-        sides = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
-        down, across = sides if self.count > 1 else (self.rows, self.cols)
-        return down * across
+    def window(self) -> tuple[int, int]:
+        """Rows and columns of the largest window."""
+        side = self.side + 2 * self.halo if self.count > 1 else self.side
+        return min(side, self.rows), min(side, self.cols)
 
     @property
     def redundant(self) -> float:
@@ -118,10 +141,7 @@ class LevelLayout:
 
         A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
         """
-        if self.count == 1:
-            return 0.0
-        rows, cols = (min(self.side, n) for n in (self.rows, self.cols))
-        down, across = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
+        rows, cols, (down, across) = min(self.side, self.rows), min(self.side, self.cols), self.window
         return (down if down == self.rows else (rows + down) // 2) * across / (rows * cols) - 1
 
 
@@ -159,33 +179,28 @@ class Layout:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def further(plan: Plan, source: bool, maps: Maps) -> Arrays:
-    """Return the arrays of the output in addition to the picture: the source map if ``source``, and ``maps``."""
-    found: Arrays = {"source": ((2 + (len(plan.sample.boxes) > 1),), np.dtype(np.int32))} if source else {}
-    return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in maps.items()}
-
-
-def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Layout:
-    """Return the layout of an output in tiles of at most ``tile`` sites on a side, with ``more`` arrays.
+def planned(plan: Plan, seed: int, side: int, outputs: Outputs) -> Layout:
+    """Return the layout of ``outputs`` in tiles of at most ``side`` sites on a side.
 
     Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
     """
-    whole("tiles", tile, 1)
+    whole("side of tiles", side, 1)
     options, schedule = plan.options, plan.schedule
+    if not isinstance(options.schedule, str):
+        raise TypeError("workers know schedules by their names; give schedule the name of one")
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
-        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or leave tiles out")
-    count = ceil(plan.shape[0] / tile) * ceil(plan.shape[1] / tile)
+        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or make no tiles")
+    count = ceil(plan.shape[0] / side) * ceil(plan.shape[1] / side)
     if count > TILES:
-        raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
-    levels = tuple(_level(plan, seed, number, tile) for number in range(plan.levels))
-    sample, channels, sd = plan.sample, plan.sample.working.shape[0], plan.options.finish or 0
-    shown = tile + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
-    window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
+        raise ValueError(f"tiles of {side}x{side} pixels are {count}, more than {TILES}; give larger ones")
+    levels = tuple(_level(plan, seed, number, side) for number in range(plan.levels))
+    sample, channels, sd = plan.sample, plan.sample.working.shape[0], options.finish or 0
+    shown = side + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
+    window = max(*(prod(one.window) for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    arrays = [((sample.shown,), sample.pixels.dtype), *(more or {}).values()]
-    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in arrays)
+    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in outputs.arrays(plan).values())
     disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + shown_bytes))
     return Layout(levels, channels, memory, disk)
 

@@ -9,7 +9,7 @@
         begun0       the turn that began level 0; likewise for each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
         level0/7     values, source, temperature after turn 7: of each level the last state, and the one being written
-        tally7       a row for each task that has finished turn 7: active, sum of temperatures, uses and kinds
+        tally7       a row for each task that has finished turn 7, see `Tally`
 
 A turn is one operation on every tile: begin a level, a sweep, write the picture. It reads the state that the turn
 before it wrote, and no data that it writes itself, so its missing tasks complete an interrupted turn. The file ``turn``
@@ -48,8 +48,7 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.checkpoint import read_state, write_state
 from simdtex.io.files import Damaged, write_durable
-from simdtex.jobs.tiles.layout import Arrays, Layout, LevelLayout, Maps, further, planned
-from simdtex.jobs.tiles.windows import Tally, Tile
+from simdtex.jobs.tiles.layout import Layout, LevelLayout, Outputs, Tile, planned
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
@@ -103,7 +102,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
 
 
-FORMAT = 11
+FORMAT = 12
 """Format of the store; all other formats are rejected."""
 
 TALLIES_AT_ONCE = 2**22
@@ -111,6 +110,11 @@ TALLIES_AT_ONCE = 2**22
 
 NODES = ("zarr.json", ".zarray", ".zgroup", ".zattrs", ".zmetadata")
 """The metadata files of Zarr; every other file is a chunk."""
+
+
+Tally = NDArray[np.int64]
+"""Counts of sites, which add up over tiles: active sites, the sum of temperatures in units of 1/1024, and the uses of
+each candidate and the sites of each kind in each region."""
 
 
 class Turn(NamedTuple):
@@ -136,32 +140,20 @@ class Turn(NamedTuple):
 
 
 class Work(NamedTuple):
-    """The ``plan`` of a store, without conditioning data, its ``seed``, and the ``layout`` of its tiles.
+    """The ``plan`` of a store, without conditioning data, its ``seed``, ``outputs``, and the ``layout`` of its tiles.
 
     ``confidences``: those of the conditions; ``held``: whether there are conditioning data or guides; ``given``:
-    whether there are data; ``scattered``: the data between the sites, for each level that has such; ``channels``:
-    whether the image has a channel axis; ``source``: whether the source map is written, too; ``maps``: further maps of
-    the material, one for each picture of the sample.
+    whether there are data; ``scattered``: the data between the sites, for each level that has such.
     """
 
     plan: Plan
     seed: int
+    outputs: Outputs
     layout: Layout
     confidences: Confidences
     held: bool
     given: bool
     scattered: dict[str, Data]
-    channels: bool
-    source: bool
-    maps: Maps
-
-    @property
-    def outputs(self) -> Arrays:
-        """The axes after rows and columns, and the types, of the arrays of the output."""
-        sample = self.plan.sample
-        return {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)} | further(
-            self.plan, self.source, self.maps
-        )
 
 
 class Files(zarr.storage.LocalStore):
@@ -249,24 +241,8 @@ class Store:
             self.root = zarr.open_group(self._files, mode="a")
 
     @staticmethod
-    def create(
-        where: str,
-        plan: Plan,
-        seed: int,
-        layout: Layout,
-        *,
-        channels: bool,
-        source: bool,
-        maps: Maps,
-        command: Any = None,
-        light: str = "keep",
-    ) -> Store:
-        """Make a store, ready for its first turn, and return it.
-
-        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written, too;
-        ``maps``: further maps to write, one for each picture of the sample; ``command``: kept for ``ended``;
-        ``light``: whether the light of the plan's sample was made even.
-        """
+    def create(where: str, plan: Plan, seed: int, outputs: Outputs, layout: Layout, **about: Any) -> Store:
+        """Make a store, ready for its first turn, and return it; ``about`` are JSON types that it keeps."""
         zarr.open_group(Files(where), mode="w-")
         store, held, scattered = Store(where), False, {}
         store._files.name = secrets.token_hex(8)
@@ -287,9 +263,9 @@ class Store:
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
-        about = {"format": FORMAT, "version": version("simdtex"), "seed": seed, "command": command, "light": light}
-        more = list(conditions.confidences), held, given is not None, scattered, channels, source, maps
-        store._keep("run", about, [described(plan), layout.levels[0].side, *more])
+        about |= {"format": FORMAT, "version": version("simdtex"), "seed": seed}
+        conditioned = list(conditions.confidences), held, given is not None, scattered
+        store._keep("run", about, [described(plan), list(outputs), layout.levels[0].side, *conditioned])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
 
@@ -301,10 +277,11 @@ class Store:
     @cached_property
     def work(self) -> Work:
         """The plan and its data."""
-        about, (tree, side, confidences, held, given, scattered, *more) = self._state("run")
-        plan, seed = restored(tree), about["seed"]
+        about, (tree, outputs, side, confidences, held, given, scattered) = self._state("run")
+        plan, seed, more = restored(tree), about["seed"], Outputs(*outputs)
         between = {number: Data(*data) for number, data in scattered.items()}
-        return Work(plan, seed, planned(plan, seed, side), Confidences(*confidences), held, given, between, *more)
+        layout = planned(plan, seed, side, more)
+        return Work(plan, seed, more, layout, Confidences(*confidences), held, given, between)
 
     @property
     def finished(self) -> bool:
@@ -336,38 +313,38 @@ class Store:
                     self._remove(f"{name}/")
         return turn
 
-    def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
+    def prepare(self, turn: Turn, candidates: int) -> None:
         """Make the arrays that a turn writes to; for existing ones only the description is rewritten."""
-        level = work.layout.levels[turn.level]
+        level = self.work.layout.levels[turn.level]
         if turn.phase == "show":
-            for name, (after, dtype) in work.outputs.items():
+            arrays = self.work.outputs.arrays(self.work.plan)
+            for name, (after, dtype) in arrays.items():
                 self._sites(name, level, dtype, after=after)
-            count, side = len(work.outputs), -(-level.side // level.chunk)
-            shape = (count, *self._at("image").counts[:2])
-            axes = ("array", "chunk_y", "chunk_x")
-            self._array("checksums", shape, (count, side, side), np.dtype(np.uint32), axes)
+            count, side = len(arrays), -(-level.side // level.chunk)
+            self._array("checksums", (count, *self._at("image").counts[:2]), (count, side, side), np.uint32)
         else:
             for name, kind in zip(Field._fields, ("uint16", "int32", "uint16"), strict=True):
-                before = (work.layout.channels,) if name == "values" else ()
+                before = (self.work.layout.channels,) if name == "values" else ()
                 self._sites(f"work/level{level.number}/{turn.number}/{name}", level, kind, before)
         row = 2 + candidates
-        self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
+        self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.int64)
 
-    def picture(self, turn: Turn, work: Work) -> tuple[Any, Any]:
+    def picture(self, turn: Turn) -> tuple[Any, Any]:
         """Return the picture of a written output, and its source map, even if that is not written."""
-        return self._at("image"), Sources(self._at(f"work/level0/{turn.number - 1}/source"), work.plan.sample)
+        return self._at("image"), Sources(self._at(f"work/level0/{turn.number - 1}/source"), self.work.plan.sample)
 
     def samples(self) -> list[NDArray[Any]]:
         """Return the pictures of the sample, with a channel axis if the image has one."""
         pixels = self.work.plan.sample.pictures.pixels
-        return [one if self.work.channels else one[..., 0] for one in pixels]
+        return [one if self.work.outputs.channels else one[..., 0] for one in pixels]
 
-    def finish(self, work: Work) -> None:
+    def finish(self) -> None:
         """Note that the output is complete, with its description."""
-        about = {"format": FORMAT, "version": version("simdtex"), "name": self._files.name, "seed": work.seed}
-        about["light"] = self.about["light"]
-        arrays = {name: self._description(name) for name in work.outputs}
-        self.root.attrs["simdtex"] = about | {"options": asdict(work.plan.options), "arrays": arrays}
+        about, plan = self.about, self.work.plan
+        kept = {name: about[name] for name in ("format", "version", "name", "seed")}
+        arrays = {name: self._description(name) for name in self.work.outputs.arrays(plan)}
+        more = {"light": about["light"]["light"], "options": asdict(plan.options), "arrays": arrays}
+        self.root.attrs["simdtex"] = kept | more
 
     def check(self) -> None:
         """Raise Damaged if a chunk of a complete output is missing or in the wrong place; its content is not read."""
@@ -415,21 +392,20 @@ class Store:
 
     def note(self, turn: Turn, task: int, tally: Tally) -> None:
         """Note that a task has finished a turn."""
-        row = np.concatenate([np.array([tally.active, tally.temperature_sum], np.int64), tally.counts])
-        self._at(f"work/tally{turn.number}")[task] = row
+        self._at(f"work/tally{turn.number}")[task] = tally
 
-    def done(self, turn: Turn, work: Work, task: int) -> bool:
+    def done(self, turn: Turn, task: int) -> bool:
         """Return whether a task has finished a turn, and everything that it wrote can be read."""
-        level = work.layout.levels[turn.level]
+        level, names = self.work.layout.levels[turn.level], list(self.work.outputs.arrays(self.work.plan))
         try:
             self._at(f"work/tally{turn.number}")[task]
-            for tile in map(level.tile, level.task(task)):
+            for tile in level.task(task):
                 if turn.phase != "show":
-                    self.read(level, turn.number, tile)
+                    self.read(turn.level, turn.number, tile)
                     continue
-                for name in work.outputs:
+                for name in names:
                     self._at(name)[spans(tile)]
-                where, found = self._checksums(list(work.outputs), tile)
+                where, found = self._checksums(names, tile)
                 if not np.array_equal(self._at("checksums")[where], found):
                     return False
         except Damaged:
@@ -441,24 +417,23 @@ class Store:
         tally = self._at(f"work/tally{turn.number}")
         some = max(1, TALLIES_AT_ONCE // tally.shape[1])
         rows = (tally[first : first + some] for first in range(0, tally.shape[0], some))
-        active, temperature_sum, *counts = sum(part.sum(0) for part in rows)
-        return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
+        return np.asarray(sum(part.sum(0) for part in rows))
 
-    def read(self, level: LevelLayout, turn: int, window: Tile) -> Field:
+    def read(self, number: int, turn: int, window: Tile) -> Field:
         """Return the state of a level's sites after the turn of a number, in a window, which may cross the seam."""
-        here = f"work/level{level.number}/{turn}"
-        return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in Field._fields))
+        return Field(*(self._cut(f"work/level{number}/{turn}/{name}", number, window) for name in Field._fields))
+
+    def held(self, number: int, window: Tile) -> Held | None:
+        """Return the data and guides of a level's sites in a window; None if there are none."""
+        if not self.work.held:
+            return None
+        return Held(*(self._cut(f"work/given/held{number}/{name}", number, window) for name in Held._fields))
 
     def write(self, turn: Turn, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites after a turn."""
         here = f"work/level{turn.level}/{turn.number}"
         for name, plane in field._asdict().items():
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
-
-    def held(self, level: LevelLayout, window: Tile) -> Held:
-        """Return the conditioning data of a level's sites in a window."""
-        here = f"work/given/held{level.number}"
-        return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the known values of the output in a tile, and their mask."""
@@ -504,6 +479,15 @@ class Store:
     def _chunk(self, name: str, row: int, col: int) -> str:
         return "/".join((name, "c", str(row), str(col), *("0" for _ in self._at(name).shape[2:])))
 
+    def _cut(self, name: str, number: int, window: Tile) -> NDArray[Any]:
+        """Return a window of an array (..., rows, cols) over the sites of a level, which may cross the seam."""
+        array, level = self._at(name), self.work.layout.levels[number]
+        found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
+        for rows, down in _parts(window.top, window.rows, level.rows):
+            for cols, right in _parts(window.left, window.cols, level.cols):
+                found[..., down, right] = array[..., rows, cols]
+        return found
+
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
 
@@ -544,10 +528,10 @@ class Store:
         """Return an array with rows and columns of sites, and further axes ``before`` and ``after`` these."""
         shape, chunks = ((*before, *sides, *after) for sides in ((level.rows, level.cols), (level.chunk, level.chunk)))
         axes = (*("channel",) * len(before), "y", "x", *("channel",) * len(after))
-        return self._array(name, shape, chunks, np.dtype(dtype), axes)
+        return self._array(name, shape, chunks, dtype, axes)
 
     def _array(
-        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
+        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: Any, axes: Any = None
     ) -> Checked:
         """Return an array; unless this process has it open, make it or rewrite its description."""
         if name in self._arrays:
@@ -568,16 +552,13 @@ class Store:
 class Stored(Conditions):
     """Conditioning data and guides of an output, read from a store window by window."""
 
-    def __init__(self, store: Store, work: Work) -> None:
-        super().__init__(work.confidences)
-        self._store, self._work = store, work
+    def __init__(self, store: Store) -> None:
+        super().__init__(store.work.confidences)
+        self._store = store
 
     def at(self, number: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level's sites in a window; None if there are none."""
-        if not self._work.held:
-            return None
-        window = Tile(*grid.first, *grid.shape)
-        return self._store.held(self._work.layout.levels[number], window)
+        return self._store.held(number, Tile(*grid.first, *grid.shape))
 
     def coarser(self, plan: Input) -> Stored:
         """Return the conditions of the levels that have a reduced input: the store has those of all levels."""
@@ -585,7 +566,7 @@ class Stored(Conditions):
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        return self._work.scattered.get(str(number))
+        return self._store.work.scattered.get(str(number))
 
 
 def phase_of(level: LevelLayout) -> str:
@@ -598,19 +579,11 @@ def spans(tile: Tile) -> tuple[slice, slice]:
     return slice(tile.top, tile.top + tile.rows), slice(tile.left, tile.left + tile.cols)
 
 
-def cut(array: Any, level: LevelLayout, window: Tile) -> NDArray[Any]:
-    """Return a window of a stored array (..., rows, cols), which may cross the seam."""
-
-    def parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
-        at = 0
-        while at < size:
-            begin = (first + at) % whole
-            end = min(whole, begin + size - at)
-            yield slice(begin, end), slice(at, at + end - begin)
-            at += end - begin
-
-    found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
-    for rows, down in parts(window.top, window.rows, level.rows):
-        for cols, right in parts(window.left, window.cols, level.cols):
-            found[..., down, right] = array[..., rows, cols]
-    return found
+def _parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
+    """Yield the parts of a window of a line of ``whole`` sites, from ``first`` on, and their places in the window."""
+    at = 0
+    while at < size:
+        begin = (first + at) % whole
+        end = min(whole, begin + size - at)
+        yield slice(begin, end), slice(at, at + end - begin)
+        at += end - begin

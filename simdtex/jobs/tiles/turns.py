@@ -1,126 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The turns of an output in tiles: the run of the leading process, and the task of a worker.
-
-For the driver, a step is one turn of all tiles, executed by any processes. A task is one turn of some tiles, read from
-the store and written to it.
-"""
+"""The turns of an output in tiles: the run of the leading process, of which a step is one turn of all tiles."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from math import sqrt
-from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.jobs.tiles import windows as tiles
-from simdtex.jobs.tiles.layout import LevelLayout
-from simdtex.jobs.tiles.store import Store, Stored, Turn, Work, phase_of
-from simdtex.jobs.tiles.windows import Tally, Tile, framed
-from simdtex.machine import Machine, open_machine
-from simdtex.methods.mrf.algorithm import Run, finished_picture
-from simdtex.methods.mrf.finish import gaussian_offsets
+from simdtex.jobs.tiles.layout import LevelLayout, Tile
+from simdtex.jobs.tiles.store import Store, Stored, Turn, phase_of
+from simdtex.machine import Machine
 from simdtex.methods.mrf.level import Lattices
-from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.use import use_penalty
-from simdtex.model.source_map import apply_source_map
 from simdtex.run import Callback, Observer, Output, Progress
-
-
-class Context(NamedTuple):
-    """The data that a process keeps from one tile to the next."""
-
-    store: Store
-    work: Work
-    run: Run
-
-
-_one = Lock()
-"""A process has one device, which two tiles would share."""
-
-
-@lru_cache(1)
-def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """Return the context of a store, which is put on a device once; only the latest is kept."""
-    store, machine = Store(where), open_machine(device)
-    run = Run(store.work.plan, machine, store.work.seed, Stored(store, store.work))
-    return Context(store, store.work, run)
-
-
-def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
-    """Execute a turn of a task's tiles, unless it is done and its data are undamaged; return the number of the task.
-
-    ``where`` and ``name`` are the store's path and name, since the path may later hold another store.
-    """
-    with _one:
-        here = context(where, name, device)
-        if not here.store.done(turn, here.work, task):
-            level = here.work.layout.levels[turn.level]
-            tallies = [PHASES[turn.phase](here, turn, level.tile(number)) for number in level.task(task)]
-            here.store.note(turn, task, tiles.together(tallies))
-    return task
-
-
-def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field, tally = tiles.begin_tile(here.run, turn.level, tile, _above(here, turn, tile))
-    here.store.write(turn, tile, field)
-    return tally
-
-
-def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field, penalty = tiles.run_level(here.run, turn.level, _above(here, turn, tile), here.store.penalty(turn))
-    here.store.write(turn, tile, field)
-    _, kinds = here.run.of(turn.level).fair_use(turn.level).split(penalty)
-    return Tally(kinds.astype(np.int64), 0, 0)  # whole steps
-
-
-def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
-    level = here.work.layout.levels[turn.level]
-    frame = framed(level.lattice, tile, level.halo)
-    before, penalty = here.store.read(level, turn.number - 1, frame.window), here.store.penalty(turn)
-    assert penalty is not None
-    done, free = turn.cooling + turn.free, not turn.active
-    field, tally = tiles.sweep_tile(here.run, turn.level, tile, frame, before, penalty, done, free)
-    here.store.write(turn, tile, field)
-    return tally
-
-
-def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
-    run, work, level = here.run, here.work, here.work.layout.levels[0]
-    sd = run.options.finish or 0
-    frame = framed(level.lattice, tile, int(gaussian_offsets(sd)[0].max()) if sd else 0)
-    state = here.store.read(level, turn.number - 1, frame.window)
-    known = here.store.held(level, frame.window).known if work.held else None
-    field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
-    shown = finished_picture(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
-    if here.work.given:
-        values, given = here.store.given(tile)
-        shown = np.where(given, values, shown)
-    arrays = {"image": shown if work.channels else shown[..., 0]}
-    if work.source or work.maps:
-        place = run.sample.place(frame.cut(state.source))
-        arrays |= {"source": place} if work.source else {}
-        for name, maps in work.maps.items():
-            arrays[name] = apply_source_map(place, maps if len(maps) > 1 else maps[0])
-    here.store.show(tile, arrays)
-    return Tally(np.zeros(0, np.int32), 0, 0)
-
-
-def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
-    levels = here.work.layout.levels
-    if turn.reads == len(levels):
-        return None
-    (top, rows), (left, cols) = here.run.grid(turn.level).window(*tile).above
-    return here.store.read(levels[turn.reads], turn.number - 1, Tile(top, left, rows, cols))
-
-
-PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
-
 
 Execute = Callable[[Turn, int], Iterator[int]]
 """A function that executes the given number of tasks of a turn, in any order, and yields the number of each done."""
@@ -145,9 +43,9 @@ class Turns:
     """The turns of an output; the state is the current turn, which the store keeps."""
 
     def __init__(self, tiles: Tiles, machine: Machine) -> None:
-        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work
-        work = self.work
-        self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store, work))
+        self.store, self.execute, work = tiles.store, tiles.execute, tiles.store.work
+        self.levels = work.layout.levels
+        self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store))
 
     def begin(self) -> Turn:
         """Return the current turn of the store."""
@@ -155,8 +53,8 @@ class Turns:
 
     def step(self, turn: Turn, watch: Callable[..., None]) -> tuple[Turn, None]:
         """Execute a turn of all tiles, and return the next turn; tasks that have finished it take little time."""
-        level = self.work.layout.levels[turn.level]
-        self.store.prepare(turn, self.work, self._candidates(turn))
+        level = self.levels[turn.level]
+        self.store.prepare(turn, self._candidates(turn))
         for done, _ in enumerate(self.execute(turn, level.tasks), 1):
             watch(turn, min(level.count, done * level.together))
         return self._complete(turn), None
@@ -167,9 +65,9 @@ class Turns:
 
     def result(self, turn: Turn, observer: Any) -> tuple[Any, Output]:
         """Return the picture and its source map as arrays of the store; slicing reads them."""
-        level = self.work.layout.levels[0]
+        level = self.levels[0]
         tiles = f"{level.count} tile{'s' * (level.count > 1)} of at most {level.side} x {level.side}"
-        image, source = self.store.picture(turn, self.work)
+        image, source = self.store.picture(turn)
         return image, Output(source, statistics=known_before(self.lattices) | {"tiles": tiles})
 
     def save(self, turn: Turn) -> Turn:
@@ -192,10 +90,11 @@ class Turns:
 
     def _complete(self, turn: Turn) -> Turn:
         """Return the turn after a complete one, which becomes the current turn of the store."""
-        store, lattices, levels = self.store, self.lattices.of(turn.level), self.work.layout.levels
+        store, lattices = self.store, self.lattices.of(turn.level)
         if turn.phase == "show":
             return turn._replace(phase="done")  # only `finish` notes it
-        counts, active, temperature_sum = store.total(turn)
+        total = store.total(turn)
+        (active, temperature_sum), counts = total[:2].tolist(), total[2:]
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
         number = turn.number + 1
@@ -206,7 +105,7 @@ class Turns:
             if not lattices.at_equilibrium(after):
                 return store.save(after, penalty)
         if turn.level:
-            below = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1)
+            below = Turn(number, phase_of(self.levels[turn.level - 1]), turn.level - 1)
             return store.save(below, fair_use.split(penalty)[1])
         return store.save(Turn(number, "show", 0))
 
@@ -223,7 +122,7 @@ class Watch(Observer):
         """Report that ``done`` tiles have finished a turn."""
         if self._callback is None:
             return
-        level, sweep = self._run.work.layout.levels[turn.level], turn.cooling + turn.free + 1
+        level, sweep = self._run.levels[turn.level], turn.cooling + turn.free + 1
         self._fraction = max(self._fraction, self._share(turn, level, done / level.count))
         what = f"level {turn.level}" + (f", sweep {sweep}" if turn.phase == "sweep" else "")
         what = "writing the picture" if turn.phase == "show" else what
@@ -253,15 +152,14 @@ class Watch(Observer):
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` on a side."""
-        levels = self._run.work.layout.levels
+        levels = self._run.levels
         number, step = turn.reads, -(-max(level.rows, level.cols) // SHOWN)
         sample = self._run.lattices.of(min(number, len(levels) - 1)).sample
         if number == len(levels):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         found = []
         for row in range(0, levels[number].rows, step):
-            values, source, _ = self._run.store.read(
-                levels[number], turn.number - 1, Tile(row, 0, 1, levels[number].cols)
-            )
+            line = Tile(row, 0, 1, levels[number].cols)
+            values, source, _ = self._run.store.read(number, turn.number - 1, line)
             found.append(sample.picture(values[..., ::step], source[:, ::step]))
         return np.concatenate(found)

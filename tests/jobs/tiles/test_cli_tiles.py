@@ -13,9 +13,10 @@ import pytest
 from cases import assert_same_bits, texture
 from commands import run
 
+import simdtex
+from simdtex import TileStore
 from simdtex.figures import sheet
 from simdtex.io import image
-from simdtex.jobs import tiles as distributed
 from simdtex.jobs.synthesis import report as synthesis
 from simdtex.jobs.tiles.store import Checked, Sources
 from simdtex.model.source_map import load_source_map
@@ -131,17 +132,16 @@ def test_resume_writes_the_report(folder):
         if progress.phase == "show":
             raise Stop
 
-    sample, options = image.read("grey.png").pixels, {"order": 1, "xi": -6.0, "device": "reference", "tiles": 24}
+    sample, options = image.read("grey.png").pixels, {"order": 1, "xi": -6.0, "device": "reference", "rng": 3}
+    store = TileStore("o.zarr", 24, command={"report": "page", "line": "as given"})
     with pytest.raises(Stop):
-        distributed.synthesize(
-            sample, (34, 41), "o.zarr", rng=3, command={"report": "page", "line": "as given"}, callback=stop, **options
-        )
+        simdtex.synthesize(sample, (34, 41), store=store, callback=stop, **options)
     (folder / "page").mkdir()
     (folder / "page" / "mine.txt").write_text("mine")
     result = run("resume", "o.zarr", "--device", "reference")
     assert result.exit_code == 2
     assert "page holds other files (mine.txt): give an empty or a new one; then go on with: simdtex" in result.stderr
-    assert os.listdir("page") == ["mine.txt"] and not distributed.finished("o.zarr")
+    assert os.listdir("page") == ["mine.txt"] and not store.finished
     (folder / "page" / "mine.txt").unlink()
     (folder / "o.zarr" / "image" / "c" / "0" / "1").write_bytes(b"")
     result = run("resume", "o.zarr", "--device", "reference")
@@ -151,7 +151,7 @@ def test_resume_writes_the_report(folder):
     assert_same_bits(pixels("o.zarr"), image.read("whole.png").pixels)
     assert (folder / "page" / "picture.png").read_bytes() == (folder / "w" / "picture.png").read_bytes()
     assert json.loads((folder / "page" / "results.json").read_text())["command"] == "as given"
-    assert distributed.finished("o.zarr") and not (folder / "o.zarr" / "work").exists()
+    assert store.finished and not (folder / "o.zarr" / "work").exists()
 
 
 def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
@@ -244,20 +244,20 @@ def test_a_run_that_is_stopped_goes_on(folder, how):
 STOPPED = """
 import os, signal, sys
 from pathlib import Path
-from simdtex.jobs import tiles as distributed
-from simdtex import commands as cli
+from simdtex import TileStore
+from simdtex.commands import main
 
 async def begun_by_zarr():
     pass
 
-def synthesize(sample, shape, store, **options):
-    Path(store).mkdir()
+def make(store, *_):
+    Path(store.path).mkdir()
     waiting = begun_by_zarr()
     os.kill(os.getpid(), getattr(signal, sys.argv[1]))
     signal.pause()
 
-distributed.synthesize = synthesize
-cli.main(["synth", "colour.png", "-o", "o.zarr", "--tiles", "16", "--size", "40x40", "--order", "1", "-q"])
+TileStore.make = make
+main(["synth", "colour.png", "-o", "o.zarr", "--tiles", "16", "--size", "40x40", "--order", "1", "-q"])
 """
 
 

@@ -12,13 +12,14 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
+from simdtex import TileStore
 from simdtex.driver import drive
-from simdtex.jobs import tiles as distributed
+from simdtex.jobs.synthesis.job import plan_synthesis
 from simdtex.jobs.tiles import store as store_module
-from simdtex.jobs.tiles.layout import planned
+from simdtex.jobs.tiles.layout import Outputs, planned
 from simdtex.jobs.tiles.store import Store
-from simdtex.jobs.tiles.turns import Tiles, do
-from simdtex.jobs.tiles.windows import framed
+from simdtex.jobs.tiles.tasks import do
+from simdtex.jobs.tiles.turns import Tiles
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.plan import plan as planned_run
@@ -36,7 +37,7 @@ COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
 def test_channels_stay_where_they_are(tmp_path):
     sample = np.ascontiguousarray(np.moveaxis(COLOUR, -1, 0))
     options = {"order": 1, "xi": -8.0, "rng": 11, "device": REFERENCE, "channel_axis": 0}
-    ours = distributed.synthesize(sample, (14, 15), tmp_path / "out.zarr", tiles=8, **options)
+    ours = simdtex.synthesize(sample, (14, 15), store=TileStore(tmp_path / "out.zarr", 8), **options)
     assert_same_bits(ours.compute(), simdtex.synthesize(sample, (14, 15), **options))
 
 
@@ -44,10 +45,11 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     """What a worker lays out is what was laid out: see also that all options survive JSON."""
     options = Options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
-    layout = planned(plan, seed, 10)
-    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False, maps={})
+    outputs = Outputs(True, False, {})
+    layout = planned(plan, seed, 10, outputs)
+    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, outputs, layout, light={"light": "keep"})
     work = store.work
-    assert (work.plan.options, work.seed, work.layout) == (plan.options, seed, layout)
+    assert (work.plan.options, work.seed, work.outputs, work.layout) == (plan.options, seed, outputs, layout)
     assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
     assert_same_bits(work.plan.sample.working, plan.sample.working)
     assert json.dumps(store.about)
@@ -58,9 +60,10 @@ class Stop(Exception):
 
 
 def created(tmp_path, name="s.zarr", **options):
-    options = Options(order=1, levels=2, xi=-8.0, **options)
+    options, outputs = Options(order=1, levels=2, xi=-8.0, **options), Outputs(False, False, {})
     plan, where = planned_run(Pictures((SAMPLE[..., None],)), (14, 15), options), str(tmp_path / name)
-    return Store.create(where, plan, 11, planned(plan, 11, 8), channels=False, source=False, maps={}), where
+    layout = planned(plan, 11, 8, outputs)
+    return Store.create(where, plan, 11, outputs, layout, command=None, light={"light": "keep"}), where
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +111,7 @@ def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeyp
         left = n
         attempt.set(n)
         try:
-            image = distributed.resume(where, device=REFERENCE)
+            image = TileStore(where).resume(REFERENCE)
             break
         except Stop:
             pass
@@ -119,17 +122,17 @@ def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeyp
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps nobody off a folder")
 def test_one_process_at_a_time_leads(tmp_path):
-    path, said = tmp_path / "out.zarr", []
+    store, said = TileStore(tmp_path / "out.zarr", 16), []
 
     def another(_):
         with pytest.raises(ValueError, match=r"another run is at work in .*out.zarr now; wait for it, or stop it"):
-            distributed.resume(path, device=REFERENCE)
+            store.resume(REFERENCE)
         said.append(True)
 
-    distributed.synthesize(SAMPLE, (20, 20), path, tiles=16, rng=1, device=REFERENCE, order=1, callback=another)
+    simdtex.synthesize(SAMPLE, (20, 20), store=store, rng=1, device=REFERENCE, order=1, callback=another)
     assert said
-    before = zarr.open_group(path)["image"][...]  # the lock is released, and a finished run has nothing to do
-    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), before)
+    before = zarr.open_group(store.path)["image"][...]  # the lock is released, and a finished run has nothing to do
+    assert_same_bits(store.resume(REFERENCE).compute(), before)
 
 
 def test_progress_tells_every_tile(tmp_path, monkeypatch):
@@ -141,7 +144,7 @@ def test_progress_tells_every_tile(tmp_path, monkeypatch):
         seen.append((progress.fraction, progress.doing, progress.image()))
 
     options = {"order": 1, "xi": -8.0, "rng": 1, "device": REFERENCE}
-    distributed.synthesize(SAMPLE, (14, 15), tmp_path / "o.zarr", tiles=8, callback=callback, **options)
+    simdtex.synthesize(SAMPLE, (14, 15), store=TileStore(tmp_path / "o.zarr", 8), callback=callback, **options)
     fractions = [fraction for fraction, *_ in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
@@ -151,7 +154,7 @@ def test_progress_tells_every_tile(tmp_path, monkeypatch):
 
 
 def test_the_plan_says_what_is_needed():
-    plan = distributed.plan(SAMPLE, (4096, 4096), tiles=1024, order=18)
+    plan = TileStore("", 1024).layout(plan_synthesis(SAMPLE, (4096, 4096), order=18))
     finest = plan.levels[0]
     assert (finest.count, finest.side, finest.rows, finest.chunk) == (16, 1024, 4096, 512)
     assert finest.halo == 4 * lattice_plan(4096, 4096, True, 18, 0).colors
@@ -162,7 +165,8 @@ def test_the_plan_says_what_is_needed():
 
 
 def test_memory_of_a_worker_does_not_grow_with_the_output():
-    plans = [distributed.plan(SAMPLE, (side, side), tiles=512, order=2) for side in (4000, 40_000, 1_000_000)]
+    jobs = [plan_synthesis(SAMPLE, (side, side), order=2) for side in (4000, 40_000, 1_000_000)]
+    plans = [*map(TileStore("", 512).layout, jobs)]
     assert len({plan.memory for plan in plans}) == 1
     assert plans[-1].disk > 10**13
 
@@ -173,13 +177,13 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     from simdtex.schedules.schedule import Trimmed
 
     plan = planned_run(Pictures((SAMPLE[..., None],)), (120, 120), Options(order=2, levels=1))
-    level = planned(plan, 1, 40).levels[0]
+    level = planned(plan, 1, 40, Outputs(False, False, {})).levels[0]
     run = Run(plan, REFERENCE, 1)
     sites = 0
     for tile in map(level.tile, range(level.count)):
-        frame = framed(level.lattice, tile, level.halo)
-        window = run.level(0, frame.window)
-        schedule = Trimmed(window.schedule, frame.rows.start, frame.rows.stop)
+        where, rows, _ = level.frame(tile, level.halo)
+        window = run.level(0, where)
+        schedule = Trimmed(window.schedule, rows.start, rows.stop)
         active = Active(window, np.zeros((1, 1)), True)
         _, info = schedule.step(window.setting, schedule.init(window.setting), active)
         sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
@@ -192,19 +196,23 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
         ({"schedule": "luby"}, "schedule luby needs the whole output at once; give the schedule coloring"),
         ({"schedule": "block"}, "schedule block needs the whole"),
         ({"array": "16x16"}, "array 16x16 needs the whole"),
-        ({"tiles": 0}, "tiles is 0; give 1 or more"),
-        ({"tiles": 1, "shape": (4000, 4000)}, "tiles of 1x1 pixels are 16000000, more than 4194304; give larger ones"),
-        ({"tiles": 2**20, "shape": (2**20, 2**20), "workers": 2}, "is available; give smaller tiles or fewer workers"),
+        ({"side": 0}, "side of tiles is 0; give 1 or more"),
+        ({"side": 1, "shape": (4000, 4000)}, "tiles of 1x1 pixels are 16000000, more than 4194304; give larger ones"),
+        ({"side": 2**20, "shape": (2**20, 2**20), "workers": 2}, "is available; give smaller tiles or fewer workers"),
         ({"workers": 10**6}, "workers is 1000000; give .* or fewer"),
         ({"workers": 0}, "workers is 0; give 1 or more"),
         ({"shape": (0, 3)}, "rows of the output is 0"),
         ({"order": 200}, "does not fit the sample"),
+        ({"method": "pyramid"}, "the method pyramid needs the whole output at once; give mrf, or make no tiles"),
+        ({"checkpoint": "state"}, "a store keeps the state and the source map of its run; leave checkpoint"),
+        ({"full_output": True}, "a store keeps the state and the source map of its run; leave checkpoint"),
     ],
 )
 def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
-    path = tmp_path / "out.zarr"
+    own = {name: options.pop(name) for name in ("side", "workers") if name in options}
+    store = TileStore(tmp_path / "out.zarr", **own)
     with pytest.raises(ValueError, match=words):
-        distributed.synthesize(SAMPLE, options.pop("shape", (20, 20)), path, **options)
+        simdtex.synthesize(SAMPLE, options.pop("shape", (20, 20)), store=store, **options)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -212,12 +220,12 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     for make in (lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no")):
         make(tmp_path / "a.zarr")
         with pytest.raises(ValueError, match="is no Zarr store"):
-            distributed.resume(tmp_path / "a.zarr")
+            TileStore(tmp_path / "a.zarr").resume()
         if (tmp_path / "a.zarr").is_dir():
             (tmp_path / "a.zarr").rmdir()
     zarr.open_group(tmp_path / "b.zarr", mode="w")
     with pytest.raises(ValueError, match="is no output in tiles"):
-        distributed.resume(tmp_path / "b.zarr")
+        TileStore(tmp_path / "b.zarr").resume()
     for name, other, words in (
         ("version", lambda name: "v", "is of simdtex v and this is .*; go on with the code of simdtex v that wrote"),
         ("FORMAT", 0, "is of format 0 and this simdtex reads \\d+; go on with the code of simdtex .* that wrote it"),
@@ -226,20 +234,25 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
             patch.setattr(store_module, name, other)
             store, where = created(tmp_path, f"{name}.zarr")
         with pytest.raises(ValueError, match=words):
-            distributed.resume(where)
+            TileStore(where).resume()
         assert store.turn.number == 1
+
+
+def test_a_path_is_no_store():
+    with pytest.raises(TypeError, match=r"store is a str; give simdtex.TileStore\(path\)"):
+        simdtex.synthesize(SAMPLE, (20, 20), store="o.zarr")
 
 
 def test_a_schedule_of_ones_own_is_not_known_to_workers(tmp_path):
     with pytest.raises(TypeError, match="workers know schedules by their names"):
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", schedule=simdtex.schedules.get("coloring"))
+        store, schedule = TileStore(tmp_path / "o.zarr"), simdtex.schedules.get("coloring")
+        simdtex.synthesize(SAMPLE, (20, 20), store=store, schedule=schedule)
 
 
 def test_the_store_is_an_array_that_others_read(tmp_path):
     path = tmp_path / "out.zarr"
-    picture = distributed.synthesize(
-        COLOUR, (14, 15), path, tiles=9, order=1, xi=-8.0, rng=1, device=REFERENCE, channel_axis=-1
-    )
+    how = {"order": 1, "xi": -8.0, "rng": 1, "device": REFERENCE, "channel_axis": -1}
+    picture = simdtex.synthesize(COLOUR, (14, 15), store=TileStore(path, 9), **how)
     assert picture.chunksize == (9, 9, 3)
     image = zarr.open_group(path, mode="r")["image"]
     assert image.metadata.dimension_names == ("y", "x", "channel")
@@ -252,7 +265,7 @@ def test_further_maps_are_carried_along(tmp_path):
     normal = [np.stack([one + k for k in (1, 2, 3)], -1) for one in samples]
     maps = {"normal": normal, "height": [one.astype(np.float32) / 7 for one in samples]}
     path, options = tmp_path / "o.zarr", {"order": 1, "xi": -8.0, "rng": 2, "device": REFERENCE}
-    distributed.synthesize(samples, (14, 15), path, tiles=8, maps=maps, **options)
+    simdtex.synthesize(samples, (14, 15), store=TileStore(path, 8, maps=maps), **options)
     _, output = simdtex.synthesize(samples, (14, 15), full_output=True, **options)
     store = zarr.open_group(path)
     assert sorted(store.keys()) == ["checksums", "height", "image", "normal"]
@@ -275,5 +288,6 @@ def test_further_maps_are_carried_along(tmp_path):
 )
 def test_maps_that_do_not_fit_are_said(tmp_path, maps, options, words):
     with pytest.raises(ValueError, match=words):
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", maps=maps, order=1, **options)
+        store = TileStore(tmp_path / "o.zarr", maps=maps)
+        simdtex.synthesize(SAMPLE, (20, 20), store=store, order=1, **options)
     assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,8 @@ from cases import assert_same_bits, texture
 from skimage import data
 
 import simdtex
-from simdtex.jobs import tiles as distributed
+from simdtex import TileStore
+from simdtex.jobs.synthesis.job import plan_synthesis
 from simdtex.machine.devices import DeviceError
 
 dask_distributed = pytest.importorskip("distributed")
@@ -28,8 +29,8 @@ def whole():
 
 @pytest.mark.slow
 def test_workers_of_this_machine_open_their_own_devices(tmp_path, whole, any_device):
-    path = tmp_path / "out.zarr"
-    ours = distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, workers=2, device=any_device.index, **OPTIONS)
+    store = TileStore(tmp_path / "out.zarr", 40, workers=2)
+    ours = simdtex.synthesize(SAMPLE, (90, 101), store=store, device=any_device.index, **OPTIONS)
     assert_same_bits(ours.compute(), whole)
 
 
@@ -49,14 +50,9 @@ def test_a_worker_is_killed_and_another_joins_late(tmp_path, whole):
         dask_distributed.Client(cluster) as client,
     ):
         first = min(client.run(os.getpid).values())
-        ours = distributed.synthesize(
-            *(SAMPLE, (90, 101), tmp_path / "out.zarr"),
-            tiles=30,
-            workers=client,
-            device="reference",
-            callback=callback,
-            **OPTIONS,
-        )
+        store = TileStore(tmp_path / "out.zarr", 30, workers=client)
+        given = {"device": "reference", "callback": callback}
+        ours = simdtex.synthesize(SAMPLE, (90, 101), store=store, **given, **OPTIONS)
     assert len(seen) > 40
     assert_same_bits(ours.compute(), whole)
 
@@ -72,8 +68,9 @@ def test_a_client_that_ends_leaves_a_store_to_go_on_with(tmp_path, whole):
 
     path = tmp_path / "out.zarr"
     with pytest.raises(Stop):
-        distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, device="reference", callback=stop, **OPTIONS)
-    ours = distributed.resume(path, workers=1, device="reference")
+        given = {"device": "reference", "callback": stop}
+        simdtex.synthesize(SAMPLE, (90, 101), store=TileStore(path, 40), **given, **OPTIONS)
+    ours = TileStore(path, workers=1).resume("reference")
     assert_same_bits(ours.compute(), whole)
 
 
@@ -94,8 +91,9 @@ def test_a_run_without_workers_says_what_it_waits_for(tmp_path, whole, monkeypat
         dask_distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
         dask_distributed.Client(cluster) as client,
     ):
-        given = {"workers": client, "device": "reference", "callback": callback, "note": note}
-        ours = distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+        store = TileStore(tmp_path / "out.zarr", 30, workers=client, note=note)
+        given = {"device": "reference", "callback": callback}
+        ours = simdtex.synthesize(SAMPLE, (90, 101), store=store, **given, **OPTIONS)
         where = cluster.scheduler_address
     assert said == [f"all workers of {where} are gone and the run waits for one; start one with: dask worker {where}"]
     assert_same_bits(ours.compute(), whole)
@@ -120,28 +118,29 @@ def test_a_scheduler_that_ends_is_said(tmp_path, whole):
             if progress.phase == "sweep" and progress.level == 0:
                 scheduler.kill()
 
-        given = {"workers": address, "device": "reference", "callback": callback}
+        store = TileStore(tmp_path / "out.zarr", 30, workers=address)
+        given = {"device": "reference", "callback": callback}
         try:
             with pytest.raises(DeviceError, match=f"the scheduler {address} is gone; start it and its workers again, "):
-                distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+                simdtex.synthesize(SAMPLE, (90, 101), store=store, **given, **OPTIONS)
         finally:
             scheduler.kill()
             worker.kill()
-    ours = distributed.resume(tmp_path / "out.zarr", device="reference")
+    ours = TileStore(store.path).resume("reference")
     assert_same_bits(ours.compute(), whole)
 
 
 def test_an_open_machine_is_refused_for_workers(tmp_path):
     with pytest.raises(TypeError, match="each worker opens its own device"):
-        distributed.synthesize(
-            SAMPLE, (20, 20), tmp_path / "a.zarr", workers=1, device=simdtex.open_machine("reference"), channel_axis=-1
-        )
+        store, device = TileStore(tmp_path / "a.zarr", workers=1), simdtex.open_machine("reference")
+        simdtex.synthesize(SAMPLE, (20, 20), store=store, device=device, channel_axis=-1)
 
 
 def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
     """A client that failed to connect would else be the default one, on which the next `compute` waits for ever."""
     with pytest.raises(ValueError, match="no scheduler answers at nonsense://a") as caught:
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "a.zarr", workers="nonsense://a", channel_axis=-1)
+        store = TileStore(tmp_path / "a.zarr", workers="nonsense://a")
+        simdtex.synthesize(SAMPLE, (20, 20), store=store, channel_axis=-1)
     assert caught.value.__cause__ is not None  # which holds the client
     with pytest.raises(ValueError, match="No clients found"):
         dask_distributed.default_client()
@@ -149,9 +148,10 @@ def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
 
 PEAK = """
 import sys
-from simdtex.jobs import tiles as distributed
+import simdtex
 from skimage import data
-distributed.synthesize(data.brick()[:128, :128], (1024, 1024), sys.argv[1], tiles=512, rng=1, device=sys.argv[2])
+store = simdtex.TileStore(sys.argv[1], 512)
+simdtex.synthesize(data.brick()[:128, :128], (1024, 1024), store=store, rng=1, device=sys.argv[2])
 with open("/proc/self/status") as file:  # ru_maxrss would count the process that started this one
     print(1024 * int(next(line for line in file if line.startswith("VmHWM")).split()[1]))
 """
@@ -160,7 +160,7 @@ with open("/proc/self/status") as file:  # ru_maxrss would count the process tha
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc is Linux's")
 def test_a_process_takes_no_more_memory_than_the_plan_says(tmp_path, cl_device):
-    plan = distributed.plan(data.brick()[:128, :128], (1024, 1024), tiles=512)
+    plan = TileStore("", 512).layout(plan_synthesis(data.brick()[:128, :128], (1024, 1024)))
     command = [sys.executable, "-c", PEAK, str(tmp_path / "o.zarr"), str(cl_device.index)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     assert plan.memory / 4 < int(done.stdout) < plan.memory

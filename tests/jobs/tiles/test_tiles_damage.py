@@ -8,12 +8,11 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
+from simdtex import TileStore
 from simdtex.io import files
-from simdtex.jobs import tiles as distributed
 from simdtex.jobs.tiles import layout
 from simdtex.jobs.tiles.store import Store
-from simdtex.jobs.tiles.turns import context
-from simdtex.jobs.tiles.windows import Tally
+from simdtex.jobs.tiles.tasks import context
 
 zarr = pytest.importorskip("zarr")
 pytestmark = pytest.mark.slow
@@ -22,6 +21,11 @@ SAMPLE = texture((22, 25), seed=2)
 SHAPE = 14, 15
 KNOWN = np.ma.masked_array(texture(SHAPE, seed=4), np.indices(SHAPE).sum(0) % 9 > 0)
 OPTIONS = {"order": 1, "levels": 2, "xi": -8.0, "rng": 11, "device": REFERENCE}
+
+
+def made_in(path, source_map=False, **given):
+    """Make the output in tiles of 8 x 8."""
+    return simdtex.synthesize(SAMPLE, SHAPE, store=TileStore(path, 8, source_map=source_map), **OPTIONS | given)
 
 
 class Stop(Exception):
@@ -60,9 +64,7 @@ def stopped(tmp_path_factory):
         if (phase, tile, sweep) not in made:
             made[phase, tile, sweep] = path = tmp_path_factory.mktemp("store") / "o.zarr"
             with pytest.raises(Stop):
-                distributed.synthesize(
-                    SAMPLE, SHAPE, path, tiles=8, known=KNOWN, source_map=True, callback=stop, **OPTIONS
-                )
+                made_in(path, known=KNOWN, source_map=True, callback=stop)
         return made[phase, tile, sweep]
 
     return store
@@ -74,7 +76,7 @@ def finished(tmp_path_factory):
     path = tmp_path_factory.mktemp("store") / "o.zarr"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(layout, "CHUNK", 4)
-        distributed.synthesize(SAMPLE, SHAPE, path, tiles=8, known=KNOWN, source_map=True, **OPTIONS)
+        made_in(path, known=KNOWN, source_map=True)
     return path
 
 
@@ -90,7 +92,7 @@ def gone_on(path, sentences):
     for _ in range(5):
         context.cache_clear()
         try:
-            return distributed.resume(path, device=REFERENCE)
+            return TileStore(path).resume(REFERENCE)
         except ValueError as error:
             sentences.append(str(error))
             if "begin anew" in sentences[-1]:
@@ -170,9 +172,6 @@ def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finish
         assert_same_bits(zarr.open_group(path)["source"][:], zarr.open_group(finished)["source"][:])
 
 
-FEW = OPTIONS | {"tiles": 8, "source_map": True}
-
-
 @pytest.fixture(scope="module")
 def moments(tmp_path_factory):
     """Return copies of three stores after every tile, and when finished: two of one run, and one of another seed."""
@@ -184,7 +183,7 @@ def moments(tmp_path_factory):
             copies.append(path.with_name(f"{path.stem}{len(copies)}"))
             shutil.copytree(path, copies[-1])
 
-        image = distributed.synthesize(SAMPLE, SHAPE, path, callback=keep, **FEW | {"rng": rng}).compute()
+        image = made_in(path, source_map=True, callback=keep, rng=rng).compute()
         keep(None)
         found[name] = copies, image
     return found
@@ -251,7 +250,7 @@ def test_a_plane_of_an_earlier_turn_is_damage(tmp_path, moments):
 def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
     path = tmp_path / "o.zarr"
     shutil.copytree(finished, path)
-    image = distributed.resume(path)
+    image = TileStore(path).resume()
     assert image.chunks[0][:2] == (4, 4)
     assert_same_bits(image.compute(), whole)
     if damage == "another":
@@ -261,7 +260,7 @@ def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
     with pytest.raises(
         ValueError, match=rf"{part} of .* is missing or damaged, and nothing makes it again; remove the store and begin"
     ):
-        distributed.resume(path)
+        TileStore(path).resume()
 
 
 @pytest.mark.parametrize(
@@ -284,16 +283,16 @@ def test_the_description_of_a_finished_store_is_checked(tmp_path, finished, whol
     assert old in where.read_bytes()
     where.write_bytes(where.read_bytes().replace(old, new, 1))
     if b"mine" in new:
-        assert_same_bits(distributed.resume(path).compute(), whole)
+        assert_same_bits(TileStore(path).resume().compute(), whole)
         return
     with pytest.raises(ValueError, match=rf"{part} of .* is missing or damaged, and nothing makes it"):
-        distributed.resume(path)
+        TileStore(path).resume()
 
 
 def test_the_picture_has_checksums(tmp_path, stopped):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("show", 3), path)
-    image = distributed.resume(path, device=REFERENCE)
+    image = TileStore(path).resume(REFERENCE)
     flipped(path / "image/c/0/1")
     with pytest.raises(ValueError, match="checksum"):
         image.compute()
@@ -309,7 +308,7 @@ def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
     with pytest.raises(
         ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin anew"
     ):
-        distributed.synthesize(SAMPLE, SHAPE, path, tiles=8, callback=remove, **OPTIONS)
+        made_in(path, callback=remove)
     assert not path.exists()
 
 
@@ -317,21 +316,21 @@ def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("sweep", 3, 2), path)
     store = Store(str(path))
-    turn, work = store.turn, store.work
-    assert store.done(turn, work, 0)  # which opens the arrays
+    turn = store.turn
+    assert store.done(turn, 0)  # which opens the arrays
     shutil.rmtree(path)
     with pytest.raises(files.Damaged, match=r"zarr\.json"):
-        store.note(turn, 0, Tally(np.zeros(460, np.int64), 0, 0))
+        store.note(turn, 0, np.zeros(462, np.int64))
     assert not path.exists()
 
 
 def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_removed(tmp_path, stopped, whole):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("show", 3), path)
-    distributed.resume(path, device=REFERENCE)
+    TileStore(path).resume(REFERENCE)
     shutil.copytree(stopped("show", 3) / "work" / "given", path / "work" / "given")
-    assert distributed.finished(path)
-    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
+    assert TileStore(path).finished
+    assert_same_bits(TileStore(path).resume(REFERENCE).compute(), whole)
     assert not (path / "work").exists()
 
 
@@ -344,7 +343,7 @@ def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_pat
         real(path, *flags)
 
     monkeypatch.setattr(files, "_sync", sync)
-    distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=8, **OPTIONS)
+    made_in(tmp_path / "o.zarr")
     turns = [n for n in range(1, 99) if f"o.zarr/work/level0/{n}/values/c/0/1" in flushed]
     for folder in (f"o.zarr/work/level0/{n}/values/c" for n in turns):
         at = flushed.index(f"{folder}/0/1")
@@ -360,7 +359,7 @@ def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
     monkeypatch.setattr(layout, "TASKS", tasks)
     seen = []
     given = {"known": KNOWN, "callback": lambda progress: seen.append((progress.level, progress.tile))}
-    image = distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=8, **given, **OPTIONS)
+    image = made_in(tmp_path / "o.zarr", **given)
     assert_same_bits(image.compute(), whole)
     each = -(-4 // tasks)
     assert {tile for level, tile in seen if level == 0} == {min(4, each * n) for n in range(1, -(-4 // each) + 1)}
@@ -374,12 +373,12 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
         patch.setattr(files, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "
         with pytest.raises(ValueError, match=words):
-            distributed.resume(path, device=REFERENCE)
+            TileStore(path).resume(REFERENCE)
         with pytest.raises(ValueError, match=rf"^{tmp_path}/new\.zarr/.* could not be written .*: free some space"):
-            distributed.synthesize(SAMPLE, SHAPE, tmp_path / "new.zarr", **OPTIONS)
-    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
+            made_in(tmp_path / "new.zarr")
+    assert_same_bits(TileStore(path).resume(REFERENCE).compute(), whole)
     (path / "image" / "zarr.json").unlink()
     with pytest.raises(
         ValueError, match=r"image/zarr.json of .* is missing or damaged, and nothing makes it again; remove the store"
     ):
-        distributed.resume(path, device=REFERENCE)
+        TileStore(path).resume(REFERENCE)
