@@ -536,10 +536,10 @@ class Estimation:
         own = sample.own(positions)[:, 0]
         names, of = np.unique(own if self.options.categorical else sample.working[0, positions], return_inverse=True)
         data = Data(np.argwhere(there), sample.scale.levels(self.known.values[there]).T)
-        count = len(names) if self.options.categorical else 2
-        memory.require(machine, 0, 8 * cells * ((len(names) if self.options.categorical else 0) + 4))
+        categories = len(names) if self.options.categorical else 0
+        memory.require(machine, 0, 8 * cells * (categories + 4))
         sites = np.argwhere(np.ones(self.shape, bool))
-        found, done = np.full((count, cells), np.nan), 0
+        found, done = np.full((categories or 2, cells), np.nan), 0
         for here, p in given_data(machine, sample, of, data, sites, nearest, self.attributes["bandwidth"]):
             found[:, here] = p.T if self.options.categorical else _moments(p, of, own)
             done += here.size
