@@ -149,7 +149,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
-            memory_limit=0,  # `plan` gives the need; a tile stopped at a limit would only restart
+            memory_limit=0,  # `TileStore.layout` gives the need; a tile stopped at a limit would only restart
             env={**limits, "OMP_NUM_THREADS": str(each)},
             plugins=(Cores(each),),
             silence_logs=50,
