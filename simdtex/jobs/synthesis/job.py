@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions that most users need: `synthesize`, `explain`, `replay`, `lcpdf`."""
+"""The synthesis of a texture of any size, and the LCPDF: `synthesize` and `lcpdf`."""
 
 from __future__ import annotations
 
