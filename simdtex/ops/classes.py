@@ -54,7 +54,7 @@ def _axes(sites: Array, offsets: Array, rows: int, cols: int) -> tuple[tuple[Arr
 
 
 EXEMPLAR_MULTIPLE = 4
-"""The number of exemplars of a class is a multiple of this (kernels/exemplars.cl)."""
+"""The number of exemplars of a class is a multiple of this (kernels/classification/exemplars.cl)."""
 
 LOGS = 256
 """Units in 1 of the logarithm of a distance."""
