@@ -22,7 +22,7 @@ from runs import RUNS, Run, call, hole, volume
 
 import simdtex
 from simdtex.machine import devices
-from simdtex.machine.opencl import NONE, OpenCL, kernel_file, kernel_source
+from simdtex.machine.opencl import NONE, OpenCL, kernel_files, kernel_source
 
 TABLE = Path(__file__).resolve().parent.parent / "docs" / "devices" / "builds.csv"
 COLUMNS = ("file", "defines", "kernel", "gfx1100 registers", "gfx1100 scratch", "sm_86 local memory")
@@ -89,7 +89,7 @@ def builds() -> list[Build]:
 
     def noted(self, function, defines=NONE):
         constants = " ".join(f"{key}={defines[key]}" for key in sorted(defines))
-        found.add(Build(kernel_file(function), constants))
+        found.add(Build(kernel_files()[function], constants))
         return kernel(self, function, defines)
 
     def pretended(probe=True):

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // exp(x) for -87 < x <= 0 with the same bits on every device: Cody-Waite reduction and a polynomial of degree 6,
 // every step an fma. Relative error below 2.5e-7 (tests/machine/test_arithmetic.py measures it).
-#ifndef SIMDTEX_EXP_H
-#define SIMDTEX_EXP_H
 
 static inline float exp32(const float x)
 {
@@ -18,5 +16,3 @@ static inline float exp32(const float x)
     p = fma(p, r, 1.0f);
     return as_float(as_int(p) + ((int)k << 23));
 }
-
-#endif

@@ -2,8 +2,6 @@
 // Gumbel noise. The candidate of least cost_p / 2h^2 - G_p, G_p = -log(-log u_p) with u_p uniform on (0, 1), is a draw
 // from the weights exp(-cost_p / 2h^2) of equation (7), whatever these add up to. u_p has 32 bits, and absolute errors of
 // G_p are below 3e-6 at both ends (tests/methods/mrf/test_relax.py measures it).
-#ifndef SIMDTEX_GUMBEL_H
-#define SIMDTEX_GUMBEL_H
 #include "common/log.h"
 #include "common/philox.h"
 #include "common/vector.h"
@@ -77,5 +75,3 @@ static inline float minus_gumbel_of(const ulong seed, const uint level, const ui
     return noise.s0;
 #endif
 }
-
-#endif

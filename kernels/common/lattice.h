@@ -2,8 +2,6 @@
 // The lattice of one level, equations (10) and (11), or a window of it: an array of sites with a shape and an origin. Site
 // (i, j) has number i * cols + j. A volume (-D AXES=3) is a stack of layers, one below another, and so is its lattice: row
 // i of it is row i % rows of layer i / rows.
-#ifndef SIMDTEX_LATTICE_H
-#define SIMDTEX_LATTICE_H
 
 #ifndef AXES
 #define AXES 2
@@ -62,5 +60,3 @@ static inline int neighbour(const Lattice g, const int i, const int j, __global 
 {
     return neighbour_at(g, i, j, LAYERS(offset), DOWN(offset), RIGHT(offset));
 }
-
-#endif

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // log(x) of normal x > 0 with the same bits on every device: x = 2^k (1 + r) and a polynomial of degree 9 in r, every
 // step an fma. Absolute error below 1.2e-6 for x < 2^24, above 2^-34 (tests/machine/test_arithmetic.py measures it).
-#ifndef SIMDTEX_LOG_H
-#define SIMDTEX_LOG_H
 
 // log(2^e (1 + r)) for r from sqrt(1/2) - 1 to sqrt(2) - 1, of T, a float or a vector of them; relative to r where e is 0.
 #define LOG_SERIES(T, r)                                                                                               \
@@ -17,5 +15,3 @@ static inline float log32(const float x)
     const float r = as_float(bits - (k << 23)) - 1.0f, e = (float)k;
     return LOG_SUM(float, e, r);
 }
-
-#endif

@@ -3,8 +3,6 @@
 //
 // Weights are integers: W_p = floor(2^40 w_p / w_max). Integers add up to the same sum in any order, so
 // no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
-#ifndef SIMDTEX_PARZEN_H
-#define SIMDTEX_PARZEN_H
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/exp.h"
 
@@ -54,5 +52,3 @@ static inline int step_from(__global const uint *noise, const int radius, const 
     }
     return lo - radius;
 }
-
-#endif

@@ -3,8 +3,6 @@
 // Key: the 64-bit seed. Counter: (site, turn, site and level and purpose, attempt), so that no tile or device changes
 // a draw. A site is its place in the whole picture, 48 bits of it: the upper 16 stand above level and purpose. The turn
 // counts sweeps, or steps where a sweep may take a site twice.
-#ifndef SIMDTEX_PHILOX_H
-#define SIMDTEX_PHILOX_H
 
 // Ten rounds of words a, b, c, d of type T, a number or a vector of them; FULL gives both halves of the products.
 #define PHILOX(T, a, b, c, d, key, FULL)                                                                               \
@@ -59,5 +57,3 @@ static inline ulong below(const uint lo, const uint hi, const ulong n)
 {
     return mul_hi((ulong)hi << 32 | lo, n);
 }
-
-#endif

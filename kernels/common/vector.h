@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // V numbers side by side in one work-item (-D V=1, 4, 8 or 16): the same arithmetic in the same order for each.
-#ifndef SIMDTEX_VECTOR_H
-#define SIMDTEX_VECTOR_H
 
 #ifndef V
 #define V 1
@@ -28,5 +26,3 @@ typedef WIDE(int) ivec;
 #define LEAST8(a) LEAST4(min((a).lo, (a).hi))
 #define LEAST16(a) LEAST8(min((a).lo, (a).hi))
 #define LEAST(a) JOIN(LEAST, V)(a)
-
-#endif

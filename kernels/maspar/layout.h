@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All kernels of the processor array have one work-item for each PE. A PE holds one pixel in each virtual layer; mask
 // (layers, PEs) is 1 where it is active. PEs outside the mask change nothing.
-#ifndef SIMDTEX_LAYOUT_H
-#define SIMDTEX_LAYOUT_H
 
 // simdtex.maspar.machine.LAYOUT is the same.
 typedef struct {
@@ -40,5 +38,3 @@ static inline int address_of(const Layout g, const int2 pixel)
     const int2 layer = g.blocks ? r : q, at = g.blocks ? q : r;
     return (layer.x * g.wide + layer.y) * PES(g) + at.x * g.cols + at.y;
 }
-
-#endif

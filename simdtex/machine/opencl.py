@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import re
 import time
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from math import prod
 from pathlib import Path
 from threading import RLock
@@ -37,7 +39,7 @@ NONE: Mapping[str, int | str] = {}
 SMALL_GROUP = 4
 """Work-group size on a CPU for kernels with much work in each item: few sites still occupy all cores."""
 
-ONE_PROGRAM = ("active", "coloring", "start", "use")
+ONE_PROGRAM = ("schedules/active", "schedules/coloring", "mrf/start", "mrf/use")
 """Kernel files without -D constants that every run of ``mrf`` needs, compiled as one program: each takes about 50 ms to
 load on PoCL."""
 
@@ -55,22 +57,35 @@ def kernel_folder() -> Path:
     return inside if inside.is_dir() else package.parent / "kernels"
 
 
-def kernel_source(name: str) -> str:
-    """Return the text of a file of that folder, with the text of each header in place of its ``#include``.
+def kernel_source(*names: str) -> str:
+    """Return the text of files of that folder, with the text of each header in place of its first ``#include``.
 
-    The compiler needs no path, which may contain a space, and its messages count the lines of each file.
+    So a header needs no guard, but no ``#include`` may stand within ``#if``. The compiler needs no path, which may
+    contain a space, and its messages count the lines of each file.
     """
-    lines = [f'#line 1 "{name}"', *(kernel_folder() / name).read_text(encoding="utf-8").splitlines()]
-    for number, line in enumerate(lines):
-        if line.startswith("#include"):
-            lines[number] = f'{kernel_source(line.split(chr(34))[1])}\n#line {number + 1} "{name}"'
-    return "\n".join(lines) + "\n"
+    read = set()
+
+    def text(name: str) -> str:
+        if name in read:
+            return ""
+        read.add(name)
+        lines = [f'#line 1 "{name}"', *(kernel_folder() / name).read_text(encoding="utf-8").splitlines()]
+        for number, line in enumerate(lines):
+            if line.startswith("#include"):
+                lines[number] = f'{text(line.split(chr(34))[1])}\n#line {number + 1} "{name}"'
+        return "\n".join(lines) + "\n"
+
+    return "".join(map(text, names))
 
 
-def kernel_file(function: str) -> str:
-    """Return the file of a kernel, without its ending: the first word of its name, of the folder maspar the second."""
-    words = function.split("_")
-    return "/".join(words[:2]) if words[0] == "maspar" else words[0]
+@cache
+def kernel_files() -> dict[str, str]:
+    """Return the file of each kernel, without its ending: that which defines a function of this name."""
+    folder, files = kernel_folder(), {}
+    for path in folder.rglob("*.cl"):
+        for function in re.findall(r"^__kernel\b.*?\bvoid (\w+)\(", path.read_text(encoding="utf-8"), re.MULTILINE):
+            files[function] = path.relative_to(folder).with_suffix("").as_posix()
+    return files
 
 
 class Pool:
@@ -379,11 +394,11 @@ class OpenCL:
 
     def kernel(self, function: str, defines: Mapping[str, int | str] = NONE) -> Any:
         """Return a kernel, compiled once for these -D constants."""
-        file = kernel_file(function)
+        file = kernel_files()[function]
         options = " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = ONE_PROGRAM if file in ONE_PROGRAM and not defines else (file,)
         if (files, options) not in self._kernels:
-            source = "".join(kernel_source(f"{name}.cl") for name in files)
+            source = kernel_source(*(f"{name}.cl" for name in files))
             self._kernels[files, options] = devices.build(self.context, source, options.split())
         return self._kernels[files, options][function]
 

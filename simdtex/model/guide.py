@@ -20,7 +20,7 @@ from simdtex.model.pictures import Pictures, halved, unknown_in
 from simdtex.model.scale import Scale, stretch
 
 UNKNOWN = 2**16 - 1
-"""The working level of an unknown value, which has no weight (kernels/common/confidence.h)."""
+"""The working level of an unknown value, which has no weight (kernels/mrf/confidence.h)."""
 
 
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]

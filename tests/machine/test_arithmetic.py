@@ -148,7 +148,7 @@ def test_exp32_of_0_is_1_and_it_never_exceeds_1():
 @pytest.fixture(scope="module")
 def build(machine):
     """The program above on a machine, as it builds its own."""
-    headers = kernel_source("common/exp.h") + kernel_source("common/gumbel.h")
+    headers = kernel_source("common/exp.h", "common/gumbel.h")
     kernels = devices.build(machine.context, headers + SOURCE, [])
 
     def run(name, *arrays):

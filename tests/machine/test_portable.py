@@ -10,7 +10,7 @@ from simdtex.machine.opencl import kernel_folder
 
 pytestmark = pytest.mark.skipif(not portable.CLANG, reason=portable.NO_CLANG)
 
-MOST_SCRATCH = {"relax": 640, "lcpdf": 2304}
+MOST_SCRATCH = {"mrf/relax": 640, "mrf/lcpdf": 2304}
 """Bytes of scratch that kernels of a file may take on a gfx1100, of others 640: more than the largest in the table."""
 
 HARMLESS = {
@@ -41,7 +41,7 @@ def test_no_result_is_left_to_the_device(file, vector):
     for build in FILES[file]:
         for name, line, operation in portable.unsafe(build.compiled("spir", vector)):
             text = (kernel_folder() / name).read_text(encoding="utf-8").splitlines()[line - 1]
-            if not (file == "relax" and any(words in text for words in HARMLESS)):
+            if not (file == "mrf/relax" and any(words in text for words in HARMLESS)):
                 found.add(f"{name}:{line}: {text.strip()} ({operation})")
     assert not found
 

@@ -50,7 +50,7 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
 
 
 EXEMPLAR_MULTIPLE = 4
-"""The number of exemplars of a class is a multiple of this (kernels/exemplars.cl)."""
+"""The number of exemplars of a class is a multiple of this (kernels/classification/exemplars.cl)."""
 
 LOGS = 256
 """Units in 1 of the logarithm of a distance."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The cost of a candidate: distance, coherence, use, phase on a lattice, data between the sites, kind, and novelty.
 
-`Costs.evaluate` is the only sum of them on the host, as ``kernels/common/costs.h`` is on devices.
+`Costs.evaluate` is the only sum of them on the host, as ``kernels/mrf/costs.h`` is on devices.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from simdtex.model.guide import UNKNOWN
 from simdtex.model.sample import Candidates
 
 AGAIN = 4
-"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/relax.cl."""
+"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/mrf/relax.cl."""
 
 
 class Phased(NamedTuple):
@@ -113,7 +113,7 @@ class Costs(NamedTuple):
 
     @property
     def defines(self) -> dict[str, int]:
-        """-D constants of kernels: kernels/common/costs.h."""
+        """-D constants of kernels: kernels/mrf/costs.h."""
         waves = {"WAVES": len(self.phased.candidates)} if self.phased else {}
         kinds = {"KINDS": len(self.kinds.candidates)} if self.kinds else {}
         return waves | kinds | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})

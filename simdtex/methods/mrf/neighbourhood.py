@@ -26,7 +26,7 @@ class Field(NamedTuple):
 
 
 class Confidences(NamedTuple):
-    """The number of guides, and the confidences of values: kernels/common/confidence.h.
+    """The number of guides, and the confidences of values: kernels/mrf/confidence.h.
 
     ``guides``, the number of guide channels, which are the last; ``own``, whether each value has its own confidence, as
     for guides and unknown values; ``centre``, the confidence of a guide at the site itself; ``hard``, that of hard

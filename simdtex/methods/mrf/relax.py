@@ -4,7 +4,7 @@
 A `Relaxation` defines how a site relaxes: its neighbourhood, the proposed candidates (`AllCandidates` or
 `CandidateList`), their costs (`simdtex.methods.mrf.costs`), the choice among them, and its cooling. `relax` works in
 place, step after step; `relax_out_of_place` does not change the field. A device executes one kernel,
-``kernels/relax.cl``, or for the mode of a density ``kernels/lcpdf.cl``.
+``kernels/mrf/relax.cl``, or for the mode of a density ``kernels/mrf/lcpdf.cl``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ EXHAUSTIVE = 64
 """The most candidates of a level that a coherent search evaluates exhaustively."""
 
 SUGGESTING = 12
-"""Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/relax.cl."""
+"""Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/mrf/relax.cl."""
 
 ALIKE = 64
 """The most candidates that count as alike in known variables, unless they are equal in these."""
@@ -205,7 +205,7 @@ LEVEL = np.dtype(
     ],
     align=True,
 )
-"""The struct ``Level`` of kernels/common/level.h."""
+"""The struct ``Level`` of kernels/mrf/level.h."""
 
 
 def constants(grid: Grid, **values: Any) -> np.void:
@@ -386,7 +386,7 @@ def _kernel(
 
 
 def _shared(defines: dict[str, int], items: int) -> int:
-    """Return the most bytes of local memory that a group of work-items takes in kernels/relax.cl."""
+    """Return the most bytes of local memory that a group of work-items takes in kernels/mrf/relax.cl."""
     channels, most, side = int(defines["C"]), int(defines["N"]), 2 * int(defines["RADIUS"]) + 1
     each = channels + (channels if "OWN" in defines else 1)  # confidences and values
     rows, columns = side ** (2 if defines.get("AXES") == 3 else 1), -(-side // LANES) * LANES

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sample in the layout for reading the square around a neighbourhood: kernels/common/square.h."""
+"""The sample in the layout for reading the square around a neighbourhood: kernels/mrf/square.h."""
 
 from __future__ import annotations
 

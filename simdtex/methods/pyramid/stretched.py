@@ -12,7 +12,7 @@ from simdtex.model.sample import moved
 from simdtex.model.scale import stretch
 
 TOP = 2**20
-"""The largest pixel. Sums of a pyramid of up to 30 levels then fit 32 bits (kernels/laplacian.cl)."""
+"""The largest pixel. Sums of a pyramid of up to 30 levels then fit 32 bits (kernels/pyramid/laplacian.cl)."""
 
 BLOCK = 2**18
 """Number of values that are converted to pixels together."""

@@ -13,7 +13,7 @@ from cases import REFERENCE, assert_same_bits, laid_out, opencl, slow_but, sweep
 
 import simdtex
 from simdtex.machine import devices
-from simdtex.machine.opencl import kernel_source
+from simdtex.machine.opencl import kernel_folder, kernel_source
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
 from simdtex.methods.mrf.level import Active, parts
@@ -41,7 +41,7 @@ def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
         for n, name in enumerate(fields(dtype), 1)
     )
     source = f"__kernel void look({kind} v, __global int *out) {{ out[0] = sizeof v; {lines} }}"
-    kernel = devices.build(machine.context, kernel_source("common/level.h") + source, [])["look"]
+    kernel = devices.build(machine.context, kernel_source("mrf/level.h") + source, [])["look"]
     out = machine.put(np.zeros(1 + len(fields(dtype)), np.int32))
     machine.enqueue(kernel, (1,), np.zeros((), dtype)[()], out)
     told = machine.get(out).tolist()
@@ -49,11 +49,8 @@ def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
 
 
 def test_a_struct_names_its_numbers_as_the_header_does():
-    header = Path(simdtex.__file__).parent.parent / "kernels" / "common" / "level.h"
-    if not header.is_file():
-        pytest.skip("the kernels are not beside the package")
-    for file, kind, dtype in (("lattice.h", "Lattice", LATTICE), ("level.h", "Level", LEVEL)):
-        text = (header.parent / file).read_text()
+    for file, kind, dtype in (("common/lattice.h", "Lattice", LATTICE), ("mrf/level.h", "Level", LEVEL)):
+        text = (kernel_folder() / file).read_text()
         body = re.search(rf"typedef struct {{(.*?)}} {kind};", text, re.DOTALL)[1]
         body = re.sub(r"//.*", "", body)
         names = [n.strip() for line in body.split(";") for n in re.sub(r"^\s*\w+\s", "", line).split(",") if n.strip()]

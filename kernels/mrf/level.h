@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What stays the same for all relaxations of a level. simdtex.methods.mrf.relax.LEVEL is the same; tests/methods/mrf/test_level.py holds the
 // one against the other.
-#ifndef SIMDTEX_LEVEL_H
-#define SIMDTEX_LEVEL_H
 #include "common/lattice.h"
 
 typedef struct {
@@ -26,5 +24,3 @@ typedef struct {
     float hard;                   // confidence of hard data
     float centre_known;           // confidence of a known variable at the site itself
 } Level;
-
-#endif

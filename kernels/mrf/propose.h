@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A list of candidates in which each stands once.
-#ifndef SIMDTEX_PROPOSE_H
-#define SIMDTEX_PROPOSE_H
 
 // Whether i is among the first m of a list; `seen` has a bit for each that is.
 #define BIT(i) (1ul << ((uint)(i) * 0x9E3779B1u >> 26))
@@ -24,5 +22,3 @@ static inline int proposed(const int i, __private int *list, const int m, __priv
     *seen |= BIT(i);
     return m + 1;
 }
-
-#endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "common/cool.h"
+#include "mrf/cool.h"
 #include "common/lattice.h"
 
 // Equation (13), by itself: what sites cool to.

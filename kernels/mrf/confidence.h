@@ -3,8 +3,6 @@
 // every channel has a confidence of its own: a guide's is 1 whatever the temperature, and `centre` at the site itself;
 // an unknown value has 0. The last KNOWN guides are known variables, with the confidence of hard data, and
 // `centre_known` at the site itself.
-#ifndef SIMDTEX_CONFIDENCE_H
-#define SIMDTEX_CONFIDENCE_H
 
 #ifndef G
 #define G 0
@@ -27,6 +25,4 @@
 #define CONFIDENT(c) 0
 #define WEIGHED_AS(u, source, hard) (u)
 #define CONFIDENCE_OF(made, x, u, guide) (u)
-#endif
-
 #endif

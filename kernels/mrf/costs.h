@@ -9,9 +9,7 @@
 //   novelty n_p                                       for each neighbour that it continues, or 4 for one that it repeats
 //
 // Only the first may be less than that of all candidates; none is below 0.
-#ifndef SIMDTEX_COSTS_H
-#define SIMDTEX_COSTS_H
-#include "common/square.h"
+#include "mrf/square.h"
 
 #ifndef WAVES
 #define WAVES 0
@@ -92,5 +90,3 @@ static inline float misfit(const int begin, const int end, __global const int *r
         }
     return d;
 }
-
-#endif

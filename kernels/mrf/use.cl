@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "common/coherence.h"
+#include "mrf/coherence.h"
 
 // How many known sites, those with t < 1, each candidate is the source of. Whole numbers: their order does not matter.
 //

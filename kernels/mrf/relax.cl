@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Step 6.2.2 of Algorithm 1 in one kernel: the relaxation of a site, the sites of a step in parallel. The steps are
 //
-//   6.2.2.1  gather the neighbourhood of s, propose candidates, and evaluate them: equation (12) and common/costs.h;
+//   6.2.2.1  gather the neighbourhood of s, propose candidates, and evaluate them: equation (12) and mrf/costs.h;
 //   6.2.2.2  choose one of them: ICM that of least cost, the Gibbs sampler that of least cost - 2h^2 G with the noise
 //            of common/gumbel.h, a draw from the LCPDF, equation (7); of equals the first in the sample;
 //   6.2.2.3  cool the site, equation (13).
@@ -20,11 +20,11 @@
 // neighbours. -D APART writes to new_values (C, S), new_source and new_temperature (S,) instead. A site has one work-item,
 // or -D ITEMS of them: these share its neighbours, its candidates, and the lanes of a distance.
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/costs.h"
-#include "common/cool.h"
+#include "mrf/costs.h"
+#include "mrf/cool.h"
 #include "common/gumbel.h"
 #include "common/parzen.h"
-#include "common/propose.h"
+#include "mrf/propose.h"
 
 #ifdef APART
 #define NEW(name) new_##name

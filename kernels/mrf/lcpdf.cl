@@ -8,9 +8,9 @@
 // Weights are integers, zero below 2^-40 of the largest: common/parzen.h. No distance is kept: each is evaluated again,
 // for the least, for the sums of weights and for the source.
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/costs.h"
+#include "mrf/costs.h"
 #include "common/parzen.h"
-#include "common/propose.h"
+#include "mrf/propose.h"
 
 #ifndef N
 #define N 64 // most neighbours

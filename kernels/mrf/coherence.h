@@ -2,8 +2,6 @@
 // A preference for coherence, which the 1998 paper lacks: neighbour r of site s was taken from sample position p_r, so
 // p_r + (s - r) continues it. The squared distance of such a candidate is multiplied by `discount` = 1 / (1 + coherence),
 // once however many neighbours propose it. Neighbours that no relaxation has touched (t = 1) propose none.
-#ifndef SIMDTEX_COHERENCE_H
-#define SIMDTEX_COHERENCE_H
 
 #define UNTOUCHED 1024 // t = 1 in 1/1024
 
@@ -20,5 +18,3 @@ static inline int number_of(__global const int *index_of, const int source)
 {
     return source < 0 ? -1 : index_of[source];
 }
-
-#endif

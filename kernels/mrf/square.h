@@ -4,13 +4,11 @@
 //
 // The sum has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels inside; then lanes n
 // and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
-#ifndef SIMDTEX_SQUARE_H
-#define SIMDTEX_SQUARE_H
-#include "common/coherence.h"
-#include "common/confidence.h"
+#include "mrf/coherence.h"
+#include "mrf/confidence.h"
 #include "common/distance.h"
-#include "common/group.h"
-#include "common/level.h"
+#include "mrf/group.h"
+#include "mrf/level.h"
 #include "common/vector.h"
 
 #ifndef RADIUS
@@ -341,6 +339,4 @@ static inline void by_category(__private float16 *xu)
     }
 }
 #endif
-#endif
-
 #endif

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Work-items that relax one site together, -D ITEMS of them in a work-group, a multiple of 16: sums have 16 lanes, and so
 // an item has one lane of one candidate. With ITEMS=1 an item relaxes a site by itself, and its arrays are its own.
-#ifndef SIMDTEX_GROUP_H
-#define SIMDTEX_GROUP_H
 
 #ifndef ITEMS
 #define ITEMS 1
@@ -19,5 +17,3 @@
 #define GROUP
 #endif
 #define EACH(k, n) for (int k = ITEM; k < (n); k += ITEMS) // those of 0 .. n - 1 that this item does
-
-#endif
