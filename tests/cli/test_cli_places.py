@@ -220,6 +220,8 @@ def test_an_empty_size_is_no_default(folder, name):
         args = ["out.png" if word == "fresh.npz" else word for word in args]
     if name in ("demo", "schedules"):
         args += ["-o", "report"]
+    if name == "estimate":
+        args += ["--known", "sample.png"]
     refused("size '' is not ", name, *args)
     assert not Path("report").exists()
 

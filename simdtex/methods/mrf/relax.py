@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,8 +214,7 @@ def constants(grid: Grid, **values: Any) -> np.void:
     numbers["lattice"] = grid.struct
     for name, value in values.items():
         numbers[name] = value
-    struct: np.void = numbers[()]  # type: ignore[assignment]
-    return struct
+    return cast(np.void, numbers[()])
 
 
 class Evaluated(NamedTuple):
