@@ -3,6 +3,7 @@
 import functools
 import importlib
 import os
+import signal
 from pathlib import Path
 
 import hypothesis
@@ -13,6 +14,8 @@ SOURCE = kept.key()  # before the package is imported
 
 from simdtex.machine import devices as device_module  # noqa: E402
 from simdtex.machine.devices import DeviceInfo  # noqa: E402
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts jobs in the background with it ignored
 
 REQUIRE = "SIMDTEX_REQUIRE_OPENCL"
 WHOLE_RUNS = ("test_conformance",)

@@ -19,7 +19,7 @@ ROOMS = {
     ("model",): 3891,
     ("run", "checkpoint", "driver"): 885,
     ("schedules",): 1055,
-    ("methods.mrf",): 3983,
+    ("methods.mrf",): 3987,
     ("methods.pyramid",): 2085,
     ("methods.multires",): 821,
     ("inputs",): 550,
@@ -38,7 +38,7 @@ ROOMS = {
     ("live",): 2035,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 36795, 21031
+LINES, CODE = 36799, 21035
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}

@@ -372,16 +372,17 @@ def _kernel(
     if isinstance(proposal, AllCandidates):
         defines |= {"EXACT": 1, "STEP": machine.step}
         terms = (relaxation.offsets.shape[0] + bool(relaxation.confidences.guides)) * len(field.values)
-        work = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)
+        work, phases = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms), []
     else:
         defines["SLOTS"] = -(-most_listed(proposal.neighbours, proposal.chance) // 64) * 64
-        defines |= {"PHASES": 1} if proposal.phases else {}
+        phases = list(proposal.phases or ())
+        defines |= {"PHASES": 1} if phases else {}
         defines |= {"NOVEL": 1} if relaxation.costs.novelty else {}
         defines |= {"HOT": proposal.square.hot} if proposal.square.hot and machine.vector > 1 else {}
     if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
     arguments += [machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
-    return defines, arguments + list(getattr(proposal, "phases", None) or ())
+    return defines, arguments + phases
 
 
 def _shared(defines: dict[str, int], items: int) -> int:
