@@ -11,6 +11,7 @@ import simdtex
 from simdtex.checkpoint import Checkpointing
 from simdtex.driver import drive
 from simdtex.machine import memory
+from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf import level as level_of_a_run
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
@@ -230,10 +231,10 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
 
 
 def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
-    plan, kept = prepared(search="coherent", schedule="luby", array="8x8").plan, []
+    plan, kept = prepared(search="coherent", schedule="luby").plan, []
 
     def driven(found, keep=lambda info, tree, now=False: None):
-        image, output = drive(plan, REFERENCE, 5, checkpointing=Checkpointing(found, keep))
+        image, output = drive(plan, REFERENCE, 5, None, Checkpointing(found, keep), observers("8x8"))
         levels = [report | {"seconds": None} for report in output.statistics["levels"]]
         counts = output.statistics["accounting"] | {"launches": None}
         return image.tolist(), [stage.level for stage in output.stages], levels, counts
