@@ -13,8 +13,8 @@ import numpy as np
 import PIL.Image
 import pytest
 from browsing import AXE, browser, drop, live, missing, shown, until
+from cases import BASES, spots
 from live import png, striped, texture
-from test_regularity import BASES, spots
 
 import simdtex
 from simdtex.io.image import example

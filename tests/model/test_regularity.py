@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cases import REFERENCE, texture
+from cases import BASES, REFERENCE, spots, texture
 from numpy.testing import assert_allclose
 from scipy import ndimage
 
@@ -11,28 +11,6 @@ from simdtex.model import regularity
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import Lattice, aligned, harmonics, parse_lattice, phases, plain, regular
 from simdtex.options import resolve
-
-BASES = {
-    "square": ((12, 0), (0, 12)),
-    "tall": ((17, 0), (0, 7)),
-    "brick": ((11.5, -16), (11.5, 16)),
-    "hexagons": ((16.7, 34.2), (36.2, -0.8)),
-    "oblique": ((9.3, 4.1), (-3.2, 11.9)),
-    "weave": ((6.5, 6.2), (6.4, -6.1)),
-}
-
-
-def spots(basis, shape=(96, 110), origin=(0.0, 0.0), noise=20, channels=1, seed=1):
-    """A picture of a bright spot and a dark one in every cell of a lattice."""
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    at = Lattice(*basis, origin).phases(y, x)
-    near = [
-        np.exp(-40 * ((np.mod(at + 0.5 - np.reshape(c, (2, 1, 1)), 1) - 0.5) ** 2).sum(0)) for c in ((0, 0), (0.3, 0.4))
-    ]
-    picture = 120 + 100 * near[0] - 60 * near[1]
-    rng = np.random.default_rng(seed)
-    grey = np.clip(picture[..., None] + rng.normal(0, noise, (*shape, channels)), 0, 255)
-    return grey.astype(np.uint8)
 
 
 def found_in(picture, known=None):
