@@ -28,7 +28,7 @@ PUBLIC = {
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),
     "explain",
     "replay",
-    *("show", "TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
+    *("show", "TextureClassifier", "TileStore", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
     "tileset",
 }
 OTHERS = {"importlib.metadata", "PIL.TiffImagePlugin", "simdtex.maspar.accounting", "simdtex.methods.pyramid.algorithm"}
