@@ -22,7 +22,7 @@ from simdtex.live import script, style
 from simdtex.live.job import LABELS
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 TOKEN = "a-token-for-the-browser"
 LACKS = missing() or ("" if AXE.exists() else "axe-core is not installed (make browser, which needs npm)")
 if LACKS and os.environ.get(REQUIRE):
