@@ -16,7 +16,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 ROOMS = {
     ("random", "options", "machine"): 1882,
     ("io",): 3802,
-    ("model",): 3891,
+    ("model",): 3899,
     ("run", "checkpoint", "driver"): 885,
     ("schedules",): 1055,
     ("methods.mrf",): 3987,
@@ -24,21 +24,21 @@ ROOMS = {
     ("methods.multires",): 821,
     ("inputs",): 550,
     ("figures",): 865,
-    ("cli",): 1733,
-    ("maspar",): 1815,
+    ("cli",): 1719,
+    ("maspar",): 1809,
     ("jobs.tiles",): 1604,
-    ("jobs.synthesis",): 664,
+    ("jobs.synthesis",): 658,
     ("jobs.filling",): 847,
     ("jobs.why",): 475,
     ("jobs.tilesets",): 662,
     ("jobs.mixes",): 407,
     ("jobs.classification",): 1764,
-    ("jobs.studies",): 2301,
+    ("jobs.studies",): 2289,
     ("jobs.simulation",): 2557,
-    ("live",): 2035,
+    ("live",): 2027,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 36799, 21035
+LINES, CODE = 36761, 21013
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}

@@ -25,7 +25,7 @@ from simdtex.cli.command import (
     WRITE,
     WRITE_PAIR,
 )
-from simdtex.model.light import LIGHTS
+from simdtex.model import light
 from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
@@ -93,15 +93,6 @@ DIRECTIONS = {"both": True, "x": "x", "y": "y"}
 DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 
 option = functools.partial(click.option, cls=Option)
-
-TYPES: dict[str, Any] = {
-    **{"file": READ, "pair": READ_PAIR, "named": READ_NAMED, "numbers": NUMBERS, "number": float, "integer": int},
-    "new file": WRITE,
-    "direction": DIRECTION,
-    "columns": COLUMNS,
-    "categories": CATEGORIES,
-}
-"""The types of the options of inputs, by what a declaration says that it takes."""
 
 
 def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -270,12 +261,7 @@ GUIDE = option(
 )
 
 
-LIGHT = option(
-    "--light",
-    words=LIGHTS,
-    group="Appearance",
-    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
-)
+LIGHT = _option("", "light", {"": light.LIGHT})
 MAP = option(
     "--map",
     "roles",

@@ -31,7 +31,7 @@ from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.model.display import label_colours
-from simdtex.model.light import LIGHTS
+from simdtex.model.light import LIGHT
 from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, one_of, real, shown, table, whole
 from simdtex.run import Output
 
@@ -61,14 +61,6 @@ TABLES: dict[str, tuple[Any, str]] = {
     "classify": (classifier.Options, "classify"),
 }
 """The options and the command of each set of controls: for the methods, and for the jobs with a single method."""
-
-LIGHT = Option(
-    "keep",
-    Choice(LIGHTS),
-    "Keep the sample's light, or take pixels from the sample in even light",
-    group="Appearance",
-)
-"""The control for the parameter ``light``."""
 
 MAX_SIDE = 2**14
 """The most rows or columns of an output."""

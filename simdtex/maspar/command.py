@@ -4,24 +4,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from simdtex.cli.command import READ, WRITE
-from simdtex.cli.options import output_option
-
-if TYPE_CHECKING:
-    pass
-
-from typing import Any
-
 from simdtex.cli.inputs import check_output, output_shape, read_material
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import (
     SEED,
     given,
     option,
+    output_option,
     paper_options,
     report_option,
     size_option,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.pictures import Mask, Pictures, few
 from simdtex.model.regularity import lattice_sentence
-from simdtex.options import LARGEST, moderate, one_of
+from simdtex.options import LARGEST, Choice, Option, moderate, one_of
 
 Axes = tuple[int, ...]
 
@@ -38,6 +38,14 @@ ROW, COL = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 0, 2, 1, 0])
 
 LIGHTS = ("keep", "even")
 """The values of the option ``light``: as it is, or without its trend."""
+
+LIGHT = Option(
+    "keep",
+    Choice(LIGHTS),
+    "Keep the sample's light, or take pixels from the sample in even light",
+    group="Appearance",
+)
+"""The option of commands and of the live page, where the light of a sample is kept by default."""
 
 BLOCKS, SMOOTH, SHARE = 8, 0.9, 0.2
 """A picture of `BLOCKS` x `BLOCKS` means is uneven if the trend is `SMOOTH` of their variance, and `SHARE` of the

@@ -1,33 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex schedules`` and ``simdtex maspar``: schedules side by side, and the processor array of 1998."""
+"""``simdtex schedules``: schedules side by side; and ``simdtex bench``: the time of each method on each device."""
 
 from __future__ import annotations
 
 import json
 import time
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from simdtex.cli.command import FOLDER, READ, WRITE, afterwards, command
 from simdtex.cli.inputs import read_picture
-from simdtex.cli.job import watching
-from simdtex.cli.options import DEVICE, QUIET, output_option
+from simdtex.cli.job import command_line, expected, watching
+from simdtex.cli.options import DEVICE, DRY_RUN, QUIET, given, job_options, output_option
 from simdtex.methods.mrf.options import Options
-
-if TYPE_CHECKING:
-    pass
-
-from functools import partial
-from typing import Any
-
-from simdtex.cli.job import command_line, expected
-from simdtex.cli.options import (
-    DRY_RUN,
-    given,
-    job_options,
-)
 from simdtex.schedules import PARALLEL, Schedule
 
 

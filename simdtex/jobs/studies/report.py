@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reports of schedules: a comparison, with the Ising model, and an execution on the processor array of 1998."""
+"""The report of a comparison of schedules, with the Ising model."""
 
 from __future__ import annotations
 

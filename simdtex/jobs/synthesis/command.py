@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex synth``, ``extend``, ``tile`` and ``fill``: textures, also in tiles; and ``resume``."""
+"""``simdtex synth``: textures of any size, also in tiles."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from simdtex.cli.job import Task, command_line, job, notes
 from simdtex.cli.options import (
     GUIDE,
     KNOWN_OPTIONS,
+    LIGHT,
     PREVIEW,
     PROFILE,
     SAMPLE_MASK,
@@ -42,7 +43,6 @@ from simdtex.jobs.tiles.command import TILES, check_tiles, make_in_tiles
 from simdtex.methods.mrf import options as mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
-from simdtex.model.light import LIGHTS
 
 
 @job(
@@ -65,13 +65,7 @@ from simdtex.model.light import LIGHTS
 @SAMPLE_MASK
 @KNOWN_OPTIONS
 @GUIDE
-@option(
-    "--light",
-    words=LIGHTS,
-    default="keep",
-    group="Appearance",
-    help="Keep the sample's light, or take pixels from the sample in even light.  [keep]",
-)
+@LIGHT
 @material_options
 @PREVIEW
 @TILES

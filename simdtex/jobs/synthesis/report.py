@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reports of one synthesis and of one classification."""
+"""The page of a synthesis: its pictures, and how evenly it uses the sample."""
 
 from __future__ import annotations
 
