@@ -13,7 +13,7 @@ from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
 from simdtex.methods.mrf import lcpdf
 from simdtex.methods.mrf.algorithm import ignore
-from simdtex.methods.mrf.costs import Costs, Kinds, Phased, Scattered
+from simdtex.methods.mrf.costs import Costs, Kinds, Phased, ScatteredData
 from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.relax import AllCandidates, CandidateList, InPhase, Relaxation, in_phase
 from simdtex.methods.mrf.square import TAIL, square_of
@@ -147,7 +147,7 @@ class Problem(NamedTuple):
         values = rng.integers(0, self.sample.top + 1, (begin[-1] + 1, channels)).astype(np.uint16)
         values[rng.random(values.shape) < 0.2] = UNKNOWN
         put = (begin, (apart @ [self.sample.cols, 1]).astype(np.int32), values)
-        return Scattered(*map(machine.put, put), np.float32(1.5))
+        return ScatteredData(*map(machine.put, put), np.float32(1.5))
 
     def kinds(self, machine, every=False):
         """So many kinds of each candidate, or place, of four that there are, some excluded here and there; or None."""
@@ -182,7 +182,7 @@ class Problem(NamedTuple):
         if not exact:
             proposal = CandidateList(candidates, square, len(self.offsets), chance, self.in_phase(machine))
         terms = self.costs(machine, every=exact, **{"dear": 0.0} | costs)
-        choice = lcpdf.Choice(gibbs, density, self.window(bandwidth)[0])
+        choice = lcpdf.SiteChoice(gibbs, density, self.window(bandwidth)[0])
         offsets = machine.put(self.offsets)
         return Relaxation(self.grid, offsets, proposal, terms, choice, -1024, seed, level, self.confidences)
 

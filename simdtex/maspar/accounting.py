@@ -18,8 +18,8 @@ from simdtex.maspar.algorithm import Level, Pass, Problem, Program
 from simdtex.maspar.array import ProcessorArray
 from simdtex.maspar.machine import COSTS, MP1, Mask
 from simdtex.maspar.sites import Walk
-from simdtex.methods.mrf.lcpdf import Choice
-from simdtex.methods.mrf.level import Info, Lattices, State
+from simdtex.methods.mrf.lcpdf import SiteChoice
+from simdtex.methods.mrf.level import Lattices, MrfState, SweepInfo
 from simdtex.model.array import MAPPINGS, parse_array
 from simdtex.model.lattice import Grid
 from simdtex.run import Observer
@@ -49,7 +49,7 @@ class Account:
         self.array, self._offsets, self._channels = array, offsets, channels
         self.total: dict[str, Any] = dict.fromkeys(("steps", "passes", "sites", "flop", *COSTS), 0)
 
-    def begin(self, grid: Grid, candidates: int, choice: Choice) -> None:
+    def begin(self, grid: Grid, candidates: int, choice: SiteChoice) -> None:
         """Start a level with its lattice, the number of candidates of a relaxation, and the choice among them."""
         self._grid, self._flop = grid, FLOP * len(self._offsets) * self._channels * candidates
         mp1 = MP1(None, self.array, (grid.pixels[0], grid.pixels[1]), inf)
@@ -105,7 +105,7 @@ class Accounting(Observer):
         self.account = Account(ProcessorArray(*parse_array(array)), run.offsets, run.sample.channels)
         self._level, self._launches = -1, run.machine.launches
 
-    def step(self, state: State, info: Info) -> None:
+    def step(self, state: MrfState, info: SweepInfo) -> None:
         """Count the cost of a sweep."""
         if info.level != self._level:
             self._begin(info.level)

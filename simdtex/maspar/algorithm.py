@@ -19,7 +19,7 @@ from simdtex.maspar import instructions
 from simdtex.maspar.instructions import STEPPED, Broadcast
 from simdtex.maspar.machine import EXP, MP1, NOISE, PHILOX, Mask, Plural
 from simdtex.maspar.sites import Walk, coloring
-from simdtex.methods.mrf.lcpdf import Choice, Key, log_legal, turns
+from simdtex.methods.mrf.lcpdf import Key, SiteChoice, log_legal, turns
 from simdtex.methods.mrf.square import LANES
 from simdtex.model.lattice import Grid
 
@@ -35,7 +35,7 @@ class Level(NamedTuple):
 
     number: int
     grid: Grid
-    choice: Choice
+    choice: SiteChoice
     source: NDArray[np.int32]
     own: NDArray[np.float32]
     sample: NDArray[np.float32]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from simdtex.maspar.array import Layout
 from simdtex.methods.mrf.arithmetic import fma32, minus_gumbel
-from simdtex.methods.mrf.lcpdf import Key, Window, spread, stepped, weighed, weights
+from simdtex.methods.mrf.lcpdf import Key, ParzenWindow, spread, stepped, weighed, weights
 from simdtex.methods.mrf.relax import PAIRS
 from simdtex.methods.mrf.square import LANES
 from simdtex.random import GUMBEL, below, draw4
@@ -161,7 +161,7 @@ def lcpdf_choose(
 
 
 def lcpdf_mode(
-    on: On, of: Broadcast, near: Array, least: Array, chosen: Array, window: Window, mass: Array, x: Array, c: int
+    on: On, of: Broadcast, near: Array, least: Array, chosen: Array, window: ParzenWindow, mass: Array, x: Array, c: int
 ) -> None:
     """Set ``mass`` to the sums of the weights (7), given all channels of ``x`` but ``c``, of each grey level.
 
@@ -178,12 +178,12 @@ def lcpdf_mode(
             mass[0, at[1]] = sums.T
 
 
-def lcpdf_highest(on: On, mass: Array, window: Window, x: Array) -> None:
+def lcpdf_highest(on: On, mass: Array, window: ParzenWindow, x: Array) -> None:
     """Set a word to the grey level with the highest density, of several the lowest."""
     x[..., 0][on.at] = spread(mass[0, on.at[1]].T, window).argmax(0)
 
 
-def lcpdf_step(on: On, x: Array, window: Window, place: Array, key: Key, c: int) -> None:
+def lcpdf_step(on: On, x: Array, window: ParzenWindow, place: Array, key: Key, c: int) -> None:
     """Add to the grey level of channel ``c`` a step drawn from the kernel of equation (7) around it."""
     grey = x[..., 0][on.at].astype(np.uint16)
     x[..., 0][on.at] = stepped(grey, c, place[..., 0][on.at], window, key)

@@ -147,7 +147,7 @@ def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
 
 
 def nearest_data(
-    place: NDArray[np.int32], grid: Grid, order: int
+    place: NDArray[np.integer], grid: Grid, order: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return the data near each site of a lattice or a window of it, site by site, the nearest first.
 

@@ -8,7 +8,7 @@ import simdtex
 from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import ProcessorArray
 from simdtex.maspar.machine import COSTS
-from simdtex.methods.mrf.lcpdf import Choice, window
+from simdtex.methods.mrf.lcpdf import SiteChoice, window
 from simdtex.model.array import parse_array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 
@@ -71,7 +71,7 @@ def test_a_text_may_name_the_mapping(name):
 
 def account(array, grid, steps, order=1, candidates=10):
     counted = Account(array, neighbourhood_offsets(order), 1)
-    counted.begin(grid, candidates, Choice(True, False, window(1.0, 255)))
+    counted.begin(grid, candidates, SiteChoice(True, False, window(1.0, 255)))
     for sites in steps:
         counted.step(np.array(sites, np.int32))
     return counted.report()

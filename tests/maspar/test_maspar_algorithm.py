@@ -14,7 +14,7 @@ from simdtex.maspar.array import MAPPINGS, ProcessorArray
 from simdtex.maspar.machine import MP1
 from simdtex.maspar.sites import Walk
 from simdtex.methods.mrf.arithmetic import fma32
-from simdtex.methods.mrf.lcpdf import Choice, window
+from simdtex.methods.mrf.lcpdf import SiteChoice, window
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.schedules.schedule import neighbours_in
 
@@ -112,7 +112,7 @@ def test_distances_are_summed_lane_by_lane_and_row_by_row(machine):
         lanes[j + 4] = fma32(e, e, lanes[j + 4])
     while len(lanes) > 1:
         lanes = lanes[: len(lanes) // 2] + lanes[len(lanes) // 2 :]
-    icm, number, own = Choice(False, False, window(1.0, 255)), np.zeros(1, np.int32), np.zeros((1, 1), np.float32)
+    icm, number, own = SiteChoice(False, False, window(1.0, 255)), np.zeros(1, np.int32), np.zeros((1, 1), np.float32)
     level = Level(0, grid, icm, number, own, sample[:, None, None].astype(np.float32), number)
     for device in (REFERENCE, machine):
         mp1 = MP1(device, ProcessorArray(8, 8), (8, 8))
@@ -138,7 +138,7 @@ def test_of_tied_modes_the_lowest_is_taken(machine, make):
 @pytest.mark.parametrize("density", [True, False])
 def test_a_pass_takes_the_memory_that_it_uses(draws, density):
     """A mode has a sum of 64 bits for each grey level; nothing grows with the number of candidates."""
-    grid, choice = Grid((4, 4)), Choice(draws, density, window(1.0, 255))
+    grid, choice = Grid((4, 4)), SiteChoice(draws, density, window(1.0, 255))
     mp1 = MP1(REFERENCE, ProcessorArray(4, 4), (4, 4), 2**20)
     program = Program(mp1, Problem(np.zeros((2, 1), np.int32), neighbourhood_offsets(1), 1, -1, 0))
     walk = Walk(mp1, grid, neighbourhood_offsets(1))

@@ -533,7 +533,7 @@ class Filling:
         place = (np.moveaxis(np.mgrid[at], 0, -1) - (top, left)).astype(np.int32)
         return WindowSample(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
-    def plan(self, window: Window, sample: WindowSample) -> mrf.Plan:
+    def plan(self, window: Window, sample: WindowSample) -> mrf.MrfPlan:
         """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
         at, options, guide = window.at, self.options, None
         pictures, hole, least = sample.pictures, self.hole[at], window.levels and options.levels is None

@@ -35,7 +35,8 @@ from simdtex.jobs.simulation.maps import (
 )
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.methods.mrf.density import Data, given_data
+from simdtex.methods.mrf.conditioning import Data
+from simdtex.methods.mrf.density import given_data
 from simdtex.model.given import Given, Soft
 from simdtex.model.guide import GuidePair
 from simdtex.model.light import Light
@@ -271,7 +272,7 @@ class Simulation:
         names = (*("layer", "row", "column")[-len(self.shape) :], "image")
         return names[: len(self.shape) + (len(self.cells.training.pixels) > 1)] if self.source else ()
 
-    def plan(self) -> mrf.Plan:
+    def plan(self) -> mrf.MrfPlan:
         """Return the plan of all runs."""
         soft = self.soft if self.soft.rows else None
         return mrf.plan(self.training, self.shape, self.options, self.known, self.guide, soft=soft)

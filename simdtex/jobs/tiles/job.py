@@ -19,7 +19,7 @@ from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.tiles.layout import Layout, Maps, Outputs, planned
 from simdtex.machine import memory
 from simdtex.machine.reference import Reference
-from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.plan import MrfPlan
 from simdtex.model.source_map import apply_source_map
 from simdtex.options import require
 from simdtex.random import as_seed
@@ -167,7 +167,7 @@ class TileStore:
         """Whether the output is complete; raises ValueError if the store holds none, as `resume` does."""
         return bool(self._opened().finished)
 
-    def _planned(self, job: Any, seed: int) -> tuple[Plan, Outputs, Layout]:
+    def _planned(self, job: Any, seed: int) -> tuple[MrfPlan, Outputs, Layout]:
         """Return the plan of a job, the arrays of its output, and its tiles."""
         if job.method != "mrf":
             raise ValueError(f"the method {job.method} needs the whole output at once; give mrf, or make no tiles")
@@ -196,7 +196,7 @@ class TileStore:
         return store
 
 
-def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
+def _maps(maps: dict[str, Any], plan: MrfPlan) -> Maps:
     """Return further maps as lists, with one map for each picture of the sample; raise if they do not fit."""
     found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.methods.mrf.finish import gaussian_offsets
-from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.plan import MrfPlan
 from simdtex.model.lattice import Grid
 from simdtex.options import whole
 from simdtex.schedules.schedule import Windowed
@@ -47,7 +47,7 @@ class Outputs(NamedTuple):
     source: bool
     maps: Maps
 
-    def arrays(self, plan: Plan) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    def arrays(self, plan: MrfPlan) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return the axes after rows and columns, and the type, of each array by name."""
         sample = plan.sample
         found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
@@ -179,7 +179,7 @@ class Layout:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def planned(plan: Plan, seed: int, side: int, outputs: Outputs) -> Layout:
+def planned(plan: MrfPlan, seed: int, side: int, outputs: Outputs) -> Layout:
     """Return the layout of ``outputs`` in tiles of at most ``side`` sites on a side.
 
     Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
@@ -205,7 +205,7 @@ def planned(plan: Plan, seed: int, side: int, outputs: Outputs) -> Layout:
     return Layout(levels, channels, memory, disk)
 
 
-def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
+def _level(plan: MrfPlan, seed: int, number: int, side: int) -> LevelLayout:
     """Return the layout of a level; each step of a sweep reaches the radius of the neighbourhood farther."""
     lattice, torus = Grid.of(plan.shape, 2**number), plan.options.boundary == "torus"
     assert isinstance(plan.schedule, Windowed)

@@ -52,7 +52,7 @@ from simdtex.jobs.tiles.layout import Layout, LevelLayout, Outputs, Tile, planne
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
-from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.plan import MrfPlan
 from simdtex.methods.mrf.problem import Input
 from simdtex.model.guide import Planes
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -89,7 +89,7 @@ def described(plan: Input) -> dict[str, Any]:
     return {**about, "options": asdict(plan.options), **arrays, **sample}
 
 
-def restored(tree: dict[str, Any]) -> Plan:
+def restored(tree: dict[str, Any]) -> MrfPlan:
     """Return the plan of a tree from `described`, without conditioning data of the output."""
     options = resolve(Options, "synth", tree["options"])
     unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
@@ -99,7 +99,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.neighbourhood)
     size = {"reduction": tree["reduction"], "coarser": tree["coarser"] and restored(tree["coarser"])}
-    return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
+    return MrfPlan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"], **size)
 
 
 FORMAT = 12
@@ -146,7 +146,7 @@ class Work(NamedTuple):
     whether there are data; ``scattered``: the data between the sites, for each level that has such.
     """
 
-    plan: Plan
+    plan: MrfPlan
     seed: int
     outputs: Outputs
     layout: Layout
@@ -241,7 +241,7 @@ class Store:
             self.root = zarr.open_group(self._files, mode="a")
 
     @staticmethod
-    def create(where: str, plan: Plan, seed: int, outputs: Outputs, layout: Layout, **about: Any) -> Store:
+    def create(where: str, plan: MrfPlan, seed: int, outputs: Outputs, layout: Layout, **about: Any) -> Store:
         """Make a store, ready for its first turn, and return it; ``about`` are JSON types that it keeps."""
         zarr.open_group(Files(where), mode="w-")
         store, held, scattered = Store(where), False, {}

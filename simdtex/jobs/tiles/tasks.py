@@ -15,9 +15,9 @@ import numpy as np
 from simdtex.jobs.tiles.layout import Tile
 from simdtex.jobs.tiles.store import Store, Stored, Tally, Turn
 from simdtex.machine import Machine, open_machine
-from simdtex.methods.mrf.algorithm import Run, finished_picture, first_field, run_steps, use_counts
+from simdtex.methods.mrf.algorithm import MrfRun, finished_picture, first_field, run_steps, use_counts
 from simdtex.methods.mrf.finish import gaussian_offsets
-from simdtex.methods.mrf.level import Level, State
+from simdtex.methods.mrf.level import Level, MrfState
 from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.model.lattice import Grid
 from simdtex.model.source_map import apply_source_map
@@ -29,10 +29,10 @@ _one = Lock()
 
 
 @lru_cache(1)
-def context(where: str, name: str, device: str | Machine | None) -> tuple[Store, Run]:
+def context(where: str, name: str, device: str | Machine | None) -> tuple[Store, MrfRun]:
     """Return a store and its run, which is put on a device once; only those of the latest store are kept."""
     store = Store(where)
-    return store, Run(store.work.plan, open_machine(device), store.work.seed, Stored(store))
+    return store, MrfRun(store.work.plan, open_machine(device), store.work.seed, Stored(store))
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
@@ -48,7 +48,7 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: in
     return task
 
 
-def _begin(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
+def _begin(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Tally:
     """Write a tile before the first sweep of its level."""
     level = run.level(turn.level, tile)
     field = first_field(run, level, _above(store, run, turn, tile))
@@ -56,7 +56,7 @@ def _begin(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     return _tally(level, field, level.grid)
 
 
-def _whole(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
+def _whole(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Tally:
     """Write a level that is a single tile, after all its sweeps."""
     state = run.enter(turn.level, _above(store, run, turn, tile), store.penalty(turn))
     while not run.at_equilibrium(state):
@@ -66,7 +66,7 @@ def _whole(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     return np.append([0, 0], kinds).astype(np.int64)  # whole steps
 
 
-def _sweep(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
+def _sweep(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Tally:
     """Write a tile after a sweep."""
     machine, whole, penalty = run.machine, store.work.layout.levels[turn.level], store.penalty(turn)
     window, rows, cols = whole.frame(tile, whole.halo)
@@ -77,13 +77,13 @@ def _sweep(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
     sweeps = turn.cooling + turn.free  # the only part of the schedule's state that persists
     memory = level.schedule.init(level.setting)._replace(sweep=sweeps)
     before = _on(machine, store.read(turn.level, turn.number - 1, window))
-    found, *_ = run_steps(level, State(*before, penalty, memory, turn.level, active=turn.active))
+    found, *_ = run_steps(level, MrfState(*before, penalty, memory, turn.level, active=turn.active))
     inside = Field(*(np.ascontiguousarray(plane[..., rows, cols]) for plane in _off(machine, found)))
     store.write(turn, tile, inside)
     return _tally(level, _on(machine, inside), run.grid(turn.level).window(*tile))
 
 
-def _show(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
+def _show(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Tally:
     """Write a tile of the arrays of the output."""
     work, outputs, sd = store.work, store.work.outputs, run.options.finish or 0
     halo = int(gaussian_offsets(sd)[0].max()) if sd else 0
@@ -108,7 +108,7 @@ def _show(store: Store, run: Run, turn: Turn, tile: Tile) -> Tally:
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
 
 
-def _above(store: Store, run: Run, turn: Turn, tile: Tile) -> Field | None:
+def _above(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Field | None:
     """Return the sites of the level above in a tile, on the machine; None at the coarsest level."""
     if turn.reads == len(store.work.layout.levels):
         return None

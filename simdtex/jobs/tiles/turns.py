@@ -102,7 +102,7 @@ class Turns:
         fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
         if turn.phase != "whole":
             penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn))
-            if not lattices.at_equilibrium(after):
+            if after.active or after.free < lattices.free_sweeps(turn.level):
                 return store.save(after, penalty)
         if turn.level:
             below = Turn(number, phase_of(self.levels[turn.level - 1]), turn.level - 1)

@@ -298,7 +298,7 @@ class Tileset:
             strip = down.cut(pairs[here, below] * rows, -half, rows, 2 * half)
             canvas.paste(row * rows, col * cols - half, strip)
 
-    def plan(self, canvas: Canvas, grid: NDArray[np.intp], begin: int) -> mrf.Plan:
+    def plan(self, canvas: Canvas, grid: NDArray[np.intp], begin: int) -> mrf.MrfPlan:
         """Return the plan of a run that makes the unknown pixels of tiles; the runs before it have ``begin`` pixels."""
         known = canvas.place[..., 0] >= 0
         given = Given(canvas.values, np.repeat(known[..., None], canvas.values.shape[-1], -1), canvas.place)

@@ -14,9 +14,9 @@ from simdtex.machine import Machine
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.algorithm import run_steps
 from simdtex.methods.mrf.explain import Moment, explained, largest_order, site_number, with_order, with_trust
-from simdtex.methods.mrf.level import Lattices, State
+from simdtex.methods.mrf.level import Lattices, MrfState
 from simdtex.methods.mrf.neighbourhood import Field
-from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.plan import MrfPlan
 from simdtex.methods.mrf.record import picture, sources, temperatures
 from simdtex.model.explanation import Explanation
 from simdtex.options import Brief
@@ -96,7 +96,7 @@ class Replay:
     origin = (0, 0)
     """The first row and column of the lattice in the output, pixels."""
 
-    def __init__(self, plan: Plan, machine: Machine, seed: int, kept: int = KEPT) -> None:
+    def __init__(self, plan: MrfPlan, machine: Machine, seed: int, kept: int = KEPT) -> None:
         self._run, self._twin = plan.on(machine, seed), Lattices(plan, Reference(), seed)
         self._sweeps: list[Sweep] = []
         self._states: dict[int, dict[str, Any]] = {}  # before a sweep
@@ -221,13 +221,13 @@ class Replay:
         self._state = self._sweeping(after)
         return True
 
-    def _sweeping(self, state: State) -> State:
+    def _sweeping(self, state: MrfState) -> MrfState:
         """Return the state before the next sweep, which may be of a finer level; the last state if there is none."""
         while self._run.at_equilibrium(state) and not self._run.ended(state):
             state, _ = self._run.step(state)
         return state
 
-    def _before(self, number: int) -> State:
+    def _before(self, number: int) -> MrfState:
         """Return the state before a sweep, on the machine."""
         first = max(n for n in self._states if n <= number)
         state = self._run.load(self._states[first])

@@ -3,6 +3,6 @@
 
 from simdtex.methods.mrf.level import check_fit, number_of_levels
 from simdtex.methods.mrf.options import Options, begins
-from simdtex.methods.mrf.plan import Plan, check_categories, plan
+from simdtex.methods.mrf.plan import MrfPlan, check_categories, plan
 
-__all__ = ["Options", "Plan", "begins", "check_categories", "check_fit", "number_of_levels", "plan"]
+__all__ = ["MrfPlan", "Options", "begins", "check_categories", "check_fit", "number_of_levels", "plan"]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
 
-`Run.begin`, `Run.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. The schedule
-first chooses the sites of a step of 6.2.2, which do not depend on one another; a device then relaxes all of them in one
-launch (`simdtex.methods.mrf.relax`). The observer (record.py) keeps progress, counts and stages.
+`MrfRun.begin`, `MrfRun.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. First the
+schedule chooses the sites of a step of 6.2.2, which do not depend on one another; a device then relaxes all of them in
+one launch (`simdtex.methods.mrf.relax`). The observer (record.py) keeps progress, counts and stages.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from simdtex import schedules
 from simdtex.checkpoint import like
 from simdtex.methods.mrf.commit import commit
 from simdtex.methods.mrf.finish import finish
-from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, with_penalty
+from simdtex.methods.mrf.level import ActiveSites, Lattices, Level, MrfState, Part, SweepInfo, parts, with_penalty
 from simdtex.methods.mrf.neighbourhood import Field
-from simdtex.methods.mrf.record import Record, output
+from simdtex.methods.mrf.record import MrfRecord, output
 from simdtex.methods.mrf.relax import Relaxation, relax, relax_out_of_place
 from simdtex.methods.mrf.snapshot import snapshot
 from simdtex.methods.mrf.start import start
@@ -34,22 +34,22 @@ AT_ONCE = 2**20
 """Sites that are finished together."""
 
 
-Watch = Callable[[Level, State, Part], Any]
+Watch = Callable[[Level, MrfState, Part], Any]
 """A function that is called after every part of a sweep, with the state before the sweep."""
 
 
-def ignore(level: Level, state: State, part: Part) -> None:
+def ignore(level: Level, state: MrfState, part: Part) -> None:
     """Do nothing: the default of ``watch``."""
 
 
-class Run(Lattices):
+class MrfRun(Lattices):
     """Algorithm 1 for the driver: a step is a sweep, or enters a level."""
 
-    def begin(self) -> State:
+    def begin(self) -> MrfState:
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
         return self.enter(self.levels - 1, None)
 
-    def enter(self, number: int, above: Field | None, penalty: NDArray[np.float32] | None = None) -> State:
+    def enter(self, number: int, above: Field | None, penalty: NDArray[np.float32] | None = None) -> MrfState:
         """Return the state at the beginning of a level: sites of the level above have t = 0, all others t = 1.
 
         ``penalty`` are those after the level above, of which the penalties of kinds are kept.
@@ -57,20 +57,24 @@ class Run(Lattices):
         level = self.level(number)  # 3, 4, 6.1
         return first_state(level, first_field(self, level, above), penalty)
 
-    def step(self, state: State, watch: Watch = ignore) -> tuple[State, Info]:
+    def step(self, state: MrfState, watch: Watch = ignore) -> tuple[MrfState, SweepInfo]:
         """Run a sweep, or enter the next level if the current one is at equilibrium; return the state after it."""
         if self.at_equilibrium(state):  # 6
-            return self.enter(state.level - 1, state.field, state.penalty), Info(state.level - 1)
+            return self.enter(state.level - 1, state.field, state.penalty), SweepInfo(state.level - 1)
         level = self.level(state.level)
         state, chosen = sweep(level, state, watch)  # 6.2
         number = state.cooling + state.free
-        return state, Info(level.number, number, tuple(chosen), self.at_equilibrium(state))
+        return state, SweepInfo(level.number, number, tuple(chosen), self.at_equilibrium(state))
 
-    def ended(self, state: State) -> bool:
+    def at_equilibrium(self, state: MrfState) -> bool:
+        """Return whether all temperatures of the level are 0 and its free sweeps are done."""
+        return not state.active and state.free == self.free_sweeps(state.level)
+
+    def ended(self, state: MrfState) -> bool:
         """Return whether the finest level has reached equilibrium."""
         return state.level == 0 and self.at_equilibrium(state)
 
-    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+    def result(self, state: MrfState, observer: MrfRecord) -> tuple[NDArray[Any], Output]:
         """Return the picture ([layers,] rows, cols, channels) in the sample's type, and the rest of the output."""
         grid, given = self.grid(0), self.plan.given
         source = grid.latest(self.machine.get(state.source))
@@ -78,22 +82,22 @@ class Run(Lattices):
         image = finished_picture(self, grid, state.field, known, source)
         return given.shown(image, grid) if given else image, output(self, state, source, observer)
 
-    def save(self, state: State) -> dict[str, Any]:
+    def save(self, state: MrfState) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
         planes = (np.array(self.machine.get(plane)) for plane in state.field)
-        return dict(zip(State._fields, (*planes, *state[3:]), strict=True))
+        return dict(zip(MrfState._fields, (*planes, *state[3:]), strict=True))
 
-    def load(self, saved: dict[str, Any]) -> State:
+    def load(self, saved: dict[str, Any]) -> MrfState:
         """Return the state that `save` copied, on this machine."""
-        state = State(**saved)
+        state = MrfState(**saved)
         level = self.level(state.level)
         memory = like(level.schedule.init(level.setting), state.schedule)  # with the types of the schedule's own state
         values, source, temperature = map(self.machine.put, state.field)
         return state._replace(values=values, source=source, temperature=temperature, schedule=memory)
 
-    def observer(self, callback: Callback | None) -> Record:
+    def observer(self, callback: Callback | None) -> MrfRecord:
         """Return the observer of this run."""
-        return Record(self, callback)
+        return MrfRecord(self, callback)
 
 
 def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
@@ -107,16 +111,16 @@ def first_field(run: Lattices, level: Level, above: Field | None) -> Field:
     return run.conditions.entered(machine, level.number, grid, field)
 
 
-def first_state(level: Level, field: Field, penalty: NDArray[np.float32] | None = None) -> State:
-    """Return the state of a level before its first sweep; ``penalty`` as in `Run.enter`."""
+def first_state(level: Level, field: Field, penalty: NDArray[np.float32] | None = None) -> MrfState:
+    """Return the state of a level before its first sweep; ``penalty`` as in `MrfRun.enter`."""
     count, total = survey(level.machine, level.grid, field.temperature)
     kept = None if penalty is None else level.fair_use.split(penalty)[1]
     penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, kept)
     memory = level.schedule.init(level.setting)
-    return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)
+    return MrfState(*field, penalty, memory, level.number, active=count, temperature_sum=total)
 
 
-def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, list[schedules.Info]]:
+def sweep(level: Level, state: MrfState, watch: Watch = ignore) -> tuple[MrfState, list[schedules.Info]]:
     """Relax about as many sites as are active, in the steps of the schedule: 6.2.1 and 6.2.2.
 
     The arrays of ``state`` are overwritten. If no site is active, the sweep is a free sweep: it relaxes all sites that
@@ -128,18 +132,18 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
     count, total = survey(level.machine, level.grid, field.temperature)
     penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, state.penalty)
     cooling, freed = state.cooling + (not free), state.free + free
-    return State(*field, penalty, memory, level.number, cooling, freed, count, total), chosen
+    return MrfState(*field, penalty, memory, level.number, cooling, freed, count, total), chosen
 
 
 def run_steps(
-    level: Level, state: State, watch: Watch = ignore, sets: float = inf
+    level: Level, state: MrfState, watch: Watch = ignore, sets: float = inf
 ) -> tuple[Field, Any, list[schedules.Info]]:
     """Run the steps of a sweep; return the field after it, the state of the schedule, and its decisions.
 
     ``sets`` is the number of sets of sites after which the sweep is left.
     """
     field, memory = with_snapshot(level, state.field), state.schedule
-    active, relaxation = Active(level, field.temperature, not state.active), with_penalty(level, state.penalty)
+    active, relaxation = ActiveSites(level, field.temperature, not state.active), with_penalty(level, state.penalty)
     chosen: list[schedules.Info] = []
     for after, decision in schedules.decisions(level.schedule, level.setting, state.schedule, active):  # 6.2.1
         if not sets:

@@ -42,9 +42,9 @@ class Held(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Conditioning data between the sites of a level: ``place`` (n, 2 or 3) int32, ``values`` (n, C) uint16."""
+    """Data of an image: ``place`` (n, 2 or 3) int [layer,] row and column, ``values`` (n, C) uint16 working levels."""
 
-    place: NDArray[np.int32]
+    place: NDArray[np.integer]
     values: NDArray[np.uint16]
 
 

@@ -47,7 +47,7 @@ class Phased(NamedTuple):
         return over
 
 
-class Scattered(NamedTuple):
+class ScatteredData(NamedTuple):
     """Conditioning data between the sites of a level, each compared at its own position.
 
     ``begin`` (H * W + 1,) int32: the data of the site at pixel index s are begin[s] .. begin[s + 1] - 1; ``reach`` (n,)
@@ -108,7 +108,7 @@ class Costs(NamedTuple):
     discount: np.float32 = np.float32(1)
     novelty: np.float32 = np.float32(0)
     phased: Phased | None = None
-    scattered: Scattered | None = None
+    scattered: ScatteredData | None = None
     kinds: Kinds | None = None
 
     @property
@@ -122,7 +122,7 @@ class Costs(NamedTuple):
         """Return the arguments ``COSTS`` of kernels after ``at`` and ``levels``."""
         nothing = machine.constant(np.zeros((1, 1), np.int32))
         phased = self.phased or Phased(nothing, nothing, np.float32(0), np.float32(0))
-        scattered = self.scattered or Scattered(nothing, nothing, nothing, np.float32(0))
+        scattered = self.scattered or ScatteredData(nothing, nothing, nothing, np.float32(0))
         kinds = self.kinds or Kinds(nothing, nothing)
         listed = max(phased.candidates.shape[1], kinds.candidates.shape[1])  # of equal length if there are both
         area = max(prod(phased.sites.shape[1:]), prod(kinds.sites.shape[1:]))

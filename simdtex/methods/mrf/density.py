@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
 from simdtex.methods.mrf import lcpdf
-from simdtex.methods.mrf.costs import Costs, Scattered
+from simdtex.methods.mrf.conditioning import Data
+from simdtex.methods.mrf.costs import Costs, ScatteredData
 from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.relax import AllCandidates, Relaxation
 from simdtex.methods.mrf.square import TAIL, square_of
@@ -58,12 +58,12 @@ def lcpdf_at(
     return np.concatenate(rows)
 
 
-def _all(machine: Machine, sample: Sample, places: Places, grid: Grid, window: lcpdf.Window) -> Relaxation:
+def _all(machine: Machine, sample: Sample, places: Places, grid: Grid, window: lcpdf.ParzenWindow) -> Relaxation:
     """Return the relaxation whose density is the LCPDF of all candidates, without costs."""
     candidates = sample.candidates(machine, places)
     free = Costs(machine.put(np.zeros(candidates.size + TAIL, np.float32)))
     proposal = AllCandidates(candidates, square_of(machine, sample, places))
-    choice = lcpdf.Choice(False, True, window)
+    choice = lcpdf.SiteChoice(False, True, window)
     return Relaxation(grid, machine.put(places.offsets), proposal, free, choice, xi=-1, seed=0, level=0)
 
 
@@ -77,13 +77,6 @@ def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) ->
         )
     shares: NDArray[np.float64] = counts / total
     return shares
-
-
-class Data(NamedTuple):
-    """Data of an image: ``place`` (n, 2 or 3) int [layer,] row and column, ``values`` (n, C) uint16 working levels."""
-
-    place: NDArray[np.integer]
-    values: NDArray[np.uint16]
 
 
 def near(
@@ -140,7 +133,7 @@ def given_data(
                 here = those[begin : begin + step]
                 told = numbers[here, :count]
                 apart = (data.place[told] - part[here][:, None]) @ strides
-                scattered = Scattered(
+                scattered = ScatteredData(
                     machine.put(np.arange(here.size + 1, dtype=np.int32) * np.int32(count)),
                     machine.put(np.append(apart.ravel(), 0).astype(np.int32)),
                     machine.put(np.append(data.values[told.ravel()], data.values[:1], 0)),

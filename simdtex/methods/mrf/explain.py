@@ -181,7 +181,7 @@ def _neighbours(
     return neighbours, continued
 
 
-def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.Choice) -> NDArray[np.float64]:
+def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.SiteChoice) -> NDArray[np.float64]:
     """Return the LCPDF of each channel, (C, greys), of weights (slots, 1) and grey levels (C, slots, 1)."""
     rows = []
     for c, grey in enumerate(pixels):

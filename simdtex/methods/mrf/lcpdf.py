@@ -34,7 +34,7 @@ class Relaxed(NamedTuple):
     values: Array
 
 
-class Window(NamedTuple):
+class ParzenWindow(NamedTuple):
     """The Gaussian of equation (7) at a bandwidth h, as tables over integer grey levels.
 
     ``scale``, 1 / 2h^2; ``noise`` (2 radius + 1,) uint32, the cumulative probabilities of the steps -radius..radius in
@@ -48,7 +48,7 @@ class Window(NamedTuple):
     top: int
 
 
-class Choice(NamedTuple):
+class SiteChoice(NamedTuple):
     """The choice of a site among its candidates, step 6.2.2.2.
 
     ``draws``: whether it draws from the LCPDF, or takes its mode; ``density``: whether it takes a grey level of the
@@ -57,7 +57,7 @@ class Choice(NamedTuple):
 
     draws: bool
     density: bool
-    window: Window
+    window: ParzenWindow
 
     @property
     def spread(self) -> np.float32:
@@ -74,7 +74,7 @@ class Rule(Protocol):
     """The part of `simdtex.methods.mrf.relax.Relaxation` that the density at a site depends on."""
 
     @property
-    def choice(self) -> Choice:
+    def choice(self) -> SiteChoice:
         """The choice, with the window of equation (7)."""
 
     @property
@@ -109,7 +109,7 @@ def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> floa
     return sqrt(variance) * pow(4 / (candidates * (2 * dimensions + 1)), 1 / (dimensions + 4))
 
 
-def window(bandwidth: float, top: int) -> Window:
+def window(bandwidth: float, top: int) -> ParzenWindow:
     """Return the tables for a bandwidth h in working grey levels.
 
     h below 10^-10, for example 0 for a constant sample, is replaced by 10^-10: any difference then has no weight, and
@@ -125,7 +125,7 @@ def window(bandwidth: float, top: int) -> Window:
     sums = list(accumulate(steps))  # sum() of Python 3.12 rounds differently
     noise = [min(2**32 - 1, round(partial / sums[-1] * 2**32)) for partial in sums]
     noise[-1] = 2**32 - 1
-    return Window(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
+    return ParzenWindow(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
 
 
 def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint64]:
@@ -135,7 +135,7 @@ def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint
     return np.where(a < NO_WEIGHT, exp32(-near) * np.float32(2**40), 0).astype(np.uint64)
 
 
-def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: Choice) -> NDArray[np.uint64]:
+def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: SiteChoice) -> NDArray[np.uint64]:
     """Return the masses of a draw: the weights or, for a density, times the legal share of each pixel's kernel.
 
     ``w`` (slots, S) are the weights; ``pixels`` (C, slots, S or 1) the grey levels of the candidates.
@@ -147,7 +147,9 @@ def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: Choice) -> NDArr
     return w
 
 
-def stepped(x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: Window, key: Key) -> NDArray[np.uint16]:
+def stepped(
+    x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: ParzenWindow, key: Key
+) -> NDArray[np.uint16]:
     """Return grey levels drawn from the kernel of equation (7) around the grey levels ``x`` of channel ``c``."""
     low, mass = legal(x, win)
     bits = random.draw4(*key, places, random.DRAW, 1 + c)[0].astype(np.uint64)
@@ -156,7 +158,7 @@ def stepped(x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: Windo
     return (x.astype(np.int64) + step).astype(np.uint16)
 
 
-def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+def legal(y: NDArray[Any], win: ParzenWindow) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
     """Return the start of the legal steps from grey level y among the cumulative probabilities, and their mass."""
     y = y.astype(np.int64)
     cumulative = np.concatenate([[0], win.noise]).astype(np.uint32)
@@ -164,7 +166,7 @@ def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.
     return low, cumulative[np.minimum(2 * win.radius, win.radius + win.top - y) + 1] - low
 
 
-def log_legal(y: NDArray[Any], win: Window) -> NDArray[np.float32]:
+def log_legal(y: NDArray[Any], win: ParzenWindow) -> NDArray[np.float32]:
     """Return the logarithm of the legal share of the kernel around grey level y."""
     return log32(legal(y, win)[1].astype(np.float32)) - LOG_ONE
 
@@ -175,7 +177,7 @@ def taken(
     noise: NDArray[np.float32] | np.float32,
     candidates: Candidates,
     places: NDArray[np.int64],
-    choice: Choice,
+    choice: SiteChoice,
     key: Key,
 ) -> Relaxed:
     """Return the choice of each site among the candidates ``numbers`` (slots, S or 1), in NumPy.
@@ -199,7 +201,9 @@ def taken(
     return Relaxed(source, values)
 
 
-def to_mode(x: NDArray[np.uint16], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: Window) -> NDArray[np.intp]:
+def to_mode(
+    x: NDArray[np.uint16], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: ParzenWindow
+) -> NDArray[np.intp]:
     """Move grey levels ``x`` (C, S) to the mode, in place, and return the slot (S,) that gives most there.
 
     Each channel in turn, and once more, takes the mode given the others, of several levels the lowest.
@@ -216,7 +220,7 @@ def turns(channels: int) -> list[int]:
 
 
 def weighed(
-    x: NDArray[Any], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: Window, but: int
+    x: NDArray[Any], w: NDArray[np.uint64], pixels: NDArray[np.int64], win: ParzenWindow, but: int
 ) -> NDArray[np.uint64]:
     """Return the weights times the kernel of equation (7) at ``x`` in all channels ``but`` one, see `to_mode`."""
     for c, grey in enumerate(pixels):
@@ -226,14 +230,14 @@ def weighed(
     return w
 
 
-def smoothed(y: NDArray[np.int64], w: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+def smoothed(y: NDArray[np.int64], w: NDArray[np.uint64], win: ParzenWindow) -> NDArray[np.float32]:
     """Return f(x) = sum over p of w_p exp(-(x - y_p)^2 / 2h^2), (greys, S), of y (slots,) and w (slots, S)."""
     mass = np.zeros((win.top + 1, w.shape[1]), np.uint64)
     np.add.at(mass, y, w)
     return spread(mass, win)
 
 
-def spread(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+def spread(mass: NDArray[np.uint64], win: ParzenWindow) -> NDArray[np.float32]:
     """Return f(x), (greys, S), of the sums of weights of each grey level, (greys, S)."""
     greys, f = np.arange(win.top + 1), np.zeros(mass.shape, np.float32)
     for v in np.flatnonzero(mass.any(1)):

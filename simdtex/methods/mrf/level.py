@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isqrt, log2, prod, sqrt
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf import lcpdf
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
-from simdtex.methods.mrf.costs import Costs, Kinds, Phased, Scattered
-from simdtex.methods.mrf.lcpdf import Choice
+from simdtex.methods.mrf.costs import Costs, Kinds, Phased, ScatteredData
+from simdtex.methods.mrf.lcpdf import SiteChoice
 from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.options import Options, largest_order
 from simdtex.methods.mrf.problem import Input
@@ -59,7 +59,7 @@ TOGETHER = 2**16
 """Number of sites that one kernel relaxes between two checks of the clock."""
 
 
-class State(NamedTuple):
+class MrfState(NamedTuple):
     """The state of a run after a sweep, as arrays and numbers: all that the run needs to continue.
 
     Attributes
@@ -102,23 +102,7 @@ class State(NamedTuple):
         return Field(*self[:3])
 
 
-class Counts(Protocol):
-    """The counts of a state that tell whether its level is at equilibrium."""
-
-    @property
-    def level(self) -> int:
-        """The level, 0 the finest."""
-
-    @property
-    def free(self) -> int:
-        """Number of finished free sweeps."""
-
-    @property
-    def active(self) -> int:
-        """Number of active sites."""
-
-
-class Info(NamedTuple):
+class SweepInfo(NamedTuple):
     """A description of a step.
 
     ``level``; ``sweep``, the sweep of the level, from 1, or 0 if the step entered the level; ``chosen``, the decisions
@@ -238,13 +222,13 @@ class Lattices:
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, number)
         return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(number), self.regions)
 
-    def choice(self, number: int) -> Choice:
+    def choice(self, number: int) -> SiteChoice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
         options, sample, count = self.options, self.sample, self.places(number).positions.size
         dimensions = sample.channels * (len(self.offsets) + 1)
         h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, count, dimensions)
         draws = options.relaxation == "gibbs" or number == self.levels - 1
-        return Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top))
+        return SiteChoice(draws, options.pixel == "density", lcpdf.window(h, sample.top))
 
     def _on(self, level: Level, grid: Grid) -> Level:
         """Return the level with the parts that depend on the window, for a lattice or a window of it."""
@@ -326,7 +310,7 @@ class Lattices:
         those = np.pad(those, ((0, 0), (0, TAIL)))
         return Phased(self.machine.put(those), None, weight, tolerance)
 
-    def _scattered(self, number: int, grid: Grid) -> Scattered | None:
+    def _scattered(self, number: int, grid: Grid) -> ScatteredData | None:
         """Return the conditioning data between the sites of a lattice or a window of it; None if there are none."""
         data = self.conditions.scattered(number)
         if data is None:
@@ -338,7 +322,7 @@ class Lattices:
         strides = np.array([self.sample.layer * self.sample.cols, self.sample.cols, 1])
         reach = (apart @ strides[-apart.shape[1] :]).astype(np.int32)
         put = self.machine.put
-        return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
+        return ScatteredData(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
     @property
     def typical_distance(self) -> float:
@@ -349,10 +333,6 @@ class Lattices:
     def rate(self) -> float:
         """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
         return 0.0 if self.coarser else self.options.balance * self.typical_distance
-
-    def at_equilibrium(self, state: Counts) -> bool:
-        """Return whether all temperatures of the level are 0 and its free sweeps are done."""
-        return not state.active and state.free == self.free_sweeps(state.level)
 
     def free_sweeps(self, number: int) -> int:
         """Return the number of free sweeps of a level."""
@@ -503,7 +483,7 @@ def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     return level.relaxation._replace(costs=costs._replace(penalty=padded, kinds=kinds))
 
 
-class Active:
+class ActiveSites:
     """The active sites: those with a temperature above 0 or, in a free sweep, all that are not known.
 
     Parameters

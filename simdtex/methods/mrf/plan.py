@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.machine import Machine, memory
-from simdtex.methods.mrf.algorithm import Run
+from simdtex.methods.mrf.algorithm import MrfRun
 from simdtex.methods.mrf.conditioning import centre_known, heaviest
 from simdtex.methods.mrf.finish import gaussian_offsets
 from simdtex.methods.mrf.level import number_of_levels
@@ -38,10 +38,10 @@ CELL = 20
 """The fewest pixels of a reduced sample along the vectors of its lattice."""
 
 
-class Plan(Input):
+class MrfPlan(Input):
     """A run of the method ``mrf`` before it has a machine and a seed."""
 
-    def on(self, machine: Machine, seed: int) -> Run:
+    def on(self, machine: Machine, seed: int) -> MrfRun:
         """Return the run of the plan on a machine; raise if its memory does not suffice.
 
         Notes
@@ -62,7 +62,7 @@ class Plan(Input):
         phases = 12 * pixels + 56 * held if self.sample.waves else 0
         device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 80) + phases
         memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held + phases, self.remedy)
-        return Run(self, machine, seed)
+        return MrfRun(self, machine, seed)
 
 
 def plan(
@@ -74,7 +74,7 @@ def plan(
     most: int | None = None,
     soft: Soft | None = None,
     period: tuple[int, int] | None = None,
-) -> Plan:
+) -> MrfPlan:
     """Return the plan of a run, with its input validated and its sample in working levels.
 
     Parameters
@@ -143,17 +143,17 @@ def reduced(
     values: int,
     options: Options,
     soft: Soft | None,
-) -> Plan:
+) -> MrfPlan:
     """Return the plan of a scene, the first of ``scenes``, that is halved ``count`` times for the coarse levels."""
     while len(scenes) <= count:
         scenes.append(scenes[-1].halved())
-    found: Plan | None = None
+    found: MrfPlan | None = None
     for number, here in reversed(list(enumerate(scenes[: count + 1]))):
         own, sample = sampled(here, 1 if found else levels - number, offsets, values, options, 2**number)
         levels = levels if found else own + number
         held = planes(here.given, sample) if here.given and here.given.whole.any() else None
         schedule, rest = schedules.get(options.schedule), {"reduction": 2**number, "coarser": found}
-        found = Plan(sample, here.shape, offsets, options, schedule, levels, here.given, held, soft, **rest)
+        found = MrfPlan(sample, here.shape, offsets, options, schedule, levels, here.given, held, soft, **rest)
     assert found
     return found
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.explain import Moment, explained
-from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
+from simdtex.methods.mrf.level import Lattices, Level, MrfState, Part, SweepInfo
 from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.relax import CandidateList, most_listed
 from simdtex.model.explanation import Explanation
@@ -25,7 +25,7 @@ STEP, LISTED = 200_000, 16
 """What a step costs beside its candidates, and a listed candidate, in candidates of an exhaustive search (PoCL)."""
 
 
-class Record(Observer):
+class MrfRecord(Observer):
     """The observer of a run: it reports every part of a sweep, and keeps counts and the stage of every level."""
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
@@ -40,7 +40,7 @@ class Record(Observer):
         self._level: Level | None = None  # whose parts are received
         self._twin: Lattices | None = None  # the plan on the reference, for explanations
 
-    def part(self, level: Level, state: State, part: Part) -> None:
+    def part(self, level: Level, state: MrfState, part: Part) -> None:
         """Count a part of a sweep, and report it to the callback."""
         if not self.reports or level.number != self.reports[-1]["level"]:
             self._begin(level)
@@ -75,14 +75,14 @@ class Record(Observer):
                 )
             )
 
-    def _explain(self, level: Level, state: State, part: Part, *site: int) -> Explanation:
+    def _explain(self, level: Level, state: MrfState, part: Part, *site: int) -> Explanation:
         """Return an explanation of how a site of the level would relax now."""
         if self._twin is None:
             self._twin = Lattices(self._run.plan, Reference(), self._run.seed)
         field, sweep = Field(*map(self._run.machine.get, part.field)), state.cooling + state.free + 1
         return explained(self._twin, Moment(level.number, sweep, field, state.penalty, part.turn), site)
 
-    def _advance(self, level: int, state: State, left: float, share: float) -> None:
+    def _advance(self, level: int, state: MrfState, left: float, share: float) -> None:
         """Estimate the finished share of the run after ``share`` of a sweep that started at mean temperature ``left``.
 
         The finished share of a level's cooling is about 1 - sqrt(t / t_0); a sweep cools by about a tenth.
@@ -95,7 +95,7 @@ class Record(Observer):
             free = min(1.0, (state.free + share) / max(1, self._run.free_sweeps(level)))
         self._fraction = max(self._fraction, fraction_done(self._expected, level, cooled, free))
 
-    def step(self, state: State, info: Info) -> None:
+    def step(self, state: MrfState, info: SweepInfo) -> None:
         """Keep the picture of a level at its end."""
         machine = self._run.machine
         if info.ended:
@@ -142,7 +142,7 @@ class Record(Observer):
         self._skipped, self._evaluations = self._run.machine.spared - saved["skipped"], saved["evaluations"]
 
 
-def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> OutputWithSource:
+def output(run: Lattices, state: MrfState, source: NDArray[np.int32], record: MrfRecord) -> OutputWithSource:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
     place, t = run.sample.place(source), run.grid(0).latest(run.machine.get(state.temperature))
     statistics = known_before(run) | {"levels": record.reports, "use": None}

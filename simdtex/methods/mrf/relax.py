@@ -22,7 +22,7 @@ from simdtex.methods.mrf import lcpdf
 from simdtex.methods.mrf.arithmetic import minus_gumbel
 from simdtex.methods.mrf.commit import commit
 from simdtex.methods.mrf.costs import Costs, continuing
-from simdtex.methods.mrf.lcpdf import Choice, Key, Relaxed
+from simdtex.methods.mrf.lcpdf import Key, Relaxed, SiteChoice
 from simdtex.methods.mrf.neighbourhood import USUAL, Confidences, Field, Near, near
 from simdtex.methods.mrf.square import LANES, Square
 from simdtex.methods.mrf.temperature import temperature
@@ -239,7 +239,7 @@ class Relaxation(NamedTuple):
     offsets: Array
     proposal: AllCandidates | CandidateList
     costs: Costs
-    choice: Choice
+    choice: SiteChoice
     xi: int
     seed: int
     level: int

@@ -21,7 +21,7 @@ from simdtex.jobs.tiles.store import Store
 from simdtex.jobs.tiles.tasks import do
 from simdtex.jobs.tiles.turns import Tiles
 from simdtex.methods.mrf import Options
-from simdtex.methods.mrf.algorithm import Run
+from simdtex.methods.mrf.algorithm import MrfRun
 from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.model.pictures import Pictures
 from simdtex.model.source_map import apply_source_map
@@ -173,18 +173,18 @@ def test_memory_of_a_worker_does_not_grow_with_the_output():
 
 def test_redundant_work_is_what_the_schedule_does(tmp_path):
     """Counted: the sites of all steps of a free sweep, over those of the lattice."""
-    from simdtex.methods.mrf.level import Active
+    from simdtex.methods.mrf.level import ActiveSites
     from simdtex.schedules.schedule import Trimmed
 
     plan = planned_run(Pictures((SAMPLE[..., None],)), (120, 120), Options(order=2, levels=1))
     level = planned(plan, 1, 40, Outputs(False, False, {})).levels[0]
-    run = Run(plan, REFERENCE, 1)
+    run = MrfRun(plan, REFERENCE, 1)
     sites = 0
     for tile in map(level.tile, range(level.count)):
         where, rows, _ = level.frame(tile, level.halo)
         window = run.level(0, where)
         schedule = Trimmed(window.schedule, rows.start, rows.stop)
-        active = Active(window, np.zeros((1, 1)), True)
+        active = ActiveSites(window, np.zeros((1, 1)), True)
         _, info = schedule.step(window.setting, schedule.init(window.setting), active)
         sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
     assert sites / (120 * 120) - 1 == pytest.approx(level.redundant, rel=0.1)

@@ -179,7 +179,7 @@ def draw_many(p, win, density, strength=0.0):
     drawn, places = [], np.arange(DRAWS)
     for seed in SEEDS:
         rule = p.relaxation(REFERENCE, exact=True, coherence=strength, seed=seed, level=1)
-        rule = rule._replace(choice=lcpdf.Choice(True, density, win))
+        rule = rule._replace(choice=lcpdf.SiteChoice(True, density, win))
         numbers, cost = rule.evaluate(p.sites[:1], p.field, 3)
         many, noise = np.repeat(cost, DRAWS, 1), rule.noise(numbers, places, 3)
         found = lcpdf.taken(numbers, many, noise, p.candidates(REFERENCE), places, rule.choice, lcpdf.Key(seed, 1, 3))

@@ -16,7 +16,7 @@ from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_folder, kernel_source
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
-from simdtex.methods.mrf.level import Active, parts
+from simdtex.methods.mrf.level import ActiveSites, parts
 from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.relax import LEVEL, constants
 from simdtex.model.lattice import LATTICE, Grid
@@ -122,10 +122,10 @@ def test_the_list_of_sites_is_made_on_the_device_and_stays_there(cl_device, monk
     level, state, copies = run.level(0), run.begin(), (machine.put, machine.get)
     for name, copy in zip(("put", "get"), copies, strict=True):
         monkeypatch.setattr(machine, name, lambda array, copy=copy: (copied.append(array.size), copy(array))[1])
-    memory, first = level.schedule.step(level.setting, state.schedule, Active(level, state.temperature, False))
+    memory, first = level.schedule.step(level.setting, state.schedule, ActiveSites(level, state.temperature, False))
     assert 0 < sum(copied) < level.grid.size / 4  # the counts of its groups, which say where each begins
     copied.clear()
-    _, second = level.schedule.step(level.setting, memory, Active(level, state.temperature, True))
+    _, second = level.schedule.step(level.setting, memory, ActiveSites(level, state.temperature, True))
     assert not copied and (memory, plain(memory)) == ((1,), True)
     assert_same_bits(*(copies[1](info.sites) for info in (first, second)))
 

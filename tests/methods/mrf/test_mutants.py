@@ -14,9 +14,9 @@ from simdtex.machine import memory
 from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf import level as level_of_a_run
-from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.level import ActiveSites, check_fit, number_of_levels, parts
 from simdtex.methods.mrf.plan import check_guide
-from simdtex.methods.mrf.record import Record, expected_work
+from simdtex.methods.mrf.record import MrfRecord, expected_work
 from simdtex.methods.mrf.relax import AllCandidates, CandidateList
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
@@ -132,7 +132,7 @@ def test_which_sites_are_active():
     level = prepared().level(1)
     temperature = np.zeros((10, 12), np.uint16)
     temperature[1, 2], temperature[9, 11] = 1, 1024
-    active, free = Active(level, temperature, False), Active(level, temperature, True)
+    active, free = ActiveSites(level, temperature, False), ActiveSites(level, temperature, True)
     assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
     assert active.numbers().tolist() == [14, 119]
     assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
@@ -247,7 +247,7 @@ def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
 
 def test_how_far_a_run_is():
     run = prepared(search="exact", free_sweeps=2)
-    record = Record(run, None)
+    record = MrfRecord(run, None)
     record._expected = {2: (100.0, 20.0), 1: (300.0, 40.0), 0: (500.0, 40.0)}
 
     def after(level, left, share, free=0):
