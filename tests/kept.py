@@ -25,7 +25,7 @@ def sources():
     """Return every file that a result depends on, except the libraries."""
     folders = [one for one in (PACKAGE, PACKAGE / "kernels", PACKAGE.parent / "kernels") if one.is_dir()]
     found = {path for one in folders for path in one.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
-    return sorted(found | {HERE / "runs.py", HERE / "cases.py", *HERE.glob("plain*.py")})
+    return sorted(found | {HERE / "runs.py", HERE / "cases.py"})
 
 
 def key(paths=None):

@@ -12,29 +12,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import plain_mrf
 from cases import REFERENCE, texture
 from scipy.ndimage import gaussian_filter
 from skimage import data
 
 import simdtex
 from simdtex import maspar
-from simdtex.jobs.simulation.job import realisation_seed
 
 PINNED = Path(__file__).with_name("digests.json")
 SEED = 2**40 + 3
 
 
 class Run(NamedTuple):
-    """A whole run: a public function, its arguments, and the checks that apply to it besides those of every run.
-
-    ``inputs()`` makes positional and keyword arguments; ``plain()`` is the same run of the plain loops; ``tiles`` is
-    the side of tiles that give the same bytes, 0 for none.
-    """
+    """A public function, and ``inputs()``, its arguments; tiles of side ``tiles`` give the same bytes, 0 for none."""
 
     function: Callable[..., Any]
     inputs: Callable[[], tuple[tuple[Any, ...], dict[str, Any]]]
-    plain: Callable[[], list[np.ndarray]] | None = None
     tiles: int = 0
 
 
@@ -121,10 +114,6 @@ class Given(NamedTuple):
         row, col = np.indices(size)
         return np.stack([np.sin(row / 3) + rng.random(size), row * col / 7], -1)
 
-    @property
-    def labelled(self):
-        return {"labels": True} if self.labels and "labels" not in self.options else {}
-
     def textures(self):
         """Arguments of `simdtex.synthesize`."""
         samples, masks, known, source, guide = self.arrays()
@@ -136,7 +125,8 @@ class Given(NamedTuple):
         how = {"known": bare(known), "known_source": source}
         how["mask"] = masks if several or masks is None else masks[0]
         how["guide"] = guide if several or guide is None else (guide[0][0], guide[1])
-        how = {name: value for name, value in how.items() if value is not None} | self.options | self.labelled
+        how |= {"labels": True if self.labels else None}
+        how = {name: value for name, value in how.items() if value is not None} | self.options
         how["channel_axis"] = None if self.channels is None else -1
         return ([bare(one) for one in samples] if several else bare(samples[0]), self.shape), how
 
@@ -147,42 +137,15 @@ class Given(NamedTuple):
         how |= {names.get(name, name): one for name, one in self.maps.items()}
         return (training, 1), how | {"shape": shape, "jobs": 1, "source": True}
 
-    def plainly(self, simulated):
-        """Image, source and temperature by the plain loops; of a simulation without the temperature."""
-        samples, masks, known, source, guide = self.arrays()
-        own = {}
-        if simulated:
-            own = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64}
-            own |= {"phases": 4, "free_sweeps": 3}
-        given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": self.maps}
-        pictures = samples if len(samples) > 1 else samples[0]
-        seed = realisation_seed(SEED, 0) if simulated else SEED
-        image, *more = plain_mrf.synthesize(pictures, self.shape, seed, **given, **own | self.options | self.labelled)
-        image = image if self.channels else image[..., 0]
-        if not simulated:
-            return [image, *more]
-        known = np.zeros(self.shape, bool) if known is None else ~np.ma.getmaskarray(known).any(-1)
-        inside = self.maps.get("region", np.full(self.shape, True))
-        missing = np.nan if image.dtype.kind == "f" else 255
-        image[~inside], more[0][~inside | known] = missing, -1
-        return [image[None], *np.moveaxis(more[0], -1, 0)[:, None]]
-
 
 def textures(options=None, tiles=0, **given):
-    """A run of the method ``mrf`` that the plain loops know too."""
-    case = Given(options or {}, **given)
-    return Run(simdtex.synthesize, case.textures, functools.partial(case.plainly, False), tiles)
-
-
-def tiled(options, **given):
-    """A run in tiles of 18 pixels; it is too large for the plain loops."""
-    return Run(simdtex.synthesize, Given(options, **given).textures, tiles=18)
+    """A run of the method ``mrf``."""
+    return Run(simdtex.synthesize, Given(options or {}, **given).textures, tiles)
 
 
 def realisations(options=None, **given):
     """The same with maps, which `simdtex.simulate` takes."""
-    case = Given(options or {}, **given)
-    return Run(simdtex.simulate, case.realisations, functools.partial(case.plainly, True))
+    return Run(simdtex.simulate, Given(options or {}, **given).realisations)
 
 
 def call(function, *shapes, channels=None, dtype=np.uint8, **options):
@@ -374,7 +337,7 @@ RUNS = {
     ),
     # windows that are smaller than the whole
     **{
-        f"tiles-{name}": tiled(given | {"order": 1, "xi": -8.0}, samples=((22, 25),), shape=(37, 30), **more)
+        f"tiles-{name}": textures(given | {"order": 1, "xi": -8.0}, 18, samples=((22, 25),), shape=(37, 30), **more)
         for name, given, more in (
             ("known", {"levels": 3}, {"known": 0.02}),
             ("gibbs", OPEN | {"relaxation": "gibbs"}, {"labels": 0}),

@@ -162,10 +162,10 @@ def run_steps(
 def use_counts(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     """Return the uses of each candidate, zeros if none matters, and the number of sites of each kind in each region."""
     candidates, machine, kinds = level.proposal.candidates, level.machine, np.zeros(0, np.int32)
-    found = use(machine, field, grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
+    uses = use(machine, field, grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
     if level.regions:
         kinds = level.regions.counts(Field(*map(machine.get, field)), grid).astype(np.int32)
-    return np.append(found, kinds)
+    return np.append(uses, kinds)
 
 
 def relax_parts(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
@@ -218,11 +218,11 @@ def finished_picture(
         return sample.picture(values, seen)
     sd, rows = run.options.finish, max(1, AT_ONCE // grid.cols)
     picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
-    given = run.machine.put((np.zeros(grid.shape, bool) if known is None else known).view(np.uint8))
+    fixed = run.machine.put((np.zeros(grid.shape, bool) if known is None else known).view(np.uint8))
     for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
         by = finish(
-            run.machine, field, given, grid, run.planes, sample, sd, range(first + top, first + top + len(here))
+            run.machine, field, fixed, grid, run.planes, sample, sd, range(first + top, first + top + len(here))
         )
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture

@@ -30,11 +30,7 @@ def centre_known(options: Options, neighbours: int) -> int:
 
 
 class Held(NamedTuple):
-    """Conditioning data and guides of a level's sites, on the host.
-
-    ``values`` (C, rows, cols) uint16, of which free sites have only the guides' channels; ``source`` (rows, cols)
-    int32; ``known`` (rows, cols) bool, False at free sites.
-    """
+    """Data and guides of a level's sites; free sites, which are not ``known``, have only ``values`` of guides."""
 
     values: NDArray[np.uint16]
     source: NDArray[np.int32]
@@ -49,10 +45,7 @@ class Data(NamedTuple):
 
 
 class Conditions(ABC):
-    """Conditioning data and guides of an output: all in memory, or windows out of a store.
-
-    ``confidences`` holds the number of guide channels, whether values have confidences of their own, and the weights.
-    """
+    """Conditioning data and guides of an output, and their confidences: all in memory, or windows out of a store."""
 
     def __init__(self, confidences: Confidences) -> None:
         self.confidences = confidences

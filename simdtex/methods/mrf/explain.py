@@ -109,7 +109,7 @@ def largest_order(twin: Lattices, level: int) -> int:
     sample = twin.of(level)
     if not isinstance(sample.level(level).proposal, AllCandidates):
         return 0
-    side = min(min(one.shape[1:]) for one in sample.sample.levels)
+    side = min(min(levels.shape[1:]) for levels in sample.sample.levels)
     radius = min(sample.sample.margin // sample.spacing(level), (side - 1) // 2)
     return min(MOST_ORDER, (int(radius) + 1) ** 2 - 1)
 
@@ -126,7 +126,7 @@ def with_order(twin: Lattices, moment: Moment, order: int) -> tuple[Lattices, Mo
     offsets, options = neighbourhood_offsets(order, before.offsets.shape[1]), replace(before.options, order=order)
     plan = replace(before.plan, offsets=offsets, options=options, coarser=None)
     after = Lattices(plan, before.machine, before.seed, None if before is twin else before.conditions)
-    here, there = (one.level(level).proposal.candidates.positions for one in (before, after))
+    here, there = (lattices.level(level).proposal.candidates.positions for lattices in (before, after))
     if np.array_equal(here, there):
         return after, moment
     if moment.penalty.any():
@@ -168,7 +168,7 @@ def _neighbours(
     pixels = sample.picture(values[:, :made].transpose(1, 0, 2), gathered(field.source.ravel(), r, -1))[:, 0]
     if given:
         number = np.where(there, r % grid.size, -1)[:, 0]
-        planes = (grid.decimated(np.moveaxis(one, -1, 0)) for one in (given.known, given.values))
+        planes = (grid.decimated(np.moveaxis(plane, -1, 0)) for plane in (given.known, given.values))
         known, told = (gathered(plane.reshape(len(plane), -1), number, 0).T for plane in planes)
         pixels = np.where(known, told, pixels)
     neighbours = Neighbours(

@@ -101,21 +101,16 @@ class Key(NamedTuple):
 
 
 def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> float:
-    """Return h_opt of equation (8).
-
-    ``variance`` is sigma^2, the mean marginal variance; ``candidates`` is n, the number of sample data; and
-    ``dimensions`` is d = channels (N + 1).
-    """
+    """Return h_opt of equation (8): ``variance`` is sigma^2, ``candidates`` n, ``dimensions`` d = channels (N + 1)."""
     return sqrt(variance) * pow(4 / (candidates * (2 * dimensions + 1)), 1 / (dimensions + 4))
 
 
 def window(bandwidth: float, top: int) -> ParzenWindow:
     """Return the tables for a bandwidth h in working grey levels.
 
-    h below 10^-10, for example 0 for a constant sample, is replaced by 10^-10: any difference then has no weight, and
-    1 / 2h^2 is finite. The tables end before the Gaussian falls below 2**-33, so they hold no subnormal number.
-
-    math.exp is rounded to 2**-24 or coarser here, so the last bit of a platform's libm does not matter.
+    h below 10^-10, as of a constant sample, is replaced by 10^-10: 1 / 2h^2 is finite. The tables end before the
+    Gaussian falls below 2**-33: none of their numbers is subnormal. math.exp is rounded to 2**-24 or coarser here, so
+    the last bit of a platform's libm does not matter.
     """
     h = max(bandwidth, 1e-10)
     scale = np.float32(1 / (2 * h * h))
@@ -136,10 +131,7 @@ def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint
 
 
 def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: SiteChoice) -> NDArray[np.uint64]:
-    """Return the masses of a draw: the weights or, for a density, times the legal share of each pixel's kernel.
-
-    ``w`` (slots, S) are the weights; ``pixels`` (C, slots, S or 1) the grey levels of the candidates.
-    """
+    """Return the weights ``w`` (slots, S) or, of a density, their products with the legal shares of pixels' kernels."""
     for plane in pixels if choice.density else ():
         _, mass = legal(plane, choice.window)
         mass = np.broadcast_to(mass, w.shape)
@@ -182,8 +174,7 @@ def taken(
 ) -> Relaxed:
     """Return the choice of each site among the candidates ``numbers`` (slots, S or 1), in NumPy.
 
-    That is the first of the least cost (slots, S), of a draw plus 2 h^2 times ``noise``, see
-    `simdtex.methods.mrf.relax`.
+    That is the first of the least cost (slots, S), of a draw plus 2 h^2 times ``noise``.
     """
     total = cost
     if choice.draws:  # an empty slot stays empty

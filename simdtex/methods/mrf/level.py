@@ -62,27 +62,12 @@ TOGETHER = 2**16
 class MrfState(NamedTuple):
     """The state of a run after a sweep, as arrays and numbers: all that the run needs to continue.
 
-    Attributes
-    ----------
-    values : (C, H, W) uint16 array of the machine
-        Working grey levels x.
-    source : (H, W) int32 array of the machine
-        The source map: pixel indices in the sample, including its margin.
-    temperature : (H, W) uint16 array of the machine
-        t in units of 1/1024.
-    penalty : (n + regions x kinds,) float32 array
-        Penalties during the next sweep, of each candidate of the level and of each kind in each region
-        (`simdtex.methods.mrf.use.use_penalty`).
-    schedule : tuple of arrays and numbers
-        The schedule's own state.
-    level : int
-        The current level, 0 the finest.
-    cooling, free : int
-        Numbers of finished sweeps of the level: cooling sweeps, and free sweeps.
-    active, temperature_sum : int
-        Active sites of the level, and the sum of their temperatures in units of 1/1024.
-
-    A sweep overwrites the arrays of the machine.
+    Of the machine, and overwritten by the next sweep: ``values`` (C, H, W) uint16, working grey levels x; ``source``
+    (H, W) int32, pixel indices in the sample, including its margin; ``temperature`` (H, W) uint16, t in 1/1024.
+    ``penalty`` (n + regions x kinds,) float32 are those during the next sweep, of each candidate of the level and of
+    each kind in each region (`simdtex.methods.mrf.use.use_penalty`); ``schedule``, arrays and numbers, is the
+    schedule's own state; ``level`` is 0 at the finest; ``cooling`` and ``free`` count the finished sweeps of the level;
+    ``active`` are the active sites of the level, and ``temperature_sum`` the sum of their temperatures in 1/1024.
     """
 
     values: Array
@@ -263,14 +248,14 @@ class Lattices:
         size = proposal.candidates.size
         begin, numbers, phase = np.array([0, size]), np.arange(size), np.zeros(grid.shape, np.int32)
         if proposal.phases:
-            begin, numbers, phase = (np.array(machine.get(one)) for one in proposal.phases)
-        own = self.sample.working[-known:, machine.get(proposal.candidates.positions)]
-        found = list(alike(own, held.values[-known:].reshape(known, -1)))
-        for k, (_, sites) in enumerate(found):
+            begin, numbers, phase = (np.array(machine.get(array)) for array in proposal.phases)
+        levels = self.sample.working[-known:, machine.get(proposal.candidates.positions)]
+        groups = list(alike(levels, held.values[-known:].reshape(known, -1)))
+        for k, (_, sites) in enumerate(groups):
             phase.flat[sites] = begin.size - 1 + k
-        begin = np.append(begin, begin[-1] + np.cumsum([len(those) for those, _ in found]))
-        numbers = np.concatenate([numbers, *(those for those, _ in found)])
-        return InPhase(*(machine.put(one.astype(np.int32)) for one in (begin, numbers, phase)))
+        begin = np.append(begin, begin[-1] + np.cumsum([len(those) for those, _ in groups]))
+        numbers = np.concatenate([numbers, *(those for those, _ in groups)])
+        return InPhase(*(machine.put(array.astype(np.int32)) for array in (begin, numbers, phase)))
 
     def _kinds(self, candidates: Candidates) -> Kinds | None:
         """Return the kinds of candidates that soft data know; None without soft data."""
@@ -398,29 +383,14 @@ class Lattices:
 class Level:
     """The constants of a level.
 
-    Attributes
-    ----------
-    setting : simdtex.schedules.Setting
-        The input of its schedule.
-    schedule : simdtex.schedules.Schedule
-    relaxation : simdtex.methods.mrf.relax.Relaxation
-        The relaxation of its sites, except for the penalty of each candidate, which changes with every sweep.
-    rate : float
-        lambda N C sigma^2: the cost of a candidate whose surroundings are used twice as often as their share.
-    fair_use : simdtex.methods.mrf.use.FairUse
-        The positions of the candidates, and the fair use of each.
-    regions : simdtex.methods.mrf.use.Regions, optional
-        The shares of categories that are asked.
-    in_place : bool
-        Whether sites of a step may be written while other sites of it are read: no two are neighbours.
-    evaluations : (H, W) int32 array of the machine
-        The number of candidates that each site has evaluated.
-    movable : (H, W) uint16 array of the machine, optional
-        0 at sites with given values, which free sweeps do not change. None: every site may relax.
-    soft : (kinds, H, W) float32 array, optional
-        The cost of each kind by soft data, without the penalties of the kinds.
-    lists : dict
-        The schedule's lists of sites on the machine: each is made, or copied there, once.
+    ``setting`` is the input of its ``schedule``, and ``relaxation`` that of its sites, except for the penalty of each
+    candidate, which changes with every sweep. ``rate``, lambda N C sigma^2, is the cost of a candidate whose
+    surroundings are used twice as often as their share; ``fair_use`` has the positions of the candidates and their
+    shares, and ``regions`` the shares of categories that are asked. ``in_place``: whether sites of a step may be
+    written while others of it are read, since no two are neighbours. ``evaluations`` (H, W) int32 counts the candidates
+    that each site has evaluated; ``movable`` (H, W) uint16 is 0 at sites that free sweeps do not change, None if there
+    are none; ``soft`` (kinds, H, W) float32 is the cost of each kind by soft data, without the penalties of the kinds;
+    ``lists`` are the schedule's lists of sites on the machine, each of which is made, or copied there, once.
     """
 
     setting: Setting
@@ -475,8 +445,8 @@ class Level:
 
 def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     """Return the relaxation of the level in a sweep, with the penalties of candidates, and of kinds in regions."""
-    (own, of_kinds), costs = level.fair_use.split(penalty), level.relaxation.costs
-    padded, kinds = level.machine.put(np.pad(own, (0, TAIL))), costs.kinds  # whole vectors are read at the end
+    (of_candidates, of_kinds), costs = level.fair_use.split(penalty), level.relaxation.costs
+    padded, kinds = level.machine.put(np.pad(of_candidates, (0, TAIL))), costs.kinds  # whole vectors are read
     if kinds and level.soft is not None:
         soft = level.regions.costs(level.soft, of_kinds, level.grid) if level.regions else level.soft
         kinds = kinds._replace(sites=level.machine.put(soft))
@@ -484,14 +454,7 @@ def with_penalty(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
 
 
 class ActiveSites:
-    """The active sites: those with a temperature above 0 or, in a free sweep, all that are not known.
-
-    Parameters
-    ----------
-    level : Level
-    temperature : (H, W) uint16 array of the machine
-    free : bool
-    """
+    """The active sites: those with a temperature above 0 or, in a ``free`` sweep, all that are not known."""
 
     def __init__(self, level: Level, temperature: Array, free: bool) -> None:
         self._level = level
@@ -512,14 +475,14 @@ class ActiveSites:
 
     def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
         """Return the active sites of a list, found on the machine."""
-        known, own = self.kept, self._level.machine
+        known, device = self.kept, self._level.machine
         if id(sites) not in known:
             begins, firsts = stretches(starts)
-            known[id(sites)] = sites, sites if machine else own.put(sites), own.put(begins), firsts
+            known[id(sites)] = sites, sites if machine else device.put(sites), device.put(begins), firsts
         _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
-        return among(own, here, begins, firsts, self._plane)
+        return among(device, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:

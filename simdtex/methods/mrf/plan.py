@@ -56,7 +56,7 @@ class MrfPlan(Input):
         copies = 2 if self.schedule.tile else 1
         pixels, channels = prod(self.shape), len(self.sample.working)
         within_32_bits(self.shape, channels * copies, self.remedy)
-        field, held = copies * (6 + 2 * channels), sum(one.sample.rows * one.sample.cols for one in self.sizes)
+        field, held = copies * (6 + 2 * channels), sum(plan.sample.rows * plan.sample.cols for plan in self.sizes)
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
         kinds = self.kinds.rows if self.kinds else 0
         phases = 12 * pixels + 56 * held if self.sample.waves else 0
@@ -75,25 +75,12 @@ def plan(
     soft: Soft | None = None,
     period: tuple[int, int] | None = None,
 ) -> MrfPlan:
-    """Return the plan of a run, with its input validated and its sample in working levels.
+    """Return the plan of a run of Y, the sample, and X, the output, with its input validated.
 
-    Parameters
-    ----------
-    pictures : Pictures
-        Y, the sample.
-    shape : tuple of int
-        Rows and columns of X, the output; of a volume layers, rows and columns.
-    options : Options
-    given : Given, optional
-        Conditioning data of X.
-    guide : GuidePair or Surroundings, optional
-        The label, number or colour at each place of Y and of X.
-    most : int, optional
-        The largest number of levels if the option ``levels`` is None.
-    soft : Soft, optional
-        The probability of each category, and of each picture of Y, at each site of X.
-    period : (int, int), optional
-        Rows and columns after which the lattice of a regular sample repeats on a torus; None: those of X.
+    ``shape`` are [layers,] rows and columns of X, ``given`` its conditioning data, ``soft`` the probability of each
+    category and of each picture of Y at its sites, and ``guide`` the label, number or colour at each place of Y and X;
+    ``most`` is the largest number of levels if the option ``levels`` is None, and ``period`` the rows and columns after
+    which the lattice of a regular sample repeats on a torus, None: those of X.
     """
     pictures = options.of(pictures)
     if soft and soft.images is not None:
@@ -119,7 +106,7 @@ def plan(
     lattice = parse_lattice(options.lattice)
     torus = options.boundary == "torus"
     regular = None if lattice is None else phases(pictures, period or (shape[0], shape[1]), torus, lattice, known)
-    channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
+    channels = pictures.channels + bool(options.structure) + sum(extra.channels for extra in guides)
     heavy = heaviest(options, len(offsets)) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
     if given and given.partly:
@@ -147,15 +134,15 @@ def reduced(
     """Return the plan of a scene, the first of ``scenes``, that is halved ``count`` times for the coarse levels."""
     while len(scenes) <= count:
         scenes.append(scenes[-1].halved())
-    found: MrfPlan | None = None
-    for number, here in reversed(list(enumerate(scenes[: count + 1]))):
-        own, sample = sampled(here, 1 if found else levels - number, offsets, values, options, 2**number)
-        levels = levels if found else own + number
-        held = planes(here.given, sample) if here.given and here.given.whole.any() else None
-        schedule, rest = schedules.get(options.schedule), {"reduction": 2**number, "coarser": found}
-        found = MrfPlan(sample, here.shape, offsets, options, schedule, levels, here.given, held, soft, **rest)
-    assert found
-    return found
+    coarser: MrfPlan | None = None
+    for times, scene in reversed(list(enumerate(scenes[: count + 1]))):
+        fewer, sample = sampled(scene, 1 if coarser else levels - times, offsets, values, options, 2**times)
+        levels = levels if coarser else fewer + times
+        known = planes(scene.given, sample) if scene.given and scene.given.whole.any() else None
+        schedule, rest = schedules.get(options.schedule), {"reduction": 2**times, "coarser": coarser}
+        coarser = MrfPlan(sample, scene.shape, offsets, options, schedule, levels, scene.given, known, soft, **rest)
+    assert coarser
+    return coarser
 
 
 class Scene(NamedTuple):
@@ -180,7 +167,7 @@ class Scene(NamedTuple):
 
 def halvings(scene: Scene, options: Options, levels: int, soft: Soft | None) -> int:
     """Return how many times the sample is halved for the coarse levels."""
-    side = min(min(one.shape[:2]) for one in scene.pictures.pixels)
+    side = min(min(picture.shape[:2]) for picture in scene.pictures.pixels)
     given, most = scene.given, min(levels - 1, int(log2(max(1, side // (2 * isqrt(options.neighbourhood) + 1)))))
     loose = given is not None and (given.place is None or given.outside is not None or given.partly)
     kept = options.categorical or options.pixel == "density" or scene.pictures.pixels[0].dtype == np.bool_
@@ -258,12 +245,12 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
     if proportions:
-        found = pictures.categories(0)
-        if found is None or pictures.pixels[0].shape[-1] > 1:
+        categories = pictures.categories(0)
+        if categories is None or pictures.pixels[0].shape[-1] > 1:
             raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
-        if len(found) != len(proportions):
+        if len(categories) != len(proportions):
             raise ValueError(
-                f"there are {len(proportions)} proportions and {len(found)} categories, {_listed(found)}; "
+                f"there are {len(proportions)} proportions and {len(categories)} categories, {_listed(categories)}; "
                 "give one for each"
             )
 
@@ -275,11 +262,11 @@ def check_guide(guide: GuidePair, options: Options) -> Guide:
     samples, output = guide
     labels = options.labels
     if labels is None:
-        integers = all(one.dtype.kind in "iu" for one in (*samples, output))
-        labels = integers and all(np.unique(one).size <= MOST for one in samples)
+        integers = all(picture.dtype.kind in "iu" for picture in (*samples, output))
+        labels = integers and all(np.unique(picture).size <= MOST for picture in samples)
     if labels:
         for channel in range(output.shape[-1]):
-            there = np.unique(np.concatenate([np.unique(one[..., channel]) for one in samples]))
+            there = np.unique(np.concatenate([np.unique(picture[..., channel]) for picture in samples]))
             asked = np.unique(output[..., channel])
             asked = asked[~np.isnan(asked)] if asked.dtype.kind == "f" else asked
             strange = asked[~np.isin(asked, there)]

@@ -167,14 +167,14 @@ def known_before(run: Lattices) -> dict[str, Any]:
 def picture(run: Lattices, grid: Grid, field: Field) -> NDArray[Any]:
     """Return the picture of a level, read back, in the sample's type."""
     values, source = run.machine.get(field.values), run.machine.get(field.source)
-    found = run.sample.picture(grid.latest(values), grid.latest(source))
-    return run.plan.given.shown(found, grid) if run.plan.given else found
+    image = run.sample.picture(grid.latest(values), grid.latest(source))
+    return run.plan.given.shown(image, grid) if run.plan.given else image
 
 
 def temperatures(run: Lattices, grid: Grid, field: Field) -> NDArray[np.float64]:
     """Return the temperatures of a level, read back, 0 to 1."""
-    found: NDArray[np.float64] = grid.latest(run.machine.get(field.temperature)) / np.float64(1024)
-    return found
+    temperature: NDArray[np.float64] = grid.latest(run.machine.get(field.temperature)) / np.float64(1024)
+    return temperature
 
 
 def sources(run: Lattices, grid: Grid, field: Field) -> NDArray[np.int32]:

@@ -27,14 +27,12 @@ def start(
 ) -> Field:
     """Return the field of a level or a window of it before its first sweep: steps 2 and 5 of Algorithm 1.
 
-    The sites of the level above, which ``above`` holds as far as they are in the window (`Grid.above`), keep their
-    values, sources and temperatures. Every other site is a pixel of the sample at a position drawn from ``positions``,
-    at temperature 1.
+    The sites of the level above in the window, ``above`` (`Grid.above`), keep their values, sources and temperatures.
+    Every other site is a pixel of the sample at a position drawn from ``positions``, at temperature 1.
 
-    ``squares`` (n,) is given if the level above has a sample of half the size: the first pixel of each of its pixels'
-    squares of 2x2 in this sample, of ``cols`` columns. Each site then takes a pixel of the square that the site of the
-    level above at or before it has, at temperature 0: pieces of the sample keep their arrangement. A site below one
-    without a source has a given value, which is not set here: its source is -1, and its values are 0.
+    ``squares`` (n,), if the level above has a sample of half the size, is the first pixel of the 2x2 pixels of this
+    sample, of ``cols`` columns, that each of its pixels is. Each site then takes a pixel of the square that the site of
+    the level above at or before it has, at temperature 0; below a site without a source, source -1 and values 0.
     """
     (channels, plane), shape = pixels.shape, grid.shape
     if machine is None and squares is not None:

@@ -85,9 +85,9 @@ class Regions:
 
     def at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the region of each site of a lattice or a window of it."""
-        found: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
-        apart = grid.near_edge(self.radius) & gathered(self.bordered, found, False)
-        return np.where(apart, found + len(self.bordered), found)
+        region: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
+        apart = grid.near_edge(self.radius) & gathered(self.bordered, region, False)
+        return np.where(apart, region + len(self.bordered), region)
 
     def wanted(self, grid: Grid) -> NDArray[np.float64]:
         """Return the mean of the probabilities at the sites of each region on a lattice, (regions, kinds)."""
@@ -107,8 +107,8 @@ class Regions:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
         kinds = len(self.p)
         each = penalty.reshape(-1, kinds) * self.unit
-        found = soft[:kinds] + gathered(each.T, self.at(grid), 0)
-        return np.concatenate([found - found.min(0), soft[kinds:]])
+        costs = soft[:kinds] + gathered(each.T, self.at(grid), 0)
+        return np.concatenate([costs - costs.min(0), soft[kinds:]])
 
 
 @Operation
@@ -124,8 +124,8 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
     counts = machine.put(np.zeros(candidates.size, np.int32))
     sites = grid.size
     machine.launch("use", (sites,), sites, field.source, field.temperature, candidates.index_of, counts)
-    found: NDArray[np.int32] = machine.get(counts)
-    return found
+    uses: NDArray[np.int32] = machine.get(counts)
+    return uses
 
 
 def use_penalty(
@@ -136,34 +136,32 @@ def use_penalty(
 ) -> NDArray[np.float32]:
     """Return penalties during the next sweep, float32: of each candidate, (n,), and of each kind in each region.
 
-    ``counts`` are from `use` and from `Regions`, one after the other; ``rate`` is lambda N C sigma^2, lambda times the
-    sample's variance times neighbours and channels, 0: no penalty of candidates; and ``before`` are the penalties
-    during the last sweep, at the beginning of a level those of the kinds. The penalty of a candidate is lambda N C
-    sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the mean with
-    that ``before``, so that penalties converge. It is infinite at a place without a candidate.
+    ``counts`` are from `use` and from `Regions`, in this order; ``rate`` is lambda N C sigma^2; and ``before`` are the
+    penalties during the last sweep, at the beginning of a level those of the kinds. The penalty of a candidate is
+    lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the
+    mean with that ``before``, so that penalties converge. It is infinite at a place without a candidate.
 
     The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M +
     `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
 
-    Penalties are the potentials of a transport problem: giving all output sites the nearest candidates, with every
-    candidate used for the same number of sites, is semi-discrete optimal transport, whose dual raises the penalty of
-    candidates that are used too often. Cost: some ten passes over the candidates, on the host.
+    Giving all sites the nearest candidates, with every candidate used for the same number of sites, is semi-discrete
+    optimal transport, whose dual raises the penalty of candidates that are used too often.
     """
     counts, of_kinds = fair_use.split(counts)
     before, kept = fair_use.split(np.zeros(fair_use.wanted.size, np.float32) if before is None else before)
     kept = kept + _changes(of_kinds, fair_use) if before.size else kept
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
-    found = np.zeros(places, np.float32)
+    price = np.zeros(places, np.float32)
     if total and rate:
         used = np.zeros(places, np.int64)
         used[there if fair_use.listed else slice(None)] = counts
         around, (due, whole) = sums_around(used.reshape(fair_use.shape), fair_use.around), fair_use.due
         excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
-        found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
+        price = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
     if fair_use.fair is not None:
-        found = found[there] if fair_use.listed else np.where(there, found, np.float32(np.inf))
-    return np.append((found + before[: found.size]) / np.float32(2) if before.size else found, kept)
+        price = price[there] if fair_use.listed else np.where(there, price, np.float32(np.inf))
+    return np.append((price + before[: price.size]) / np.float32(2) if before.size else price, kept)
 
 
 def _changes(counts: NDArray[np.integer], fair_use: FairUse) -> NDArray[np.float32]:

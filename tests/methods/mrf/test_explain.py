@@ -12,20 +12,8 @@ import simdtex
 from simdtex.model.guide import UNKNOWN
 
 BRICK = data.brick()[:24, :24]
-EXPLAINED = (
-    *(
-        "more",
-        "more-levels",
-        "reduced",
-        "more-whole",
-        "more-gibbs",
-        "paper",
-        "density-colour",
-        "random-scan",
-        "block-exact",
-    ),
-    *("labels", "grey-guide", "known-open", "gaps", "several", "lattice-exact", "novelty-exact"),
-)
+EXPLAINED = ("more", "reduced", "more-gibbs", "density-colour", "block-exact", "labels", "known-open", "lattice-exact")
+EXPLAINED += ("several", "novelty-exact")
 """Runs of the table: with every search and relaxation, several schedules, and every cost."""
 
 
@@ -101,7 +89,7 @@ def consistent(why, coherence=0.5):
         np.testing.assert_allclose(why.density.sum(1), 1)
 
 
-@pytest.mark.parametrize("name", ["more", "more-gibbs", "paper", "labels", "exact-of-many"])
+@pytest.mark.parametrize("name", ["more-gibbs", "labels"])
 def test_a_device_is_explained_alike(machine, name):
     first, second = (replayed(name, device)[0].explain((2, 2)) for device in (REFERENCE, machine))
     assert first.table() == second.table()
@@ -132,8 +120,7 @@ def test_the_progress_explains_the_next_relaxation(machine):
     np.testing.assert_array_equal(made, simdtex.synthesize(BRICK, (8, 9), **rules))  # asking changes nothing
 
 
-@pytest.mark.parametrize("relaxation", ["gibbs", "icm"])
-def test_a_density_is_the_lcpdf(relaxation):
+def test_a_density_is_the_lcpdf():
     seen = []
 
     def watch(progress):
@@ -141,15 +128,14 @@ def test_a_density_is_the_lcpdf(relaxation):
             seen.append((progress.image(), progress.temperature(), progress.explain(4, 5)))
 
     sample = texture((14, 15))  # with levels near 0 and 255
-    options = {"preset": "paper", "relaxation": relaxation, "levels": 2, "order": 4, "pixel": "density"}
+    options = {"preset": "paper", "levels": 2, "order": 4, "pixel": "density"}
     simdtex.synthesize(sample, (10, 11), **options, rng=1, callback=watch, device="reference")
     assert len(seen) > 2
     for image, t, why in seen:
         expected = simdtex.lcpdf(image, sample, [(4, 5)], order=4, temperature=t, device="reference")
         np.testing.assert_allclose(why.density, expected, atol=1e-6)
-        if relaxation == "icm":
-            assert why.values == expected.argmax()
-            assert "takes the mode, the grey level of greatest density" in why.reason
+        assert why.values == expected.argmax()
+        assert "takes the mode, the grey level of greatest density" in why.reason
 
 
 def test_a_list_continues_the_nearest_neighbours_alone():
@@ -164,7 +150,6 @@ def test_what_cannot_be_explained():
     replay = simdtex.replay(*given, **rules)
     for site, told, words in [
         ((10, 0), {}, "not of the 10 x 11 sites of level 0"),
-        ((5, 0), {"level": 1}, "not of the 5 x 6 sites of level 1"),
         ((0, 0), {"level": 2}, "levels of this run are 0 to 1"),
         ((0, 0), {"sweep": 1}, "does not relax at level 0, sweep 1"),
     ]:
@@ -210,7 +195,7 @@ def exact():
     return replay, next(n for n, one in enumerate(replay.sweeps) if one.level == 0) + 1
 
 
-@pytest.mark.parametrize("order", [1, 4, 8])
+@pytest.mark.parametrize("order", [1, 8])
 def test_a_site_is_explained_with_another_order(exact, order):
     """The neighbours are those of the order in the field of the moment; the candidates those of a run of the order."""
     replay, n = exact
@@ -220,7 +205,7 @@ def test_a_site_is_explained_with_another_order(exact, order):
     consistent(why, 0)
     assert (why.level, why.sweep, why.temperature) == (own.level, own.sweep, own.temperature)
     near, squared = why.neighbours, (why.neighbours.offsets**2).sum(1)
-    assert squared.max() <= order and len(squared) == {1: 4, 4: 12, 8: 24}[order]
+    assert squared.max() <= order and len(squared) == {1: 4, 8: 24}[order]
     in_both = (own.neighbours.offsets[:, None] == near.offsets).all(2)
     assert in_both.any(1).all() == (order > 2)
     for k, m in np.argwhere(in_both):
@@ -246,9 +231,7 @@ def test_what_no_site_can_be_explained_with_is_refused(exact):
     assert [replay.largest_order(level) for level in (0, 1)] == [8, 3]
     refused = {
         "order at level 0 is 9; give 8 or fewer": {"order": 9},
-        "order at level 0 is 0; give 1 or more": {"order": 0},
         "trust is 1.5; give at most 1": {"trust": 1.5},
-        "trust must be a number": {"trust": "much"},
     }
     for words, other in refused.items():
         with pytest.raises((ValueError, TypeError), match=re.escape(words)):

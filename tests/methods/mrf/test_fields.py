@@ -9,14 +9,12 @@ import pytest
 from cases import REFERENCE, assert_same_bits, host, problem, problems, slow_but, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import chisquare
 from test_relax import apart
-from tolerances import SIGNIFICANCE
 
 from simdtex import random
 from simdtex.methods.mrf.commit import commit
 from simdtex.methods.mrf.lcpdf import Relaxed
-from simdtex.methods.mrf.neighbourhood import Field, near
+from simdtex.methods.mrf.neighbourhood import Field
 from simdtex.methods.mrf.snapshot import TYPES, snapshot
 from simdtex.methods.mrf.start import start
 from simdtex.methods.mrf.temperature import temperature
@@ -43,33 +41,19 @@ def starts(draw):
     return sample, positions, (draw(side), draw(side)), draw(st.integers(0, 2**64 - 1))
 
 
-@given(starts())
-def test_the_reference_is_the_rule(case):
+@given(case=starts())
+@settings(max_examples=40)
+def test_a_start_is_drawn_from_the_sample(machine, case):
     sample, positions, shape, seed = case
     values, source, temperature = run(REFERENCE, *case)
-    assert [a.dtype for a in (values, source, temperature)] == [np.uint16, np.int32, np.uint16]
-    assert source.shape == temperature.shape == values.shape[1:] == shape
-    assert (temperature == 1024).all()
+    assert_same_bits(temperature, np.full(shape, 1024, np.uint16))
     for site, p in enumerate(source.ravel().tolist()):
         lo, hi, *_ = random.draw4(seed, 0, 0, site, random.START)
         assert p == positions[((int(hi) << 32 | int(lo)) * len(positions)) >> 64]
-        row, col = divmod(p, sample.cols)
-        inside = (row - sample.margin, col - sample.margin)
-        assert all(0 <= i < n for i, n in zip(inside, sample.levels[0].shape[1:], strict=True))
+        inside = tuple(n - sample.margin for n in divmod(p, sample.cols))
+        assert min(inside) >= 0
         assert values.reshape(sample.channels, -1)[:, site].tolist() == sample.levels[0][:, *inside].tolist()
-
-
-@given(case=starts())
-@settings(max_examples=25)
-def test_a_device_has_the_references_bits(machine, case):
-    assert_same_bits(run(machine, *case), run(REFERENCE, *case))
-
-
-def test_every_pixel_is_as_likely():
-    sample = Sample(texture((5, 4), 1), 8)
-    positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
-    _, source, _ = run(REFERENCE, sample, positions, (100, 100), 11)
-    assert chisquare(np.bincount(source.ravel(), minlength=20)).pvalue > SIGNIFICANCE
+    assert_same_bits(run(machine, *case), [values, source, temperature])
 
 
 # -- The temperature after a relaxation, equation (13), in integers of 1/1024.
@@ -82,43 +66,18 @@ def run_temperature(machine, p, xi):
     return machine.get(temperature(machine, sites, field, offsets, p.grid, xi))
 
 
-def check_formula(p, xi):
+@given(problems(max_order=20), xis)
+@settings(max_examples=40)
+def test_the_reference_is_the_formula(p, xi):
     t = p.in_picture(p.field.temperature)
     formula = [plain.cooled(t, site, p.order, p.grid.step, p.grid.torus, xi) for site in p.where()]
-    ours = run_temperature(REFERENCE, p, xi)
-    assert ours.dtype == p.field.temperature.dtype
-    assert ours.tolist() == formula
-
-
-@given(problems(max_order=20), xis)
-@settings(max_examples=60)
-def test_the_reference_is_the_formula(p, xi):
-    check_formula(p, xi)
+    assert_same_bits(run_temperature(REFERENCE, p, xi), np.array(formula, np.uint16))
 
 
 @given(p=problems(max_order=20), xi=xis)
 @settings(max_examples=25)
 def test_a_device_has_the_references_bits_of_temperature(machine, p, xi):
     assert_same_bits(run_temperature(machine, p, xi), run_temperature(REFERENCE, p, xi))
-
-
-@pytest.mark.parametrize("torus", [True, False], ids=["torus", "open"])
-@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (1, 7), (2, 3)])
-def test_tiny_pictures(machine, shape, torus):
-    p = problem(1, order=5, shape=shape, torus=torus)
-    check_formula(p, -1)
-    assert_same_bits(run_temperature(machine, p, -1), run_temperature(REFERENCE, p, -1))
-
-
-def test_all_hot_cools_by_the_share_of_xi():
-    p = problem(3, order=8, temperatures="one")
-    assert set(run_temperature(REFERENCE, p, -1024).tolist()) == {(24 * 1024 - 1024) // 24}
-
-
-def test_the_least_xi_cools_everything_in_the_end():
-    """Rounding down makes progress certain: 1/1024 a sweep at least."""
-    p = problem(4, order=2, temperatures="one")
-    assert set(run_temperature(REFERENCE, p, -1).tolist()) == {1023}
 
 
 # -- Which sites are active: counted and listed on the machine as NumPy counts and lists them.
@@ -163,55 +122,24 @@ def test_the_active_sites_of_a_list_stay_in_order_group_by_group(machine, case, 
 # -- The end of a step: relaxed sites go into the field, and nothing else changes.
 
 
-def outcome(p):
-    """What a relaxation of the problem's sites might have given."""
-    rng = np.random.default_rng(p.sites.size)
-    count, channels = p.sites.size, len(p.field.values)
-    choice = rng.integers(0, p.sample.rows * p.sample.cols, count).astype(np.int32)
-    values = rng.integers(0, 4096, (channels, count)).astype(np.uint16)
-    return choice, values, rng.integers(0, 1025, count).astype(np.uint16)
-
-
-def run_commit(machine, p):
-    sites, field, _ = p.on(machine)
-    choice, values, cooled = (machine.put(a) for a in outcome(p))
-    return host(machine, commit(machine, field, sites, Relaxed(choice, values), cooled))
-
-
-def check_formula_commit(p):
-    choice, values, cooled = outcome(p)
-    expected = [np.array(a) for a in p.field]
-    for s, (row, col) in enumerate(divmod(int(site), p.grid.cols) for site in p.sites):
-        for c in range(len(values)):
-            expected[0][c, row, col] = values[c, s]
-        expected[1][row, col], expected[2][row, col] = choice[s], cooled[s]
-    assert_same_bits(run_commit(REFERENCE, p), expected)
-
-
-@given(problems())
-@settings(max_examples=40)
-def test_the_reference_is_the_assignment(p):
-    check_formula_commit(p)
-
-
 @given(p=problems())
 @settings(max_examples=25)
-def test_a_device_has_the_references_bits_of_commit(machine, p):
-    assert_same_bits(run_commit(machine, p), run_commit(REFERENCE, p))
-
-
-def test_a_machine_never_writes_to_the_callers_arrays(machine):
-    p = problem(3)
+def test_a_commit_is_the_assignment(machine, p):
+    rng, count = np.random.default_rng(p.sites.size), p.sites.size
+    choice = rng.integers(0, p.sample.rows * p.sample.cols, count).astype(np.int32)
+    values = rng.integers(0, 4096, (len(p.field.values), count)).astype(np.uint16)
+    cooled, expected = rng.integers(0, 1025, count).astype(np.uint16), [np.array(a) for a in p.field]
+    for plane, new in zip(expected, (values, choice, cooled), strict=True):
+        plane.reshape(*plane.shape[:-2], -1)[..., p.sites] = new
     before = [a.copy() for a in p.field]
     for m in (REFERENCE, machine):
-        run_commit(m, p)
-        assert_same_bits(list(p.field), before)
+        sites, field, _ = p.on(m)
+        relaxed = Relaxed(m.put(choice), m.put(values))
+        assert_same_bits(host(m, commit(m, field, sites, relaxed, m.put(cooled))), expected)
+        assert_same_bits(list(p.field), before)  # a machine never writes to the caller's arrays
 
 
 # -- The picture that tiles see of one another: the stack, the lattice that points into it, and who reads it.
-
-SHAPES = [(1, 1), (1, 7), (5, 4), (1, 1, 1), (2, 1, 5), (1, 6, 5), (3, 5, 7)]
-BOUNDARIES = pytest.mark.parametrize("torus", [True, False], ids=["torus", "open"])
 
 
 def picture(shape, dtype, seed=0):
@@ -223,46 +151,21 @@ def stack(now, old):
     return np.concatenate([now, old], -2)
 
 
-@pytest.mark.parametrize("dtype", TYPES)
-@pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_both_halves_are_the_picture(machine, shape, dtype):
-    now = picture(shape, dtype)
-    for m in (REFERENCE, machine):
-        stacked = m.get(snapshot(m, m.put(now), shape[-2]))
-        assert stacked.dtype == now.dtype
-        assert stacked.shape == (*shape[:-2], 2 * shape[-2], shape[-1])
-        assert_same_bits(np.ascontiguousarray(stacked[..., : shape[-2], :]), now)
-        assert_same_bits(np.ascontiguousarray(stacked[..., shape[-2] :, :]), now)
+@pytest.mark.parametrize("shape", [(1, 1), (5, 4), (3, 5, 7)], ids=str)
+def test_both_halves_of_a_stack_are_its_upper_half(machine, shape):
+    for dtype, m in product(TYPES, (REFERENCE, machine)):
+        now, old = picture(shape, dtype, 1), picture(shape, dtype, 2)
+        given, once = m.put(stack(now, old)), m.put(now)
+        twice = snapshot(m, once, shape[-2])
+        for stacked in (twice, snapshot(m, given, shape[-2])):
+            assert_same_bits(np.asarray(m.get(stacked)), stack(now, now))
+        assert m is REFERENCE or (twice is not once and snapshot(m, given, shape[-2]) is given), "no second stack"
+    assert not np.shares_memory(snapshot(REFERENCE, now, shape[-2]), now)
 
 
-@pytest.mark.parametrize("dtype", TYPES)
-@pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_a_stack_keeps_its_upper_half_and_forgets_the_lower(machine, shape, dtype):
-    now, old = picture(shape, dtype, 1), picture(shape, dtype, 2)
-    given = stack(now, old)
-    for m in (REFERENCE, machine):
-        assert_same_bits(np.asarray(m.get(snapshot(m, m.put(given), shape[-2]))), stack(now, now))
-
-
-def test_a_device_makes_no_second_stack(machine):
-    given = machine.put(stack(picture((2, 3, 4), "uint16", 1), picture((2, 3, 4), "uint16", 2)))
-    assert snapshot(machine, given, 3) is given
-    once = machine.put(picture((2, 3, 4), "uint16"))
-    assert snapshot(machine, once, 3) is not once
-
-
-def test_the_twin_changes_nothing_of_what_it_is_given():
-    now = picture((2, 3, 4), "uint16")
-    before = now.copy()
-    stacked = snapshot(REFERENCE, now, 3)
-    stacked += 1
-    assert_same_bits(now, before)
-
-
-@pytest.mark.parametrize("shape", [(1, 9, 3), (9, 1, 3), (5, 7, 3)], ids=str)
-def test_a_stack_of_channels_last_is_written_in_place(shape):
+def test_a_stack_of_channels_last_is_written_in_place():
     """As `commit` does, through a view with the rows side by side."""
-    stacked = snapshot(REFERENCE, np.moveaxis(picture(shape, "uint16"), -1, 0), shape[0])
+    stacked = snapshot(REFERENCE, np.moveaxis(picture((5, 7, 3), "uint16"), -1, 0), 5)
     assert stacked.flags.c_contiguous
     assert np.shares_memory(stacked.reshape(3, -1), stacked)
 
@@ -271,11 +174,11 @@ def tiles_of(grid, i, j):
     return i // grid.tile[0], j // grid.tile[1]
 
 
-@BOUNDARIES
-@pytest.mark.parametrize("order", [1, 2, 8])
+@pytest.mark.parametrize("torus", [True, False], ids=["torus", "open"])
+@pytest.mark.parametrize("order", [1, 8])
 @pytest.mark.parametrize(
     ("height", "width", "spacing", "tile"),
-    [(6, 9, 1, (3, 3)), (7, 5, 1, (2, 4)), (4, 6, 1, (1, 1)), (9, 11, 2, (2, 3)), (5, 6, 1, (5, 2)), (1, 8, 1, (3, 3))],
+    [(7, 5, 1, (2, 4)), (9, 11, 2, (2, 3)), (1, 8, 1, (3, 3))],
     ids=str,
 )
 def test_exactly_the_neighbours_in_another_tile_are_read_elsewhere(height, width, spacing, tile, order, torus):
@@ -306,33 +209,15 @@ def tiled(seed, tile, **options):
 
 
 TILED = [
-    {"tile": (2, 3)},
     {"tile": (4, 4), "torus": False, "order": 5},
-    {"tile": (1, 1), "channels": 3, "order": 1},
     {"tile": (2, 2), "spacing": 2, "shape": (13, 11), "channels": 2, "edges": "reflect"},
     {"tile": (50, 50), "channels": 3},
 ]
 
 
-@pytest.mark.parametrize("options", TILED, ids=str)
-def test_a_neighbourhood_reads_the_older_picture_across_an_edge(options):
-    p, now, old = tiled(1, **options)
-    _, values, confidence, *_ = near(p.sites, p.field, p.offsets, p.grid, p.confidences)
-    spacing, grid = p.grid.step, p.grid
-    for s, (row, col) in enumerate(p.where()):
-        i, j = row // spacing, col // spacing
-        for k, r in enumerate(plain.neighbours(i, j, p.order, grid.rows, grid.cols, grid.torus)):
-            if r is None:
-                assert not confidence[k, 0, s]
-                continue
-            seen = now if tiles_of(grid, i, j) == tiles_of(grid, *r) else old
-            assert confidence[k, 0, s] == 1 - seen.temperature[r] / 1024
-            assert np.array_equal(values[k, :, s], seen.values[(slice(None), *r)])
-
-
 @pytest.mark.parametrize(
     ("options", "exact"),
-    slow_but([(one, n % 2 > 0) for n, one in enumerate(TILED)], product(TILED, (False, True))),
+    slow_but([(TILED[0], False), (TILED[1], True)], product(TILED, (False, True))),
     ids=str,
 )
 def test_every_reader_has_its_twins_bits_on_a_device(machine, options, exact):

@@ -3,17 +3,12 @@
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, texture
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from plain_sample import stand_ins as plainly
 
 import simdtex
 from simdtex.model.given import MOST_NEAR, Given, nearest_data, planes, stand_ins
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.schedules import SCHEDULES
-
-DTYPES = (np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64)
 
 
 def run(sample, shape, rng=3, **options):
@@ -54,46 +49,31 @@ def test_known_values_stay_under_every_schedule(schedule):
     keeps(texture((9, 8)), known, **options, **torus)
 
 
-@pytest.mark.parametrize("channels", [None, 2])
-@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(("dtype", "channels"), [(np.bool_, 2), (np.int32, None), (np.float64, 2)])
 def test_known_values_of_every_type_stay(dtype, channels):
     shape = (9, 10, channels) if channels else (9, 10)
-    for seed, (boundary, search) in enumerate((("torus", "exact"), ("open", "coherent"))):
-        values = anything(shape, dtype, seed)
-        known = np.ma.masked_array(values, np.random.default_rng(seed).random(shape) < 0.6)  # of two, some alone
-        options = {"search": search, "boundary": boundary, "finish": 1.0, "balance": 2.0}
-        keeps(texture((10, 9), channels, dtype), known, order=2, levels=2, **options)
+    values = anything(shape, dtype, 1)
+    known = np.ma.masked_array(values, np.random.default_rng(1).random(shape) < 0.6)  # of two, some alone
+    options = {"search": "coherent", "boundary": "open", "finish": 1.0, "balance": 2.0}
+    keeps(texture((10, 9), channels, dtype), known, order=2, levels=2, **options)
 
 
-def test_a_draw_or_a_density_leaves_known_values_alone():
+def test_a_density_leaves_known_values_alone():
     known = np.ma.masked_array(anything((8, 7), np.uint8, 3), np.random.default_rng(4).random((8, 7)) < 0.6)
-    keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs")
-    keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs", pixel="density")
     keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs", pixel="density", xi=-4.0)
 
 
-@pytest.mark.parametrize("schedule", SCHEDULES)
-@pytest.mark.parametrize(("search", "site"), [("exact", (0, 0)), ("coherent", (5, 6))])
+@pytest.mark.parametrize(
+    ("schedule", "search", "site"),
+    [("coloring", "coherent", (5, 6)), ("luby", "exact", (0, 0)), ("raster", "exact", (5, 6))],
+)
 def test_all_is_known_but_one_site(schedule, search, site):
     """At a coarse level nothing is left to relax, then, or that one alone."""
     sample = texture((9, 10))
     known = np.ma.masked_array(texture((9, 10), seed=1), np.zeros((9, 10), bool))
     known[site] = np.ma.masked
-    for sweeps in (0, 2):
-        options = {"schedule": schedule, "search": search, "finish": 0.0, "free_sweeps": sweeps}
-        assert keeps(sample, known, order=2, levels=3, **options)[site] in sample
-
-
-@given(
-    *(st.integers(1, 20), st.integers(1, 20), st.sampled_from([1, 2, 4, 8]), st.booleans()),
-    *(st.sampled_from([0.02, 0.1, 0.4, 0.9]), st.integers(0, 2**16)),
-)
-@settings(max_examples=60)
-def test_stand_ins_are_those_of_plain_loops(rows, cols, spacing, torus, share, seed):
-    known = np.random.default_rng(seed).random((rows, cols)) < share
-    site, datum = stand_ins(known, Grid.of((rows, cols), spacing, torus))
-    expected = sorted((a * cols + b, i * cols + j) for (a, b), (i, j) in plainly(known, spacing, torus).items())
-    assert list(zip(site.tolist(), datum.tolist(), strict=True)) == expected
+    options = {"schedule": schedule, "search": search, "finish": 0.0, "free_sweeps": 2}
+    assert keeps(sample, known, order=2, levels=3, **options)[site] in sample
 
 
 def standing(torus, spacing, *data, shape=(9, 10)):
@@ -117,22 +97,6 @@ def test_known_answers_of_stand_ins():
     assert standing(False, 4, (2, 9), shape=(9, 10)) == {(4, 8): (2, 9)}
     assert standing(True, 4, (4, 11), shape=(8, 12)) == {(4, 0): (4, 11)}, "around the seam"
     assert standing(False, 4, (4, 11), shape=(8, 12)) == {(4, 8): (4, 11)}, "but of no open lattice"
-
-
-def test_a_datum_between_sites_is_felt_at_a_coarse_level_and_no_longer_after_it():
-    """A checkerboard of two greys: around a single datum off the lattice is its own."""
-    sample = np.repeat(np.repeat(np.uint8([[0, 255], [255, 0]]), 12, 0), 12, 1)
-    known = np.ma.masked_all((16, 16), np.uint8)
-    share = {}
-    for colour in (0, 255):
-        known[9, 9] = colour
-        means = []
-        for rng in range(2):
-            image = simdtex.synthesize(sample, (16, 16), known=known, rng=rng, device=REFERENCE, order=4, levels=3)
-            means.append(image[7:12, 7:12].mean() / 255)
-        share[colour] = np.mean(means)
-    assert share[255] > 0.8
-    assert share[0] < 0.2
 
 
 @pytest.mark.slow
@@ -174,33 +138,19 @@ def patchwork(labels=2, size=16):
     return (rng.integers(0, 160, label.shape) + 40 * label).astype(np.uint8), label
 
 
-@pytest.mark.parametrize(("labels", "search"), [(2, "exact"), (3, "coherent")])
-def test_a_map_of_labels_is_obeyed(labels, search):
-    sample, label = patchwork(labels)
+def test_a_map_of_labels_is_obeyed():
+    sample, label = patchwork(3)
     row, col = np.indices((24, 20))
-    wanted = ((row // 8 + col // 10) % labels).astype(int)
+    wanted = ((row // 8 + col // 10) % 3).astype(int)
     share = {}
     for weight in (10.0, 0.0):
-        guide = {"guide": (label, wanted), "guide_weight": weight}
-        _, output = run(sample, wanted.shape, order=4, search=search, **guide)
+        _, output = run(sample, wanted.shape, order=4, guide=(label, wanted), guide_weight=weight)
         share[weight] = (label[tuple(np.moveaxis(output.source, -1, 0))] == wanted).mean()
     assert share[10.0] > 0.93
     assert share[0.0] < 0.8, "else the guide tells nothing"
 
 
-def test_a_grey_guide_is_followed():
-    """Brightness comes where the guide is high."""
-    row, _ = np.indices((30, 30))
-    sample = (row * 6 + np.random.default_rng(1).integers(0, 60, row.shape)).astype(np.uint8)
-    wanted = np.abs(np.linspace(-29, 29, 24))[None] * np.ones((24, 1))
-    image, _ = run(sample, (24, 24), order=4, guide=(row.astype(float), wanted))
-    alone, _ = run(sample, (24, 24), order=4)
-    assert np.corrcoef(image.ravel(), wanted.ravel())[0, 1] > 0.9
-    assert np.corrcoef(alone.ravel(), wanted.ravel())[0, 1] < 0.5
-
-
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-@pytest.mark.parametrize("phases", [1, 64])
+@pytest.mark.parametrize(("search", "phases"), [("exact", 1), ("coherent", 64)])
 def test_nothing_is_taken_from_where_the_mask_is_false(search, phases):
     mask = np.random.default_rng(5).random((14, 13)) < 0.4
     sample = texture((14, 13))
@@ -208,10 +158,9 @@ def test_nothing_is_taken_from_where_the_mask_is_false(search, phases):
     assert mask[tuple(np.moveaxis(output.source, -1, 0))].all()
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-def test_a_source_names_its_sample(search):
+def test_a_source_names_its_sample():
     samples = [texture((9, 12), seed=1), texture((12, 9), seed=2), texture((8, 8), seed=3)]
-    image, output = run(samples, (14, 13), search=search, order=2, finish=0.0)
+    image, output = run(samples, (14, 13), order=2, finish=0.0)
     assert output.source.shape == (14, 13, 3)
     for (i, j, n), value in zip(output.source.reshape(-1, 3), image.ravel(), strict=True):
         assert samples[n][i, j] == value
@@ -219,12 +168,11 @@ def test_a_source_names_its_sample(search):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-def test_shares_are_about_kept(search):
+def test_shares_are_about_kept():
     samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
     found = {}
     for first in (1.0, 2.5, 4.0):  # of one run they vary by 0.15
-        options = {"search": search, "order": 4, "shares": (first, 5.0 - first)}
+        options = {"order": 4, "shares": (first, 5.0 - first)}
         runs = [run(samples, (32, 32), rng, **options)[1] for rng in range(3)]
         found[first] = np.mean([output.source[..., 2] == 0 for output in runs])
     assert abs(found[1.0] - 0.2) < 0.15
@@ -232,8 +180,7 @@ def test_shares_are_about_kept(search):
     assert abs(found[4.0] - 0.8) < 0.15
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-@pytest.mark.parametrize("edges", ["auto", "whole", "reflect"])
+@pytest.mark.parametrize(("search", "edges"), [("exact", "whole"), ("coherent", "auto")])
 def test_no_gap_of_a_sample_comes_out(search, edges):
     sample = texture((16, 15), dtype=np.float32)
     sample[4:8, 3:9] = np.nan
@@ -251,29 +198,23 @@ def test_what_is_looked_at_from_one_sample_is_no_other():
     assert image.max() <= 4
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-@pytest.mark.parametrize("kinds", [2, 3, 5])
+@pytest.mark.parametrize(("kinds", "search"), [(2, "coherent"), (3, "exact")])
 def test_categories_are_names(kinds, search):
     """Others in the same order make the same picture; and nothing comes between them."""
     cells = np.random.default_rng(kinds).integers(0, kinds, (12, 11))
-    cells = np.maximum(cells, np.roll(cells, 1, 0))
-    renamed = np.array([5, 7, 31, 100, 200])[:kinds]
+    renamed = np.array([5, 7, 31])[:kinds]
     options = {"categorical": True, "search": search, "order": 2, "levels": 2}
     image, output = run(cells.astype(np.uint8), (10, 12), **options)
-    again, elsewhere = run(renamed[cells].astype(np.uint8), (10, 12), **options)
-    assert_same_bits(renamed[image].astype(np.uint8), again)
+    again, elsewhere = run(renamed[cells].astype(np.float32), (10, 12), **options)
+    assert_same_bits(renamed[image].astype(np.float32), again)
     assert_same_bits(output.source, elsewhere.source)
-    assert set(np.unique(again)) <= set(renamed.tolist())
-    floats, _ = run(renamed[cells].astype(np.float32), (10, 12), **options)
-    assert_same_bits(floats.astype(np.uint8), again)
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-def test_a_unit_changes_nothing_where_variables_are_weighted(search):
+def test_a_unit_changes_nothing_where_variables_are_weighted():
     """Metres or millimetres."""
     sample = texture((12, 11), 2, np.float32)
     other = sample * np.float32([1, 1024])
-    options = {"weights": (1.0, 0.7), "search": search, "order": 2, "levels": 2, "channel_axis": -1}
+    options = {"weights": (1.0, 0.7), "order": 2, "levels": 2, "channel_axis": -1}
     image, output = run(sample, (10, 12), **options)
     scaled, elsewhere = run(other, (10, 12), **options)
     assert_same_bits(image * np.float32([1, 1024]), scaled)

@@ -1,13 +1,12 @@
 """What leads a run: guides, probabilities, the structure channel, and turned copies of the sample."""
 
 import json
-from itertools import product
 from math import cos, radians, sin
 
 import numpy as np
-import plain_sample
 import pytest
-from cases import REFERENCE, assert_same_bits, slow_but, texture
+from cases import REFERENCE, assert_same_bits, texture
+from scipy.ndimage import correlate1d, distance_transform_edt
 
 import simdtex
 from simdtex.jobs.simulation.ensemble import channels
@@ -96,17 +95,15 @@ def shares(pixels=TRAINING):
     return np.unique(pixels, return_counts=True)[1] / pixels.size
 
 
-@pytest.mark.parametrize("search", slow_but(["coherent"], ["exact", "coherent"]))
-def test_what_asks_for_nothing_changes_no_bit(search):
-    nothing = simulate(probabilities=of([np.nan] * 3), search=search)
-    same = simulate(probabilities=of(shares()), search=search, soft_weight=0.0)
+def test_what_asks_for_nothing_changes_no_bit():
+    nothing = simulate(probabilities=of([np.nan] * 3))
+    same = simulate(probabilities=of(shares()), soft_weight=0.0)
     assert_same_bits(same.values, nothing.values)
     options = json.loads(nothing.attrs["options"]) | {"device": REFERENCE}
     assert_same_bits(nothing.values[1], simdtex.synthesize(TRAINING, SHAPE, rng=int(nothing.seed[1]), **options))
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-@pytest.mark.parametrize("weight", [0.0, 1.0])
+@pytest.mark.parametrize(("search", "weight"), [("exact", 1.0), ("coherent", 0.0)])
 def test_what_is_impossible_is_not_there(search, weight):
     p = of([0.5, 0.5, 0.0])
     p[:, :, 9:] = np.array([0, 0, 1])[:, None, None]
@@ -145,8 +142,7 @@ def of_channels(p, n, **options):
 
 
 def test_shares_are_those_asked():
-    for share in (0.27, 0.8):
-        assert abs(of_channels(np.full((64, 64), share), 8).mean() - share) < 0.03
+    assert abs(of_channels(np.full((64, 64), 0.8), 4).mean() - 0.8) < 0.03
     found = of_channels(None, 2, proportions=(0.9, 0.1), shape=(64, 64))
     assert abs(found.mean() - 0.1) < 0.03
 
@@ -169,24 +165,20 @@ def test_each_cell_is_from_the_training_image_of_its_number():
     found = simdtex.simulate(images, 2, **options, image_map=number, source=True)
     assert (found.source_image == number).all()
     assert (found.simulation % 4 == number).all()
-    free = np.where(number, np.nan, 0.0)
-    both = simdtex.simulate(images, 2, **options, image_map=free, source=True).source_image.values
-    assert (both[:, number == 0] == 0).all() and (both[:, number == 1] == 0).any()
     few = [
-        (simdtex.simulate(images, 2, **options, image_map=of([1 - p, p]), source=True).source_image == 1).mean().item()
-        for p in (0.05, 0.4, 0.95)
+        (simdtex.simulate(images, 1, **options, image_map=of([1 - p, p]), source=True).source_image == 1).mean().item()
+        for p in (0.05, 0.95)
     ]
-    assert few == sorted(few) and few[0] < few[-1]
+    assert few[0] < few[1]
 
 
 # -- The structure channel: signed distance to the border between the bright and the dark parts of a sample.
 
 
-@pytest.mark.parametrize("weight", [0.5, 1.0, 2.0])
-def test_its_deviation_is_its_weight_in_those_of_the_sample(weight):
+def test_its_deviation_is_its_weight_in_those_of_the_sample():
     levels = np.moveaxis(texture((50, 48), 3, seed=2), -1, 0).astype(np.uint16)
-    found = structure([levels], weight, variance(levels), STEPS)[0]
-    assert found.std() == pytest.approx(weight * variance(levels) ** 0.5, rel=0.01)
+    found = structure([levels], 0.5, variance(levels), STEPS)[0]
+    assert found.std() == pytest.approx(0.5 * variance(levels) ** 0.5, rel=0.01)
 
 
 def test_it_keeps_to_the_legal_levels():
@@ -195,21 +187,31 @@ def test_it_keeps_to_the_legal_levels():
     assert (found.min(), found.max()) == (0, STEPS)
 
 
-@pytest.mark.parametrize("levels", [np.full((1, 9, 9), 7), np.zeros((3, 4, 5), int)])
-def test_a_sample_without_an_edge_has_none(levels):
-    assert not structure([levels.astype(np.uint16)], 1.0, 1.0, 255)[0].any()
+def test_a_sample_without_an_edge_has_none():
+    assert not structure([np.full((3, 4, 5), 7, np.uint16)], 1.0, 1.0, 255)[0].any()
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_it_is_what_plain_loops_find(channels):
+def test_it_is_the_signed_distance_to_the_border_in_the_first_principal_component(channels):
     pictures = [np.moveaxis(texture(shape, channels, seed=4), -1, 0).astype(np.uint16) for shape in ((13, 15), (9, 40))]
     edge = np.where(np.arange(60) < 29, 40, 200).astype(np.uint16) * np.ones((channels, 5, 1), np.uint16)
     pictures += [edge, edge.swapaxes(1, 2)]  # whose ends are farther from it than is measured
-    expected = plain_sample.structure([[*one.astype(int)] for one in pictures], 1.0, STEPS)
-    found = structure(pictures, 1.0, variance(*pictures), STEPS)
-    for one, other in zip(found, expected, strict=True):
-        assert (one == other).all()
-        assert one.any()
+    wide = np.convolve(np.convolve(np.ones(19), np.ones(21)), np.ones(21))
+    smooth, signed = pictures, []
+    for axis in (1, 2):
+        smooth = [correlate1d(one.astype(float), [1, 4, 6, 4, 1], axis, mode="nearest") for one in smooth]
+    axes = np.linalg.eigh(np.atleast_2d(np.cov(np.hstack([one.reshape(channels, -1) for one in smooth]))))[1][:, -1]
+    axes = np.rint(127 * axes / abs(axes).max() * np.sign(axes.sum()))
+    for one in smooth:
+        tone = np.tensordot(axes, one, 1)
+        mean = correlate1d(correlate1d(tone, wide, 0, mode="reflect"), wide, 1, mode="reflect")
+        bright = tone * wide.sum() ** 2 > mean
+        far = distance_transform_edt(bright) + distance_transform_edt(~bright)
+        signed.append((np.rint(np.minimum(far, 16) * 256) - 128) * np.where(bright, 1, -1))
+    least, spread = min(one.min() for one in signed), np.hstack([one.ravel() for one in signed]).std()
+    by = variance(*pictures) ** 0.5 / spread
+    for one, expected in zip(structure(pictures, 1.0, variance(*pictures), STEPS), signed, strict=True):
+        assert_same_bits(one.astype(float), np.rint((expected - least) * by))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
@@ -228,7 +230,7 @@ def test_a_sample_matches_it_and_does_not_show_it(dtype):
 # -- Turned and scaled copies of pictures: exact where they can be, the nearest pixel elsewhere, and their way back.
 
 
-@pytest.mark.parametrize("shape", [(5, 8), (7, 7), (1, 4)])
+@pytest.mark.parametrize("shape", [(5, 8), (1, 4)])
 def test_quarter_turns_are_exact(shape):
     picture = np.arange(shape[0] * shape[1]).reshape(shape)
     for quarter in range(4):
@@ -237,7 +239,7 @@ def test_quarter_turns_are_exact(shape):
         assert np.array_equal(copy.of([picture]), np.rot90(picture, -quarter)), "from columns to rows"
 
 
-@pytest.mark.parametrize(("eighths", "halves"), [*product(range(8), range(-2, 3))])
+@pytest.mark.parametrize(("eighths", "halves"), [(0, 1), (1, -2), (3, 0), (6, 2)])
 def test_a_pixel_is_the_nearest_of_the_picture(eighths, halves):
     rows, cols = 9, 14
     copy, by, angle = copy_of(3, (rows, cols), eighths, halves), 2.0 ** (halves / 2), radians(45 * eighths)
@@ -296,22 +298,12 @@ def test_sources_lead_back_to_the_training_image():
     assert (signs * training[half.source_row.values, half.source_column.values] == half.simulation.values).all()
 
 
-@pytest.mark.parametrize("quarters", [0, 1])
-def test_stripes_turn(quarters):
-    stripes = np.tile(np.uint8([0, 0, 9, 9]), (24, 6))
-    found = simdtex.simulate(
-        stripes, 1, shape=(16, 16), rotation=np.full((16, 16), 90.0 * quarters), order=4, device="reference", rng=3
-    ).values[0]
-    along = (found == np.roll(found, 1, 1 if quarters else 0))[1:, 1:].mean()
-    across = (found == np.roll(found, 1, 0 if quarters else 1))[1:, 1:].mean()
-    assert along > 0.95 and across < 0.65
-
-
-def test_guides_turn_with_their_training_image():
-    training = np.arange(400, dtype=np.int32).reshape(20, 20)
-    wanted = np.arange(12)[:, None] * np.ones((1, 12)) > 5
-    found = simdtex.simulate(
-        training, 1, rotation=np.full((12, 12), 90.0), guide=((training > 199).astype(int), wanted.astype(int)),
-        guide_weight=1e6, order=2, levels=1, device="reference", rng=3, finish=0.0,
-    ).values[0]  # fmt: skip
-    assert ((found > 199) == wanted).mean() > 0.95
+def test_stripes_turn():
+    stripes, found = np.tile(np.uint8([0, 0, 9, 9]), (24, 6)), []
+    for angle in (0.0, 90.0):
+        rotation = np.full((16, 16), angle)
+        made = simdtex.simulate(
+            stripes, 1, shape=(16, 16), rotation=rotation, order=4, device="reference", rng=3
+        ).values[0]
+        found.append([(made == np.roll(made, 1, axis))[1:, 1:].mean() for axis in (0, 1)])
+    assert found[0][0] > 0.95 > 0.65 > found[0][1] and found[1][1] > 0.95 > 0.65 > found[1][0]

@@ -1,9 +1,11 @@
 """The LCPDF: distances, densities and draws against equations (6) to (8) and (12) in plain float64."""
 
+from itertools import product
+
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, check_chi_square, opencl, problem, problems, texture
+from cases import REFERENCE, assert_same_bits, check_chi_square, opencl, problem, problems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_relax import apart
@@ -37,6 +39,27 @@ def test_the_distance_of_cold_8_bit_pixels_is_exact():
     assert np.array_equal(p.cost(), plain_distances(p))
 
 
+def test_a_sum_has_its_order():
+    """One for each column, modulo 16, of the square around the neighbourhood, row by row; and a tree adds them up."""
+    p = problem(
+        6, order=66, channels=2, sample_shape=(9, 10), shape=(19, 20), dtype=np.float32, edges="reflect", count=2
+    )
+    x, t, y, order = p.image(), p.temperature(), p.padded(), plain.offsets(66)
+    ours, expected, other = p.cost(), np.zeros((len(p.positions()), 2)), 0
+    for (n, (row, col)), (s, site) in product(enumerate(p.positions()), enumerate(p.where())):
+        lanes, total = np.zeros(16, np.float32), np.float32(0)
+        for (di, dj), r in sorted(zip(order, plain.neighbours(*site, 66, 19, 20, True), strict=True)):
+            for x_c, y_c in zip(x, y, strict=True):
+                e = (float(x_c[r]) - float(y_c[row + di, col + dj])) * (1 - t[r])
+                lanes[(dj + 8) % 16] = e * e + float(lanes[(dj + 8) % 16])
+                total = np.float32(e * e + float(total))
+        while len(lanes) > 1:
+            lanes = lanes[: len(lanes) // 2] + lanes[len(lanes) // 2 :]
+        expected[n, s], other = lanes[0], other + (lanes[0] != total)
+    assert_same_bits(ours, expected.astype(np.float32))
+    assert other, "another order gives other bits"
+
+
 @given(st.integers(0, 100), st.sampled_from([1, 2, 8]), st.sampled_from([1, 3]))
 @settings(max_examples=20)
 def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
@@ -46,7 +69,7 @@ def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
     assert h == pytest.approx(formula, rel=1e-12)
 
 
-@pytest.mark.parametrize("h", [0.05, 0.075, 0.4, 1.0, 7.3, 60.0, 5000.0])
+@pytest.mark.parametrize("h", [0.05, 0.4, 7.3, 5000.0])
 def test_the_tables_of_a_bandwidth(h):
     win = lcpdf.window(h, 255)
     k = np.arange(win.radius + 1)
@@ -82,20 +105,6 @@ def check_lcpdf(machine, image, sample, sites, **options):
     return ours
 
 
-@pytest.mark.parametrize(
-    ("order", "bandwidth", "boundary"), [(1, 1.0, "open"), (2, 0.15, "torus"), (8, 3.0, "torus"), (8, 1.0, "open")]
-)
-def test_lcpdf_is_the_formula(order, bandwidth, boundary):
-    rng = np.random.default_rng(order)
-    image, sample = texture((7, 9), seed=1), texture((10, 11), seed=2)
-    sites = [(0, 0), (6, 8), (3, 4), (0, 4)]
-    for temperature in (None, rng.random(image.shape), np.ones(image.shape)):
-        check_lcpdf(
-            REFERENCE, image, sample, sites, order=order, bandwidth=bandwidth,
-            temperature=temperature, boundary=boundary,
-        )  # fmt: skip
-
-
 @given(
     st.integers(1, 5),
     st.tuples(st.integers(1, 6), st.integers(1, 6)),
@@ -116,24 +125,16 @@ def test_lcpdf_is_the_formula_for_any_shape_and_levels(order, shape, sample_shap
     )  # fmt: skip
 
 
-def test_lcpdf_of_a_device_has_the_references_bits_and_is_the_formula(machine):
+def test_lcpdf_of_a_device_has_the_references_bits_and_is_the_formula(cl_device, machine):
     rng = np.random.default_rng(4)
-    for levels, order, boundary in [(256, 2, "torus"), (17, 8, "open"), (4096, 1, "torus")]:
+    for levels, order, boundary, bandwidth in [(256, 2, "torus", 0.15), (17, 8, "open", 3.0), (4096, 1, "torus", 1.0)]:
         image, sample = rng.integers(0, levels, (8, 7)), rng.integers(0, levels, (9, 12))
         sites, t = rng.integers(0, (8, 7), (11, 2)), rng.random((8, 7))
-        options = {"order": order, "greys": levels, "boundary": boundary, "temperature": t}
-        ours = check_lcpdf(machine, image, sample, sites[:2], **options)
-        ours = simdtex.lcpdf(image, sample, sites, device=machine, **options)
-        assert_same_bits(ours, simdtex.lcpdf(image, sample, sites, device=REFERENCE, **options))
-
-
-def test_lcpdf_of_more_sites_than_scratch_memory_holds(cl_device):
-    image, sample = texture((9, 8), seed=3), texture((12, 12), seed=4)
-    sites = np.argwhere(image >= 0)
-    whole = simdtex.lcpdf(image, sample, sites, order=2, device=REFERENCE)
-    for vector in (4, 16):
-        small = opencl(cl_device, scratch=2**13, vector=vector)
-        assert_same_bits(simdtex.lcpdf(image, sample, sites, order=2, device=small), whole)
+        options = {"order": order, "greys": levels, "boundary": boundary, "temperature": t, "bandwidth": bandwidth}
+        check_lcpdf(REFERENCE, image, sample, sites[:2], **options)
+        expected = simdtex.lcpdf(image, sample, sites, device=REFERENCE, **options)
+        for m in (machine, opencl(cl_device, scratch=2**13, vector=4)):  # which holds few sites
+            assert_same_bits(simdtex.lcpdf(image, sample, sites, device=m, **options), expected)
 
 
 def test_lcpdf_of_a_constant_sample_and_of_no_site():
@@ -147,10 +148,9 @@ def test_lcpdf_of_a_constant_sample_and_of_no_site():
 GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
 
 
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        ({"order": 0}, ValueError, "order is 0; give 1"),
+def test_bad_input_is_one_clear_sentence():
+    given = {"image": GREY, "sample": GREY, "sites": [(0, 0)], "order": 2, "device": "reference"}
+    for change, error, words in [
         ({"order": 16}, ValueError, "the largest order that fits is 8"),
         ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
         ({"greys": 1}, ValueError, "greys is 1; give 2 or more"),
@@ -162,12 +162,9 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
         ({"sites": [(6, 0)]}, ValueError, "outside the image of 6 rows x 7 columns"),
         ({"temperature": np.zeros((2, 2))}, ValueError, r"temperature has shape \(2, 2\)"),
         ({"temperature": np.full(GREY.shape, 1.5)}, ValueError, "between 0 and 1"),
-    ],
-)
-def test_bad_input_is_one_clear_sentence(change, error, words):
-    options = {"image": GREY, "sample": GREY, "sites": [(0, 0)], "order": 2, "device": "reference"} | change
-    with pytest.raises(error, match=words):
-        simdtex.lcpdf(**options)
+    ]:
+        with pytest.raises(error, match=words):
+            simdtex.lcpdf(**given | change)
 
 
 DRAWS = 5_000
@@ -200,14 +197,8 @@ def reweighted(p, strength):
     return np.array(found)
 
 
-SLOW = [(1, 1.0, "mixed", 0.0, True), (2, 1.0, "zero", 0.0, False), (2, 1.0, "zero", 2.0, True)]
-CASES = [
-    # order, bandwidth, temperatures, coherence, torus
-    (2, 1.0, "one", 0.0, True),
-    (1, 1.0, "mixed", 1.0, True),
-    (4, 1.5, "mixed", 5.0, False),
-    *(pytest.param(case, marks=pytest.mark.slow) for case in SLOW),
-]
+CASES = [(1, 1.0, "mixed", 1.0, True), (4, 1.5, "mixed", 5.0, False)]
+"""Order, bandwidth, temperatures, coherence, and whether the lattice is a torus."""
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
@@ -232,19 +223,6 @@ def test_a_draw_of_a_source_follows_the_weights(case):
     counts = np.bincount(where.index_of[choice], minlength=len(weights))
     check_chi_square(counts, weights)
     assert np.array_equal(values, p.sample.working[:, choice])
-
-
-def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
-    """P(x) of one channel is the mixture with one factor of the kernel; legal vectors only, so far from the ends."""
-    p = problem(6, order=1, channels=2, temperatures="zero", shape=(7, 8))
-    levels = (p.sample.levels[0] // 4 + 100).astype(np.uint16)
-    p.sample._lay([levels], p.sample.margin)
-    p = p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
-    win, h = p.window(1.0)
-    _, values = draw_many(p, win, True)
-    for c in range(2):
-        density = plain.mixture(reweighted(p, 0), [p.padded()[c][q] for q in p.positions()], h, 256)
-        check_chi_square(np.bincount(values[c], minlength=256), density)
 
 
 def test_draws_are_legal_where_half_of_the_kernel_is_not():

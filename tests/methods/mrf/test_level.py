@@ -4,22 +4,21 @@ import pickle
 import re
 import sys
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, laid_out, opencl, slow_but, sweeps, texture
+from cases import REFERENCE, assert_same_bits, laid_out, opencl, sweeps, texture
 
 import simdtex
 from simdtex.machine import devices
 from simdtex.machine.opencl import kernel_folder, kernel_source
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
-from simdtex.methods.mrf.level import ActiveSites, parts
+from simdtex.methods.mrf.level import ActiveSites
 from simdtex.methods.mrf.neighbourhood import Field
-from simdtex.methods.mrf.relax import LEVEL, constants
-from simdtex.model.lattice import LATTICE, Grid
+from simdtex.methods.mrf.relax import LEVEL
+from simdtex.model.lattice import LATTICE
 
 FOLDER = Path(simdtex.__file__).parent / "methods" / "mrf"
 
@@ -57,26 +56,6 @@ def test_a_struct_names_its_numbers_as_the_header_does():
         assert tuple(names) == dtype.names
 
 
-def test_what_a_kernel_is_told_of_a_level():
-    told = constants(Grid.of((5, 7), 2), seed=2**63, discount=0.5, xi=-1024)
-    assert (told["lattice"]["rows"], told["lattice"]["cols"]) == (3, 4)
-    assert (told["seed"], told["discount"], told["xi"], told["radius"]) == (2**63, np.float32(0.5), -1024, 0)
-
-
-@pytest.mark.parametrize("most", [1, 3, 4, 10, 1000])
-def test_the_parts_of_a_sweep_hold_all_sites_in_order(most):
-    ranges = np.array([[0, 4], [9, 10], [4, 4], [4, 9], [10, 21]])
-    found = list(parts(ranges, most))
-    for here, _, _ in found:
-        assert len(here) > 0
-        assert (here[:, 1] - here[:, 0]).sum() <= most
-    begun = [steps for _, steps, _ in found]
-    assert begun == sorted(begun) and begun[-1] == len(ranges)
-    assert [last for _, _, last in found] == [False] * (len(found) - 1) + [True]
-    flat = [n for here, *_ in found for first, last in here.tolist() for n in range(first, last)]
-    assert flat == [n for first, last in ranges.tolist() for n in range(first, last)]
-
-
 def prepared(machine, shape=(12, 14), sample_shape=(16, 17), **options):
     given = {"order": 2, "levels": 3} | options
     return laid_out(machine, texture(sample_shape, seed=3)[..., None], shape, mrf.Options(**given), 5)
@@ -89,33 +68,23 @@ def plain(value):
     return value is None or isinstance(value, (np.ndarray, int))
 
 
-@pytest.mark.parametrize(
-    ("schedule", "search"),
-    slow_but(
-        [("coloring", "coherent"), ("luby", "exact"), ("block:3x4", "coherent")],
-        product(("coloring", "luby", "block:3x4"), ("coherent", "exact")),
-    ),
-)
+@pytest.mark.parametrize(("schedule", "search"), [("luby", "exact"), ("block:3x4", "coherent")])
 def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, search):
-    machine = opencl(cl_device)
-    others = [REFERENCE] + [opencl(cl_device, work_group=16, vector=4)] * (schedule == "coloring")
-    run = prepared(machine, schedule=schedule, search=search)
+    run, again = (prepared(m, schedule=schedule, search=search) for m in (opencl(cl_device), REFERENCE))
     whole = [run.save(state) for _, state, _ in sweeps(run)]
     assert len({(state["level"], state["cooling"], state["free"]) for state in whole}) == len(whole) > 10
     for number in (3, len(whole) - 2):
         assert plain(whole[number])
         kept = pickle.loads(pickle.dumps(whole[number]))
-        for other in others:
-            again = prepared(other, schedule=schedule, search=search)
-            after = [again.save(state) for _, state, _ in sweeps(again, again.load(kept))]
-            for mine, theirs in zip(after, whole[number + 1 :], strict=True):
-                assert list(mine.values())[5:] == list(theirs.values())[5:]
-                assert_same_bits(mine["penalty"], theirs["penalty"])
-            for name in ("values", "source", "temperature"):
-                assert_same_bits(after[-1][name], whole[-1][name])
+        after = [again.save(state) for _, state, _ in sweeps(again, again.load(kept))]
+        for mine, theirs in zip(after, whole[number + 1 :], strict=True):
+            assert list(mine.values())[5:] == list(theirs.values())[5:]
+            assert_same_bits(mine["penalty"], theirs["penalty"])
+        for name in ("values", "source", "temperature"):
+            assert_same_bits(after[-1][name], whole[-1][name])
 
 
-@pytest.mark.parametrize("schedule", ["coloring", "checkerboard", "block:3x5", "synchronous"])
+@pytest.mark.parametrize("schedule", ["coloring", "block:3x5"])
 def test_the_list_of_sites_is_made_on_the_device_and_stays_there(cl_device, monkeypatch, schedule):
     machine, copied = opencl(cl_device), []
     run = prepared(machine, (60, 61), schedule=schedule, levels=1)
@@ -139,19 +108,8 @@ def test_a_state_tells_what_is_left():
         assert info.ended == (not state.active and state.free == run.options.free_sweeps)
 
 
-def test_a_sweep_says_where_it_stands():
-    run = prepared(REFERENCE, search="exact")
-    level, seen = run.level(2), []
-    state, info = run.step(run.begin(), lambda level, state, part: seen.append(part))
-    assert [part.last for part in seen] == [False] * (len(seen) - 1) + [True]
-    assert sum(part.steps for part in seen) == sum(len(chosen.ranges) for chosen in info.chosen)
-    assert sum(part.sites for part in seen) == level.grid.rows * level.grid.cols
-    assert (info.level, info.sweep, state.cooling, state.free) == (2, 1, 1, 0)
-
-
-@pytest.mark.parametrize("schedule", ["coloring", "luby", "synchronous", "random-scan"])
-def test_sites_that_may_not_relax_keep_their_values(any_device, schedule):
-    for machine in (REFERENCE, opencl(any_device)):
+def test_sites_that_may_not_relax_keep_their_values(any_device):
+    for machine, schedule in ((REFERENCE, "random-scan"), (opencl(any_device), "coloring")):
         run = prepared(machine, schedule=schedule)
         given = np.random.default_rng(2).random(run.plan.shape) < 0.3
         before = Field(*(np.array(machine.get(plane)) for plane in run.enter(0, None).field))

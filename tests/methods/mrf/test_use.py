@@ -27,19 +27,8 @@ def test_known_sites_are_counted_at_their_sources(machine, p):
         assert (found.dtype, found.tolist()) == (np.int32, list(expected.values()))
 
 
-def test_many_sites_of_one_source_are_all_counted(machine):
-    """Work-items that add to one number at once."""
-    p = problem(1, shape=(90, 80), edges="reflect", temperatures="zero")
-    p = p._replace(field=p.field._replace(source=np.full_like(p.field.source, p.candidates(REFERENCE).positions[5])))
-    _, field, _ = p.on(machine)
-    found = use(machine, field, p.grid, p.candidates(machine))
-    assert found[5] == 7200
-    assert found.sum() == 7200
-
-
-@pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize(
-    "how", [{"nowhere": 0.5}, {"masked": 0.5}, {"nowhere": 0.3, "masked": 0.4, "spacing": 2}], ids=str
+    ("how", "every"), [({"nowhere": 0.5}, True), ({"nowhere": 0.3, "masked": 0.4, "spacing": 2}, False)], ids=str
 )
 def test_what_is_from_nowhere_uses_nothing(machine, how, every):
     """And a number is that of a candidate, or of its place among all."""
@@ -55,33 +44,18 @@ def test_what_is_from_nowhere_uses_nothing(machine, how, every):
         assert use(m, field, p.grid, p.candidates(m, every)).tolist() == list(expected.values())
 
 
-def plainly(counts, radius, rate):
-    """The penalty in Python numbers."""
-    rows, cols = counts.shape
-    found = np.zeros(counts.shape)
-    for i in range(rows):
-        for j in range(cols):
-            here = [
-                int(counts[k, m])
-                for k in range(max(0, i - radius), min(rows, i + radius + 1))
-                for m in range(max(0, j - radius), min(cols, j + radius + 1))
-            ]
-            u = (sum(here) / len(here)) / (int(counts.sum()) / counts.size)
-            found[i, j] = rate * min(4, max(0, u - 1))
-    return found.ravel()
-
-
-@pytest.mark.parametrize("radius", [0, 1, 2, 9])
+@pytest.mark.parametrize("radius", [0, 1, 9])
 def test_the_price_is_the_excess_over_the_fair_share(radius):
     rng = np.random.default_rng(radius)
     counts = rng.integers(0, 4, (7, 9)) * (rng.random((7, 9)) < 0.3)
     counts[2, 3] = 60
+    expected = np.zeros((7, 9))
+    for i, j in np.ndindex(7, 9):
+        here = counts[max(0, i - radius) : i + radius + 1, max(0, j - radius) : j + radius + 1]
+        expected[i, j] = 12.5 * min(4, max(0, here.mean() / counts.mean() - 1))
     found = use_penalty(counts.ravel(), FairUse((7, 9), radius), 12.5)
     assert found.dtype == np.float32
-    assert np.allclose(found, plainly(counts, radius, 12.5), rtol=1e-6, atol=1e-6)
-    if radius == 1:
-        assert found.max() == 50, "no more than four times the rate"
-        assert found.min() == 0, "what is used less than its share costs nothing"
+    assert np.allclose(found, expected.ravel(), rtol=1e-6, atol=1e-6)
 
 
 FAIR = np.int64([[2, 0, 2, 1], [0, 0, 1, 1], [4, 4, 0, 1]])
@@ -185,13 +159,6 @@ def test_a_run_uses_the_sample_more_evenly(cl_device):
     assert share[0.5] > share[0.0] + 0.05
 
 
-def test_pixels_without_a_source_are_not_counted():
-    source = np.array([[[0, 1], [-1, -1], [2, 0]], [[0, 1], [1, 1], [-1, -1]]])
-    assert counts(source, (3, 2)).tolist() == [[0, 2], [0, 1], [1, 0]]
-    taken = source[source[..., 0] >= 0][np.newaxis]
-    assert effective_use(source, (3, 2), piece=1) == effective_use(taken, (3, 2), piece=1)
-
-
 def test_each_sample_is_counted_alone():
     rng = np.random.default_rng(2)
     source = np.dstack([rng.integers(0, 4, (9, 8)), rng.integers(0, 5, (9, 8)), rng.integers(0, 2, (9, 8))])
@@ -219,8 +186,6 @@ def test_errors_of_counting():
         counts(one, (4, 4), sample=1)
     with pytest.raises(ValueError, match="sample is -1: give 0 or more"):
         counts(three, (4, 4), sample=-1)
-    with pytest.raises(ValueError, match="outside a sample of 4 x 4"):
-        counts(np.array([[[0, 4]]]), (4, 4))
     for bad in (np.array([[[-1, 0]]]), np.array([[[0, -1]]]), np.array([[[-2, -2]]]), one[:0]):
         with pytest.raises(ValueError, match="source map"):
             counts(bad, (4, 4))
@@ -229,9 +194,8 @@ def test_errors_of_counting():
 def test_a_sample_that_nothing_is_taken_from():
     none = np.full((3, 3, 2), -1)
     assert not counts(none, (4, 4)).any()
-    for figure in (effective_use,):
-        with pytest.raises(ValueError, match="no pixel was taken from the sample"):
-            figure(none, (4, 4))
+    with pytest.raises(ValueError, match="no pixel was taken from the sample"):
+        effective_use(none, (4, 4))
     with pytest.raises(ValueError, match="no pixel was taken"):
         effective_use(np.zeros((3, 3, 3), int), (4, 4), sample=1)
     colours = use_colours(counts(none, (4, 4)))
