@@ -105,10 +105,7 @@ class Problem(NamedTuple):
         return square_of(machine, self.sample, self.places(), every)
 
     def penalty(self, dear=1.0, every=False):
-        """Of each candidate, and of some more: some cost nothing, some much in terms of a distance.
-
-        With ``every`` of each place, infinity where no candidate is.
-        """
+        """Of each candidate, or with ``every`` place: some cost nothing, some much in terms of a distance."""
         candidates = self.candidates(REFERENCE, every)
         scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
         penalty = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.size + TAIL)
@@ -201,7 +198,7 @@ class Problem(NamedTuple):
         h = bandwidth * lcpdf.optimal_bandwidth(self.sample.variance, count, self.sample.channels * (n + 1))
         return lcpdf.window(h, self.sample.top), h
 
-    # What the plain loops want: whole pictures, and (row, column) in pixels instead of numbers of sites.
+    # For plain loops: whole pictures, and (row, column) in pixels instead of numbers of sites.
 
     def in_picture(self, array):
         """An array over sites, in pictures that are 0 between the sites."""

@@ -32,13 +32,11 @@ class Run(NamedTuple):
 
 
 class Given(NamedTuple):
-    """What a run of ``mrf`` is given: sizes of its samples, and how everything else is made of random numbers.
+    """What a run of ``mrf`` is given, made of random numbers.
 
-    ``known`` share of the sites; ``placed`` share of those that are from somewhere in the sample; ``partly`` whether
-    variables are known on their own; ``labels`` of the guide, 0 for grey levels and None for no guide; ``silent`` share
-    of the sites where it says nothing; ``masked`` and ``gaps`` shares of the samples' pixels; ``kinds`` how many
-    categories, of the first variable where there are several; ``outside`` share of the sites that take no part;
-    ``soft`` what there are probabilities of.
+    Shares of sites: ``known``, of these ``placed`` in the sample, ``outside`` of the region, ``silent`` in the guide.
+    Shares of pixels: ``masked`` and ``gaps``. ``labels`` of the guide: 0 for grey levels, None for no guide; ``kinds``
+    of categories; ``soft``: what there are probabilities of.
     """
 
     options: dict[str, Any]

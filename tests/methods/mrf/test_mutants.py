@@ -115,6 +115,21 @@ def prepared(machine=REFERENCE, **given):
     return laid_out(machine, texture((24, 25), seed=3)[..., None], (20, 23), mrf.Options(**options), 5)
 
 
+def test_a_coarse_level_may_have_a_sample_and_an_output_of_half_the_size():
+    pixels = texture((24, 25))[..., None]
+    plan = mrf.plan(Pictures((pixels,)), (13, 11), mrf.Options(order=2, levels=3, reduction=4, structure=0))
+    assert [size.reduction for size in plan.sizes] == [1, 2, 4]
+    assert [(size.shape, size.levels) for size in plan.sizes] == [((13, 11), 3), ((7, 6), 3), ((4, 3), 3)]
+    assert [plan.of(number) for number in range(3)] == plan.sizes
+    assert [(plan.of(n).grid(n).shape, plan.of(n).grid(n).step) for n in range(3)] == [
+        ((13, 11), 1),
+        ((7, 6), 1),
+        ((4, 3), 1),
+    ]
+    mean = pixels[:24, :24, 0].reshape(12, 2, 12, 2).mean((1, 3))
+    assert (plan.sizes[1].sample.levels[0][0] == np.rint(mean)).all()
+
+
 def test_the_coarsest_level_has_fewer_decimations_if_it_has_many_candidates(monkeypatch):
     assert [prepared().places(number).step for number in range(3)] == [1, 1, 1]
     monkeypatch.setattr(level_of_a_run, "ALL", 4 * (24 * 25 // 4**2))
