@@ -5,6 +5,8 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
+from simdtex.methods.mrf.conditioning import centre_known, heaviest
+from simdtex.methods.mrf.options import Options
 from simdtex.model.given import MOST_NEAR, Given, nearest_data, planes, stand_ins
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
@@ -188,6 +190,13 @@ def test_no_gap_of_a_sample_comes_out(search, edges):
     image, output = run(sample, (13, 12), search=search, order=2, edges=edges, finish=1.5)
     assert np.isfinite(image).all()
     assert np.isfinite(sample[tuple(np.moveaxis(output.source, -1, 0))]).all()
+
+
+def test_a_known_variable_counts_more_than_all_neighbours_together():
+    for weight, heavy in ((1.0, 6.0), (16.0, 16.0)):
+        options = Options(data_weight=weight)
+        assert (heaviest(options, 24), centre_known(options, 24)) == (heavy, round(4 * (24 * heavy) ** 0.5))
+    assert heaviest(Options(data_weight=0.5), 2) == 1
 
 
 def test_what_is_looked_at_from_one_sample_is_no_other():
