@@ -35,7 +35,6 @@ from simdtex.jobs.simulation.maps import (
 )
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.methods.mrf.conditioning import Data
 from simdtex.methods.mrf.density import given_data
 from simdtex.model.given import Given, Soft
 from simdtex.model.guide import GuidePair
@@ -536,7 +535,7 @@ class Estimation:
         positions = sample.places(np.zeros((1, len(self.shape)), np.int32), 1).positions
         own = sample.own(positions)[:, 0]
         names, of = np.unique(own if self.options.categorical else sample.working[0, positions], return_inverse=True)
-        data = Data(np.argwhere(there), sample.scale.levels(self.known.values[there]).T)
+        data = mrf.Data(np.argwhere(there), sample.scale.levels(self.known.values[there]).T)
         categories = len(names) if self.options.categorical else 0
         memory.require(machine, 0, 8 * cells * (categories + 4))
         sites = np.argwhere(np.ones(self.shape, bool))
