@@ -72,8 +72,7 @@ class Metadata(NamedTuple):
     dpi : (float, float), optional
         Pixels per inch, across and down.
     exif : bytes, optional
-        Camera, exposure, date, place, author and rights; without the orientation, which is applied, and without size
-        and preview.
+        Camera, exposure, date, place, author and rights; without orientation, size and preview.
     more : bool
         Whether the file has further frames or pages, which are not read.
     geo : Georeference, optional

@@ -121,16 +121,16 @@ def read_hard_data(
         line. Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
         The names of the columns ``"x"``, ``"y"``, ``"z"`` and ``"value"``, which may be a list for several variables.
-        Columns of a text without a header are called 1, 2 and so on. By default names that mean an axis are that axis,
-        in any order: x, Xcoord, Easting, lon, column; y, Y_loc, Northing, lat, row; z, if another column is left for
-        the value. All other columns are values. Without a header x and y are the first two columns.
+        Columns without a header are called 1, 2 and so on, and x and y are the first two. By default names that mean an
+        axis are that axis, in any order, as Xcoord, Easting, lon or column; z only if another column is left for the
+        value. All other columns are values.
     categories : mapping of str to float, optional
         The number of each category that the table gives as a text, for example ``{"sand": 1, "shale": 0}``.
     missing : iterable of float
         Further numbers that mean an unknown value.
     valid : (low, high), optional
-        The range of possible values. A known code of an unknown value (`simdtex.io.grids.MISSING`, or 1e21 and above
-        in size) outside of it is unknown. None: the range of the variable's values that are not such codes.
+        The range of possible values: codes of an unknown value (`simdtex.io.grids.MISSING`, or 1e21 and above in size)
+        outside of it are unknown. None: the range of the variable's values that are not such codes.
     max_pixels : int, optional
         The most cells, or bytes of a text, to read; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
 
@@ -147,8 +147,7 @@ def read_hard_data(
     Raises
     ------
     ValueError
-        The file is missing, not a table, too large, has no rows, names no columns x and y, or has an invalid row; the
-        message names the line.
+        The file is missing, no table, too large, names no columns x and y, or has an invalid row, whose line is named.
     """
     if isinstance(table, (str, os.PathLike)):
         name, suffix = os.fspath(table), Path(table).suffix.lower()
@@ -398,9 +397,8 @@ def place_hard_data(
     TypeError
         The table or the type is not of real numbers.
     ValueError
-        A coordinate is not finite, a datum is outside of the grid and `outside` is ``"refuse"``, two data of one cell
-        have different values and `several` is ``"refuse"``, the type cannot hold a value, or nothing is known; the
-        message names the row.
+        A datum is outside of the grid, two data of one cell have different values, the type cannot hold a value, or
+        nothing is known; the message names the row.
 
     Examples
     --------

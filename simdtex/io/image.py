@@ -73,22 +73,16 @@ def read(
     Returns
     -------
     Image
-        Pixels keep their 8-bit, 16-bit, integer or float values. PGM and PPM give the numbers in the file, as uint8 if
-        the maximum in its header is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by their
-        colour profile if they have one. Fewer than 8 bits are scaled to 8, and 9 to 15 to 16, so that white is the
-        largest value; HEIC always has 8. A TIFF in which white is 0 is inverted. A fully opaque alpha channel is
-        removed; any other is kept as the last channel, and colours that were multiplied by it (TIFF, OpenEXR) are
-        divided by it. OpenEXR has linear values, float16 or float32, which are not changed for display. The orientation
-        in the EXIF data of a camera is applied.
+        Pixels keep their 8-bit, 16-bit, integer or float values; PGM and PPM give the numbers in the file. Palettes and
+        print colours (CMYK) become RGB. Fewer than 8 bits are scaled to 8, and 9 to 15 to 16, so that white is the
+        largest value. A TIFF in which white is 0 is inverted. A fully opaque alpha channel is removed; any other is the
+        last channel, and colours that were multiplied by it (TIFF, OpenEXR) are divided by it. OpenEXR has linear
+        values. The orientation in the EXIF data of a camera is applied.
 
     Raises
     ------
     ValueError
         The file is missing, no regular file, empty, damaged, of another format, which is named, or too large.
-
-    Notes
-    -----
-    The whole file is held in memory together with its pixels.
     """
     with reading(path, "the image", max_pixels) as most:
         data = Path(path).read_bytes()

@@ -2,9 +2,7 @@
 """Reading and writing of volumes, without a change of any value, and writing of realisations.
 
 A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
-picture. x is the column, y the row, z the depth. Realisations are an `xarray.DataArray`, as
-`simdtex.simulate` returns; they are written by xarray, as NumPy arrays, or as a grid. The extra ``simulate`` installs
-the libraries: ``pip install 'simdtex[simulate]'``.
+picture. Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns; the extra ``simulate`` installs xarray.
 """
 
 from __future__ import annotations
@@ -74,10 +72,9 @@ _COUNTS = re.compile(rb'NumberOfComponents="([0-9]+)|^\S+ ([0-9]+) ([0-9]+) \w+\
 
 
 def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
-    """Raise ValueError before a long run unless its result can be written, without creating a file.
+    """Raise ValueError before a long run unless such values can be written, without creating a file.
 
-    The file or folder of slices must be writable, and its suffix name a format that holds values of this type and
-    number of channels; None is not checked. A folder is only replaced if it contains only slices.
+    A folder is only replaced if it contains only slices.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -362,9 +359,8 @@ def write(path: PathLike, volume: ArrayLike) -> None:
 
     Notes
     -----
-    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file x varies fastest, then
-    y, then z, with the channels as a vector before them, as ParaView, 3D Slicer and Fiji expect. It is not compressed,
-    because not every version of ParaView can read compressed files.
+    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file, which is not
+    compressed, x varies fastest, then y, then z, with the channels as a vector before them.
     """
     values = image.pixels_of("the volume", volume, 3)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
@@ -418,8 +414,7 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
     Raises
     ------
     ValueError
-        The suffix is unknown, or is that of a grid and there is a source map; the folder is missing or not writable,
-        `path` exists and may not be replaced, or a library is not installed.
+        The path cannot be written, a grid cannot hold the ``source`` map, or a library is not installed.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -440,18 +435,14 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     Parameters
     ----------
     path : path
-        ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed), which ``xarray.open_dataarray`` reads;
-        or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text, but
-        no units of coordinates.
-        ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
-        ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
-        attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and an
-        existing store is an error.
-    array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
-        The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
-        x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
-        ``source=True`` the result is a Dataset: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by
-        name, and a grid cannot hold it. A grid has the variables of any other Dataset, for example of `estimate`.
+        ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed) for xarray; ``.npz`` for ``numpy.load``,
+        with ``values``, each coordinate under its name, and ``attributes``, a JSON text; or ``.gslib``, ``.sgems`` and
+        ``.tif``, grids with a variable for each realisation, ``NAME__real0`` and so on, see `simdtex.write_grid`, in
+        which cells outside of the coordinate ``region`` are unknown. An existing file is replaced, and an existing
+        store is an error.
+    array : DataArray, ([realisation, z,] y, x[, variable]), or Dataset
+        The result of `simdtex.simulate` or `simdtex.estimate`; attributes are texts and numbers. A grid needs evenly
+        spaced, ascending coordinates, and cannot hold the Dataset that ``source=True`` gives.
 
     Raises
     ------

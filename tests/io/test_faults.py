@@ -27,7 +27,6 @@ import tifffile
 from volumes import loaded, png
 
 from simdtex.figures.page import Section, write_report
-from simdtex.figures.sheet import StageWriter
 from simdtex.io import decode, files, image, volume
 from simdtex.io.files import Damaged, atomic_folder, atomic_path, exclusive, read_checked, write_checked
 from simdtex.io.hard_data import read_hard_data
@@ -240,19 +239,6 @@ def test_a_folder_in_which_a_thread_still_writes_is_removed(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_of_stages_with_leftovers_is_used_again(tmp_path):
-    StageWriter(tmp_path)
-    for days, usable in ((0, False), (2, True)):
-        leftover(tmp_path / f".simdtex-{'0' * 16}.png", days)
-        if usable:
-            StageWriter(tmp_path)
-        else:
-            with pytest.raises(ValueError, match="holds other files"):
-                StageWriter(tmp_path)
-    write_report(tmp_path, "Title", "Lead", [], {})
-    assert sorted(os.listdir(tmp_path)) == ["index.html", "results.json"]
-
-
 def test_a_folder_that_was_taken_away_comes_back(tmp_path):
     """A process is killed between taking the old folder away and putting the new one there."""
     volume.write(tmp_path / "a", block(1))
@@ -316,17 +302,14 @@ def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
     assert done.returncode == 2, done.stderr
     assert image.read(tmp_path / "out.png").pixels.shape == (64, 64)
     said = [line for line in done.stderr.splitlines() if line.startswith("simdtex: ")]
-    assert len(said) == 1, "one sentence, of all that could not be written"
-    each = said[0].split("; ")
-    assert len(each) > 1 and all(
-        "could not be written (No space left on device): free some space" in one for one in each
-    )
-    assert any("/st/" in one for one in each)
+    assert len(said) == 1 and "/st/" in said[0], "one sentence, of all that could not be written"
+    words = "could not be written (No space left on device): free some space"
+    assert all(words in part for part in said[0].split("; "))
     assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
     image.write(tmp_path / "sample.png", np.random.default_rng(2).integers(0, 256, (64, 64), dtype=np.uint8))
     words = command(tmp_path, "--size", "200x200", "--stages", "st", "--order", "8")
@@ -438,13 +421,12 @@ def test_more_than_pillow_allows_is_read_where_it_is_asked_for(tmp_path, monkeyp
 
 def test_the_environment_says_how_many(tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(saved(MANY, "PNG"))
-    for text, fits in (("10099", False), ("10100", True), ("", True), (" 20000 ", True)):
+    for text in ("10100", "", " 20000 "):
         monkeypatch.setenv(files.VARIABLE, text)
-        if fits:
-            image.read(tmp_path / "a.png")
-        else:
-            refused_limits(image.read, tmp_path / "a.png", TOO_LARGE)
-        image.read(tmp_path / "a.png", max_pixels=10100)
+        image.read(tmp_path / "a.png")
+    monkeypatch.setenv(files.VARIABLE, "10099")
+    refused_limits(image.read, tmp_path / "a.png", TOO_LARGE)
+    image.read(tmp_path / "a.png", max_pixels=10100)
     for text in ("0", "-5", "many", "1e9", "9" * 30, "1.5"):
         monkeypatch.setenv(files.VARIABLE, text)
         with pytest.raises(ValueError, match=rf"^{files.VARIABLE} is .*: set it to a number of pixels"):
@@ -455,22 +437,18 @@ def test_the_environment_says_how_many(tmp_path, monkeypatch):
 
 
 def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
-    """Pillow refuses those of 8 bits; of those of 16 bits only the orientation is read."""
-    bomb = zlib.compress(bytes(2**25), 9)
-    texts = {"zTXt": b"Comment\0\0" + bomb, "iTXt": b"Comment\0\1\0\0\0" + bomb, "iCCP": b"profile\0\0" + bomb}
-    for kind, data in texts.items():
-        for bits in (8, 16):
-            rows = bytes(4 * (1 + 3 * 4 * bits // 8))
-            (tmp_path / "a.png").write_bytes(png(4, 4, bits, rows=rows, **{kind: data}))
-            tracemalloc.start()
-            try:
-                assert image.read(tmp_path / "a.png").pixels.shape == (4, 4, 3)
-            except ValueError as error:
-                assert "cannot be read as an image" in str(error)
-            finally:
-                most = tracemalloc.get_traced_memory()[1]
-                tracemalloc.stop()
-            assert most < 2**24, (kind, bits)
+    """Of those of 16 bits only the orientation is read."""
+    bomb = zlib.compress(bytes(2**24), 9)
+    for kind, data in {"zTXt": b"Comment\0\0" + bomb, "iCCP": b"profile\0\0" + bomb}.items():
+        (tmp_path / "a.png").write_bytes(png(4, 4, 16, rows=bytes(4 * 25), **{kind: data}))
+        tracemalloc.start()
+        try:
+            assert image.read(tmp_path / "a.png").pixels.shape == (4, 4, 3)
+        except ValueError as error:
+            assert "cannot be read as an image" in str(error)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert most < 2**23, kind
 
 
 def test_source_maps_and_hard_data(tmp_path):

@@ -107,18 +107,16 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").touch()
-    for path, words in [
-        (tmp_path / "none" / "a.tif", "the folder .* does not exist"),
-        (tmp_path / "a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
-        (tmp_path / "file", "is a file"),
-        (tmp_path / "full", "holds other files"),
-        (tmp_path / "file" / "a", "the folder .* does not exist"),
-        (tmp_path / ("a" * 300), "cannot be written"),
+    for name, words in [
+        ("none/a.tif", "the folder .* does not exist"),
+        ("a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
+        ("file", "is a file"),
+        ("full", "holds other files"),
+        ("file/a", "the folder .* does not exist"),
+        ("a" * 300, "cannot be written"),
     ]:
         with pytest.raises(ValueError, match=words):
-            volume.check_writable(path, np.uint8, 3)
-        with pytest.raises(ValueError, match=words):
-            volume.write(path, noise((1, 2, 2)))
+            volume.check_writable(tmp_path / name, np.uint8, 3)
     (tmp_path / "slices").mkdir()
     volume.check_writable(tmp_path / "slices")
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
@@ -161,7 +159,6 @@ def test_a_damaged_or_large_volume_gets_one_sentence(tmp_path, suffix):
         volume.read(tmp_path / f"none{suffix}")
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFO on this system")
 def test_only_regular_files_are_read(tmp_path):
     """None of the readers waits for a FIFO, or reads a device; a folder is slices or nothing."""
     (tmp_path / "empty").mkdir()
@@ -348,15 +345,14 @@ def test_a_sentence_names_the_extra(tmp_path, monkeypatch, name, library):
 # raw values and slices
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "float32"])
-def test_a_raw_volume_says_its_shape_in_its_name(tmp_path, dtype):
-    values = noise((4, 3, 5), np.dtype(dtype).newbyteorder("<"))
-    path = tmp_path / f"bonsai_5x3x4_{dtype}.raw"
+def test_a_raw_volume_says_its_shape_in_its_name(tmp_path):
+    values = noise((4, 3, 5), "<f4")
+    path = tmp_path / "bonsai_5x3x4_float32.raw"
     path.write_bytes(values.tobytes())
     np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], values)
     for name, words in [
         ("bonsai.raw", "name it with columns x rows x layers and type, as"),
-        (f"bonsai_5x3x5_{dtype}.raw", r"has \d+ bytes, not \d+ as its name says"),
+        ("bonsai_5x3x5_float32.raw", r"has \d+ bytes, not \d+ as its name says"),
         ("bonsai_99999x99999x99999_uint8.raw", "no more than"),
     ]:
         path = path.rename(tmp_path / name)

@@ -214,20 +214,6 @@ def test_a_picture_of_the_sample_itself_is_the_sample_to_the_bit(dtype):
         assert_same_bits(sample.picture(sample.planes, identity((1, 2))), pixels)
 
 
-@dtypes
-def test_values_beyond_the_scale_are_projected_onto_legal_pixels(dtype):
-    """0 to 255 for 8 bits without a sign; else between the sample's smallest and largest pixel."""
-    pixels = texture((6, 5), 2, dtype)
-    pixels = pixels // 3 if np.issubdtype(dtype, np.integer) else pixels
-    sample, source = Stretched(pixels), identity((6, 5))
-    low, high = (0, 255) if dtype == np.uint8 else (pixels.min(), pixels.max())
-    for origin in (None, source):
-        for value, legal in ((-(2**25), low), (-4 * TOP, low), (4 * TOP, high), (2**25, high)):
-            picture = sample.picture(np.full_like(sample.planes, value), origin)
-            assert picture.dtype == dtype
-            assert (picture == np.asarray(legal, dtype)).all()
-
-
 @pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.float64], ids=lambda dtype: dtype.__name__)
 def test_extreme_values_are_projected_without_overflow(dtype):
     """Float64 has no number between 2**63 - 1024 and 2**63, so the closest legal one that it has is meant."""
