@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from simdtex.io.grids import CartesianGrid
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image, Metadata
-    from simdtex.model.source_map import Maps
+    from simdtex.model.source_map import MaterialMaps
 
 SHEET = 4096
 """The most pixels a side of a picture of copies; a larger one is reduced."""
@@ -470,7 +470,7 @@ class Folder:
     ``maps`` are those that are read, ``lead`` first.
     """
 
-    found: Maps
+    found: MaterialMaps
     lead: Path
     output: Path
     maps: list[Also] = field(default_factory=list)

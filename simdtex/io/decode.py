@@ -47,7 +47,7 @@ ORIENTATION, DESCRIPTION = 0x0112, 0x010E
 _KEPT = (DESCRIPTION, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
 """EXIF tags that are kept in addition to exposure and place: description, camera, software, date, author, rights."""
 
-_OWN = (0xA002, 0xA003, 0xA005)
+_OF_FILE = (0xA002, 0xA003, 0xA005)
 """EXIF tags that belong to one file: width, height, and the position of a directory."""
 
 _PNM = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" + rb"\s")
@@ -72,8 +72,7 @@ class Metadata(NamedTuple):
     dpi : (float, float), optional
         Pixels per inch, across and down.
     exif : bytes, optional
-        Camera, exposure, date, place, author and rights; without the orientation, which is applied, and without size
-        and preview.
+        Camera, exposure, date, place, author and rights; without orientation, size and preview.
     more : bool
         Whether the file has further frames or pages, which are not read.
     geo : Georeference, optional
@@ -113,7 +112,7 @@ NUMPY = b"\x93NUMPY"
 """How an ``.npy`` begins."""
 
 
-class _Found(NamedTuple):
+class _Stored(NamedTuple):
     """Pixels as they are stored, whether the last channel is alpha, and the orientation of the file."""
 
     pixels: Array
@@ -123,28 +122,22 @@ class _Found(NamedTuple):
 
 
 def decode(data: bytes, most: int, *, palette: bool = False, opaque: bool = False) -> tuple[Array, Metadata]:
-    """Decode a picture file of at most ``most`` pixels, whose format is recognised by its content.
-
-    Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel unless ``opaque``; and the metadata of the file. Unknown pixels of a raster are NaN, or masked
-    if they are integers. With ``palette`` palettes become indices. Raise Refused before anything is decoded of too
-    large a file and of another format, and each decoder's own errors for a damaged file.
-    """
+    """Decode a picture of at most ``most`` pixels; an opaque alpha channel is removed unless ``opaque``."""
     with quiet():
         try:
-            found = _read(data, most, palette)
+            stored = _read(data, most, palette)
         except Exception as error:
             if not isinstance(error, PIL.UnidentifiedImageError) and data[128:132] != b"DICM":
                 raise  # DICOM may have the header of a TIFF before its own, and be one, or not
             named = (words for pattern, words in _NAMED.items() if re.match(pattern, data[:1024], re.DOTALL))
             kinds = "PNG, JPEG, TIFF, BMP, WebP, GIF, TGA, JPEG 2000, AVIF, HEIC, OpenEXR, PPM or .npy"
             raise Refused(f"is {next(named, f'not an image: give a {kinds} file')}") from None
-    return _finished(found.pixels, found.orientation, found.alpha and not opaque), found.metadata
+    return _finished(stored.pixels, stored.orientation, stored.alpha and not opaque), stored.metadata
 
 
-def _read(data: bytes, most: int, palette: bool) -> _Found:
+def _read(data: bytes, most: int, palette: bool) -> _Stored:
     if data.startswith(NUMPY):
-        return _Found(read_npy(io.BytesIO(data), len(data), most))
+        return _Stored(read_npy(io.BytesIO(data), len(data), most))
     if header := _PNM.match(data):
         return _read_pnm(data, header, most)
     tiff = data[:4] in rasters.TIFF and data[8:10] != b"CR"
@@ -155,7 +148,7 @@ def _read(data: bytes, most: int, palette: bool) -> _Found:
         if pixels.dtype == np.uint8 and (colours := geo.about.get("colours")):
             table = np.array([colours.get(k, (0, 0, 0))[:3] for k in range(256)], np.uint8)
             metadata = metadata._replace(palette=table.tobytes())
-        return _Found(pixels, alpha, metadata=metadata)
+        return _Stored(pixels, alpha, metadata=metadata)
     if tiff:
         return _read_tiff(data, most, palette)
     if data.startswith(b"\x76\x2f\x31\x01"):
@@ -184,7 +177,7 @@ def _opened(data: bytes, most: int, page: int = 0) -> PIL.Image.Image:
     return picture
 
 
-def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Found:
+def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Stored:
     """Return decoded PGM or PPM, text or binary; Pillow changes values unless the maximum is 255 or 65535."""
     kind, width, height, largest = (int(word) for word in header.groups())
     if not 0 < largest < 65536:
@@ -201,10 +194,10 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Found:
         raise ValueError("it ends before its last pixel")
     if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
         raise ValueError(f"it has a value that is not 0 to {largest}")
-    return _Found(pixels.reshape(shape).astype(dtype), metadata=Metadata(white=largest))
+    return _Stored(pixels.reshape(shape).astype(dtype), metadata=Metadata(white=largest))
 
 
-def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found:
+def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Stored:
     with _opened(data, most, page) as picture:
         bits = _bits(picture.format, data)
         if bits > 8:  # of which Pillow keeps 8
@@ -214,7 +207,7 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             decoders = {"PNG": imagecodecs.png_decode, "AVIF": imagecodecs.avif_decode}
             pixels: Array = decoders.get(picture.format or "", imagecodecs.jpeg2k_decode)(data)
             alpha = pixels.ndim == 3 and pixels.shape[2] in (2, 4)
-            return _Found(_full_scale(pixels, bits), alpha, *_metadata(picture))
+            return _Stored(_full_scale(pixels, bits), alpha, *_metadata(picture))
         picture.load()
         if picture.mode == "L" and bits < 8 and isinstance(grey := picture.info.get("transparency"), int):
             picture.info["transparency"] = grey * (255 // (2**bits - 1))  # Pillow scales pixels only
@@ -230,7 +223,7 @@ def _read_pillow(data: bytes, most: int, palette: bool, page: int = 0) -> _Found
             mode = "RGBA" if transparent else "RGB"
         pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
         orientation, metadata = _metadata(picture)
-    return _Found(pixels, mode in ("LA", "RGBA"), orientation, metadata._replace(palette=colours))
+    return _Stored(pixels, mode in ("LA", "RGBA"), orientation, metadata._replace(palette=colours))
 
 
 def _bits(kind: str | None, data: bytes) -> int:
@@ -260,28 +253,28 @@ def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
     with suppress(Exception):  # a damaged second frame does not invalidate the first
         more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
     with suppress(Exception):  # nor is damaged EXIF
-        found = picture.getexif()
-        orientation = int(found.get(ORIENTATION, 1))
-        exif = _exif(found)
+        whole = picture.getexif()
+        orientation = int(whole.get(ORIENTATION, 1))
+        exif = _exif(whole)
     dpi = _dpi(picture.info.get("dpi"), orientation)
     return orientation, Metadata(None if picture.mode in ("CMYK", "LAB") else profile, dpi, exif, more)
 
 
-def _exif(found: PIL.Image.Exif) -> bytes | None:
+def _exif(whole: PIL.Image.Exif) -> bytes | None:
     """Return the part of the EXIF data that is kept."""
     kept = PIL.Image.Exif()
     for tag in _KEPT:
-        if tag in found:  # a text in any encoding, which Pillow reads as Latin-1, but writes as ASCII
-            kept[tag] = found[tag].encode("latin-1") if isinstance(found[tag], str) else found[tag]
+        if tag in whole:  # a text in any encoding, which Pillow reads as Latin-1, but writes as ASCII
+            kept[tag] = whole[tag].encode("latin-1") if isinstance(whole[tag], str) else whole[tag]
     for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
-        if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _OWN}:
+        if values := {tag: value for tag, value in whole.get_ifd(ifd).items() if tag not in _OF_FILE}:
             kept[ifd] = values
     return kept.tobytes() if kept else None
 
 
-def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
+def _dpi(stored: Any, orientation: int) -> tuple[float, float] | None:
     """Return pixels per inch across and down of an upright picture, or None if they are not numbers above 0."""
-    across, down = (float(one) for one in found or (0, 0))
+    across, down = map(float, stored or (0, 0))
     if not (0 < across < np.inf and 0 < down < np.inf):
         return None
     return (down, across) if orientation > 4 else (across, down)
@@ -289,17 +282,17 @@ def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
 
 def _in_rgb(picture: PIL.Image.Image) -> PIL.Image.Image:
     """Return a CMYK picture in sRGB, by its colour profile if that can be used."""
-    converted = None
-    if found := picture.info.get("icc_profile"):
+    if data := picture.info.get("icc_profile"):
         from PIL import ImageCms
 
         with suppress(ImageCms.PyCMSError, OSError):
-            profile = ImageCms.ImageCmsProfile(io.BytesIO(found))
-            converted = ImageCms.profileToProfile(picture, profile, ImageCms.createProfile("sRGB"), outputMode="RGB")
-    return converted or picture.convert("RGB")
+            profile, srgb = ImageCms.ImageCmsProfile(io.BytesIO(data)), ImageCms.createProfile("sRGB")
+            if converted := ImageCms.profileToProfile(picture, profile, srgb, outputMode="RGB"):
+                return converted
+    return picture.convert("RGB")
 
 
-def _read_exr(data: bytes, most: int) -> _Found:
+def _read_exr(data: bytes, most: int) -> _Stored:
     needs("OpenEXR", "pictures", "an OpenEXR picture")
     import OpenEXR
 
@@ -313,25 +306,26 @@ def _read_exr(data: bytes, most: int) -> _Found:
     channels = OpenEXR.File(io.BytesIO(data), separate_channels=True).channels()
     pixels = np.stack([channels[name].pixels for name in order], -1)
     if len(order) == 1:
-        return _Found(pixels[..., 0])
-    return _Found(_divided(pixels), alpha=True) if "A" in order else _Found(pixels)
+        return _Stored(pixels[..., 0])
+    return _Stored(_divided(pixels), alpha=True) if "A" in order else _Stored(pixels)
 
 
 def _pictures(tiff: Any) -> list[Any]:
     """Return the series of a TIFF that are not masks or previews; none if a page after the first is damaged."""
     with suppress(Exception):
-        found = [one for one in tiff.series if not (one.keyframe.is_reduced or one.keyframe.is_mask)] or tiff.series
-        return found if tiff.is_imagej == (found[0].kind == "imagej") else []
+        shown = [each for each in tiff.series if not (each.keyframe.is_reduced or each.keyframe.is_mask)] or tiff.series
+        return shown if tiff.is_imagej == (shown[0].kind == "imagej") else []
     return []
 
 
-def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
+def _read_tiff(data: bytes, most: int, palette: bool) -> _Stored:
     import tifffile
 
     with rasters.open_tiff(io.BytesIO(data)) as tiff:
-        page, more, found = tiff.pages.first, tiff.pages.is_multipage, _pictures(tiff)
-        if found:
-            page, more = found[0].keyframe, len(found) > 1 or prod(found[0].shape) > prod(found[0].keyframe.shape)
+        page, more = tiff.pages.first, tiff.pages.is_multipage
+        if pictures := _pictures(tiff):
+            page = pictures[0].keyframe
+            more = len(pictures) > 1 or prod(pictures[0].shape) > prod(page.shape)
         if not isinstance(page, tifffile.TiffPage):
             raise ValueError("it has no pictures")
         _check_page(page, len(data), most)
@@ -351,9 +345,9 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
             raise Refused("is a camera's raw file: develop it to TIFF")
         if kind > 2 or compression in (6, 7):
             # JPEG, palettes, and print and video colours, which Pillow converts to RGB
-            made = _read_pillow(data, most, palette, page.index if len(page.treeindex) == 1 else 0)
-            own = made.metadata
-            return made._replace(metadata=metadata._replace(profile=own.profile, palette=own.palette))
+            stored = _read_pillow(data, most, palette, page.index if len(page.treeindex) == 1 else 0)
+            profile, colours = stored.metadata.profile, stored.metadata.palette
+            return stored._replace(metadata=metadata._replace(profile=profile, palette=colours))
         _check_compression(compression)
         pixels = page.asarray()
         if pixels.size == 0:
@@ -363,35 +357,31 @@ def _read_tiff(data: bytes, most: int, palette: bool) -> _Found:
         pixels = pixels.transpose([page.axes.index(axis) for axis in "YXS" if axis in page.axes])
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
         metadata = metadata._replace(plain=extra not in (1, 2))
-    return _Found(_shown(page, pixels), extra in (1, 2), orientation, metadata)
+    return _Stored(_shown(page, pixels), extra in (1, 2), orientation, metadata)
 
 
 def is_stack(path: Any) -> bool:
     """Return whether a TIFF has layers, or several variables as pages."""
     with quiet(), rasters.open_tiff(path) as tiff:
-        if not (found := _pictures(tiff)):
+        if not (pictures := _pictures(tiff)):
             return bool(tiff.pages.is_multipage or tiff.is_imagej)
-        return not set(found[0].axes) <= set("YXS")
+        return not set(pictures[0].axes) <= set("YXS")
 
 
 def read_stack(path: Any, most: int) -> tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]:
-    """Return a TIFF's stack of at most ``most`` pixels, as ``"value"`` (layers, rows, cols, variables), and its place.
-
-    Pixels are shown as those of pictures are, but palettes give their indices, and alpha is kept. The place is the
-    origin, 0, and the size of a cell (x, y, z).
-    """
+    """Return a TIFF's stack as ``"value"`` (layers, rows, cols, variables), and the origin and size of its cells."""
     with rasters.open_tiff(path) as tiff:
-        if not (found := _pictures(tiff)):
+        if not (pictures := _pictures(tiff)):
             raise ValueError("a page is damaged, or of another size or type, or it ends before its last layer")
-        series, page, axes = found[0], found[0].keyframe, found[0].axes
-        check_beside(path, (one.parent.filehandle.path for one in series.pages if one.parent is not tiff))
-        if len(found) > 1 or any(one.aspage().hash != page.hash for one in series.pages if one is not page):
+        series, page, axes = pictures[0], pictures[0].keyframe, pictures[0].axes
+        check_beside(path, (layer.parent.filehandle.path for layer in series.pages if layer.parent is not tiff))
+        if len(pictures) > 1 or any(layer.aspage().hash != page.hash for layer in series.pages if layer is not page):
             raise Refused("has pages of several sizes or types: save a stack of pages of one")
         layers, variables = ("".join(axis for axis in axes if axis in kind) for kind in ("ZIQ", "CS"))
         if len(layers) > 1 or sorted(layers + variables + "YX") != sorted(axes):
             raise Refused(f"has the axes {axes}: save a stack of layers (Z), rows (Y), columns (X) and channels (C)")
-        for one in series.pages:
-            _check_page(one, tiff.filehandle.size, most)
+        for layer in series.pages:
+            _check_page(layer, tiff.filehandle.size, most)
         check_size(prod(series.shape), prod(series.shape) * page.dtype.itemsize, most)
         if int(page.photometric) > 3 or (int(page.photometric) == 3 and variables):
             raise Refused("has print or video colours: save it as RGB")

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one writer of files and folders, and the limits on the size of what is read.
 
-A file or folder is written completely or not at all, and a checked file carries its SHA-256. An incomplete file has a
-hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, and is renamed at the end. A killed
-process leaves its hidden file, which a write into the folder removes when it is a day old and not locked: its writer
-holds a lock on it. The header of a file to read is checked against the limits before anything is decoded.
+An incomplete file has a hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, is locked by
+its writer, and is renamed at the end. A killed process leaves it; a later write into the folder removes it when it is
+a day old. The header of a file to read is checked against the limits before anything is decoded.
 """
 
 from __future__ import annotations
@@ -88,36 +87,28 @@ def needs(library: str, extra: str, what: str) -> None:
 def check_beside(path: PathLike, others: Iterable[PathLike]) -> None:
     """Raise Refused unless all files to which a file refers are in its folder, also if they are links."""
     folders = Path(os.path.realpath(path)).parent, Path(path).parent.resolve()
-    for one in map(os.path.realpath, others):
-        if Path(one).parent not in folders:
-            raise Refused(f"refers to {one} in another folder: save all values in one file")
+    for other in map(os.path.realpath, others):
+        if Path(other).parent not in folders:
+            raise Refused(f"refers to {other} in another folder: save all values in one file")
 
 
 @contextmanager
 def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
-    """Check a regular file and yield the most pixels to read; errors of the block name the file and a remedy.
-
-    ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. ``kind`` is that
-    of `explained`.
-    """
+    """Check a regular file and yield the most pixels to read; errors of the block are those of `explained`."""
     name, most = os.fspath(path), max_pixels_or_default(max_pixels)
     with explained(name, what, kind):
-        found = os.stat(name)
-        if stat.S_ISDIR(found.st_mode):
+        status = os.stat(name)
+        if stat.S_ISDIR(status.st_mode):
             raise Refused(f"is a folder: give the path of {what}, which is a file in it")
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(status.st_mode):
             raise Refused(f"is not a regular file: give the path of {what}")
-        check_size(0, found.st_size, most, each)
+        check_size(0, status.st_size, most, each)
         yield most
 
 
 @contextmanager
 def explained(name: str, what: str, kind: str = "") -> Iterator[None]:
-    """Raise errors of the block as Unreadable, whose sentence names the file and a remedy.
-
-    With ``kind`` any error comes from a library for which the file is damaged, and the message says that it is no
-    ``kind``.
-    """
+    """Raise errors of the block as Unreadable with a remedy; with ``kind`` any error means that it is no ``kind``."""
     try:
         yield
     except Unreadable:
@@ -205,7 +196,7 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
     is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed,
     and the new file has the permissions of the old one. Raises ValueError if `check_target` does, and NotWritten if the
-    block or the renaming raises OSError, for example because the disk is full.
+    block or the renaming raises OSError.
     """
     check_target(Path(path))
     replaced = Path(path).exists()
@@ -254,10 +245,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
 
 @contextmanager
 def _temporary(path: PathLike, make: Callable[[Path], object]) -> Iterator[tuple[Path, Path]]:
-    """Yield where `path` leads, and a locked hidden file or folder beside it that ``make`` creates.
-
-    It is removed at the end if it has not been renamed, and unfinished files of killed processes before.
-    """
+    """Yield where `path` leads, and a locked hidden file or folder beside it that ``make`` creates."""
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".simdtex-{secrets.token_hex(8)}{target.suffix}")
     try:
@@ -284,10 +272,7 @@ def _remove(path: Path) -> None:
 
 
 def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
-    """Write a file atomically, with a first line that holds the SHA-256 of its content.
-
-    ``write`` writes the content into a binary file from its current position on. Errors are those of `atomic_path`.
-    """
+    """Write a file atomically, with a first line that holds the SHA-256 of the content, which ``write`` writes."""
     with atomic_path(path) as temporary, temporary.open("w+b") as file:
         file.write(_HEADER % (b"0" * 64))
         write(file)
@@ -302,26 +287,20 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
 
 
 def write_durable(path: Path, data: Any) -> None:
-    """Write bytes into a file atomically, and make its folders; everything is on the disk at the end.
-
-    Errors are those of `atomic_path`.
-    """
+    """Write bytes into a file atomically, and make its folders; everything is on the disk at the end."""
     try:
         made = [folder for folder in path.parents if not folder.exists()]
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
-        for folder in (path.parent, *(one.parent for one in made)):
-            _sync_folder(folder)
+        for parent in (path.parent, *(folder.parent for folder in made)):
+            _sync_folder(parent)
     except OSError as error:
         raise _not_written(path, error) from None
 
 
 def read_checked(path: PathLike) -> BinaryIO:
-    """Return a file that `write_checked` has written, open at the beginning of its content; the caller closes it.
-
-    Raises Damaged unless the SHA-256 is that of the content, and OSError if the file cannot be read.
-    """
+    """Return an open file of `write_checked` at the beginning of its content; raise Damaged if the SHA-256 differs."""
     file = open(path, "rb")  # noqa: SIM115 - the caller closes it
     try:
         header = file.read(_HEADER_SIZE)
@@ -383,15 +362,10 @@ def check_folder_writable(target: Path) -> None:
 
 
 def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[Path]:
-    """Return the files of an earlier run in a folder, by name; raise before long work unless it can be written.
-
-    The folder may exist if it holds only files of its own kind: ``own(name)`` returns whether an earlier run may have
-    written a file. ``what`` is the content of the folder in messages, for example ``"the report"``. Unfinished files of
-    a killed process are left to the atomic writer.
-    """
+    """Return the files of an earlier run in a folder of ``what``, all ``own``; raise unless it can be written."""
     try:
         if folder.is_dir():
-            found = sorted(path for path in folder.iterdir() if not is_leftover(path))
+            earlier = sorted(path for path in folder.iterdir() if not is_leftover(path))
         elif folder.exists() or folder.is_symlink():
             raise ValueError(f"{folder} is a file: give a folder for {what}")
         elif not folder.parent.is_dir():
@@ -399,15 +373,15 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
         else:
             with suppress(FileNotFoundError):
                 os.lstat(folder)  # raises for a too long name, which `exists` hides since Python 3.14
-            found = []
+            earlier = []
     except OSError as error:
         raise ValueError(f"{folder} cannot be written ({error.strerror}): give another folder") from None
-    others = [path.name for path in found if not (own(path.name) and path.is_file())]
+    others = [path.name for path in earlier if not (own(path.name) and path.is_file())]
     if others:
         raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
     if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
         raise ValueError(f"the folder {folder} is not writable: choose another folder")
-    return found
+    return earlier
 
 
 def _not_written(path: PathLike, error: OSError | NotWritten, temporary: Path | None = None) -> NotWritten:
@@ -420,10 +394,7 @@ def _not_written(path: PathLike, error: OSError | NotWritten, temporary: Path | 
 
 @contextmanager
 def exclusive(path: PathLike) -> Iterator[None]:
-    """Lock a file or folder by a hidden file beside it; raise ValueError if another process holds the lock.
-
-    The lock ends with the block or the process. It has no effect on Windows and on file systems without locks.
-    """
+    """Lock a path by a hidden file beside it during the block; raise ValueError if another process holds the lock."""
     hidden = Path(os.path.realpath(path))
     hidden = hidden.with_name(f".{hidden.name}.lock")
     with ExitStack() as held:
@@ -442,10 +413,7 @@ def exclusive(path: PathLike) -> Iterator[None]:
 
 @contextmanager
 def _locked(path: Path, flags: int = 0) -> Iterator[int | None]:
-    """Open and lock a file or folder during the block; raise BlockingIOError if it is locked already.
-
-    Yields the descriptor; None on Windows, where this has no effect.
-    """
+    """Lock a file or folder, and yield its descriptor (None on Windows); raise BlockingIOError if it is locked."""
     if os.name == "nt":
         yield None
         return

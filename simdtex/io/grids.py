@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.files import BYTES, atomic_path, check_size, check_target, explained, reading
+from simdtex.io.files import BYTES, PathLike, atomic_path, check_size, check_target, explained, reading
 from simdtex.io.image import cast
 from simdtex.io.rasters import NETCDF, RASTERS, TIFF, Georeference, is_raster, read_cells, read_netcdf, write_cells
 from simdtex.options import Brief, DataWarning, check_real, require, shown
@@ -30,7 +30,7 @@ from simdtex.options import Brief, DataWarning, check_real, require, shown
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
 Array = NDArray[Any]
-PathLike = str | os.PathLike[str]
+Masked = np.ma.MaskedArray[Any, Any]
 
 SUFFIXES = (".gslib", ".sgems", ".tif")
 """The suffixes for writing grids; files to read are recognised by their first lines."""
@@ -56,7 +56,7 @@ _LINE = 2**14
 """The most bytes of a line of a header."""
 
 
-class Frame(NamedTuple):
+class CellFrame(NamedTuple):
     """The position of cells: the centre of the first and the size of each, (x, y) or (x, y, z)."""
 
     origin: tuple[float, ...]
@@ -94,9 +94,9 @@ class CartesianGrid(Brief):
     about: dict[str, dict[str, str]] = field(default_factory=dict)
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> CellFrame:
         """The position of its cells."""
-        return Frame(self.origin, self.cell)
+        return CellFrame(self.origin, self.cell)
 
     @property
     def georeference(self) -> Georeference | None:
@@ -105,39 +105,35 @@ class CartesianGrid(Brief):
         return Georeference.of_cells(*self.frame, rows, self.crs) if self.frame.told else None
 
 
-def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:
+def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> CellFrame:
     """Check the position of cells, and return it; None is 0 for the origin and 1 for the size of a cell."""
     first = None if origin is None else _numbers("origin", origin)
     size = None if cell is None else _numbers("cell", cell)
     axes = len(first or size or "xy")
-    found = Frame(first or (0.0,) * axes, size or (1.0,) * axes)
-    if len(found.origin) != len(found.cell):
-        raise ValueError(f"origin has {len(found.origin)} numbers and cell {len(found.cell)}; give as many")
-    if min(found.cell) < 1 / _FAR:
-        raise ValueError(f"cell is {found.cell}; give sizes above 0, from {1 / _FAR:g} on")
-    if any(size < abs(at) * 2.0**-40 for at, size in zip(*found, strict=True)):
-        raise ValueError(f"cells of {found.cell} cannot be told apart at {found.origin}; give coordinates nearer to 0")
-    return found
+    first, size = first or (0.0,) * axes, size or (1.0,) * axes
+    if len(first) != len(size):
+        raise ValueError(f"origin has {len(first)} numbers and cell {len(size)}; give as many")
+    if min(size) < 1 / _FAR:
+        raise ValueError(f"cell is {size}; give sizes above 0, from {1 / _FAR:g} on")
+    if any(side < abs(at) * 2.0**-40 for at, side in zip(first, size, strict=True)):
+        raise ValueError(f"cells of {size} cannot be told apart at {first}; give coordinates nearer to 0")
+    return CellFrame(first, size)
 
 
 def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
     try:
-        found = tuple(float(value) for value in values)
+        numbers = tuple(float(value) for value in values)
     except (TypeError, ValueError):
-        found = ()
-    if len(found) not in (2, 3) or not all(abs(number) < _FAR for number in found):
+        numbers = ()
+    if len(numbers) not in (2, 3) or not all(abs(number) < _FAR for number in numbers):
         raise ValueError(f"{name} is {shown(values)}; give (x, y) or (x, y, z), numbers below {_FAR:g}")
-    return found
+    return numbers
 
 
 def known_numbers(
     what: str, values: Array, missing: Iterable[float] = (), valid: tuple[float, float] | None = None
 ) -> Array:
-    """Return values with NaN for those that are unknown, and warn of their number; `values` itself if all are known.
-
-    Unknown are the numbers ``missing``; and `MISSING`, and numbers of `TRIMMED` and above in size, if they are outside
-    of the range ``valid``, by default that of all other values, if there are any.
-    """
+    """Return values with NaN for ``missing`` ones and for codes outside of ``valid``, and warn of their number."""
     if not missing and (
         values.size == 0 or (np.fmin.reduce(values, None) > max(MISSING) and np.fmax.reduce(values, None) < TRIMMED)
     ):
@@ -160,11 +156,7 @@ def known_numbers(
 
 
 def kind_of(path: PathLike) -> str | None:
-    """Return the kind of a file by its first bytes or, of some rasters, by its suffix.
-
-    ``"grid"`` of GSLIB, geone or SGeMS, ``"points"`` for a point set of Geo-EAS, ``"netcdf"`` also for HDF5,
-    ``"raster"``, or None.
-    """
+    """Return ``"grid"`` (GSLIB, geone, SGeMS), ``"points"`` (Geo-EAS), ``"netcdf"``, ``"raster"`` or None."""
     if not os.path.isfile(path):
         return None
     try:
@@ -191,10 +183,7 @@ def kind_of(path: PathLike) -> str | None:
 
 
 def count_of(line: str, after: str = "") -> int | None:
-    """Return the number of variables in the second line of Geo-EAS, which words may follow; None if it has none.
-
-    ``after`` is the third line: in a table it has as many words.
-    """
+    """Return the number of variables in the second line of Geo-EAS, or None; ``after`` is the third line."""
     words = line.split()
     if not words or not _is_count(words[0]):
         return None
@@ -229,7 +218,7 @@ def read_grid(
         The range of possible values. A known code of an unknown value (`MISSING`, or 1e21 and above in size) outside
         of it becomes NaN. None: the range of the variable's values that are not such codes.
     max_pixels : int, optional
-        The most values that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most values that are read; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
 
     Returns
     -------
@@ -252,33 +241,27 @@ def read_grid(
     A text has a title, the number of variables, their names, each in a line, and a value of each variable for each
     cell, x fastest. It gives the number of cells in one of four ways:
 
-    * its first line is ``nx ny nz``, as in MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as in DeeSse: sizes of a cell,
-      and the corner of the grid, half a cell before the first centre;
-    * its second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz``, as in GSLIB: the
-      centre of the first cell, and sizes; a last number is that of realisations, which follow each other;
-    * its title ends in ``(NXxNYxNZ)``, as in SGeMS;
-    * its first lines begin with ``#`` and have ``NX``, ``SX``, ``OX`` and so on, as in geone, and the next line has the
-      names.
+    * the first line is ``nx ny nz``, or ``nx ny nz sx sy sz ox oy oz`` with sizes and the corner of the grid (DeeSse);
+    * the second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz`` with the first
+      centre and sizes (GSLIB); a last number is that of realisations, which follow each other;
+    * the title ends in ``(NXxNYxNZ)`` (SGeMS);
+    * the first lines begin with ``#`` and have ``NX``, ``SX``, ``OX`` and so on (geone); the next line has the names.
 
-    Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats; origin and size
-    are the shortest decimal numbers with these values. Regions and groups of SGeMS are ignored. NetCDF and HDF5 need
-    the extra ``simulate``, rasters the extra ``rasters``. They are returned in ascending order of y, also if their
-    first row is the northern one.
+    Without these numbers the origin is 0 and the size of a cell 1. Regions and groups of SGeMS are ignored. NetCDF and
+    HDF5 need the extra ``simulate``, rasters the extra ``rasters``.
     """
     with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
         if library := _LIBRARIES.get(kind_of(path) or ""):
             with explained(os.fspath(path), "the grid", "a grid"):
                 grid = CartesianGrid(*library(path, most))
         else:
-            found, columns, sides, georeference = (_sgems if file.peek().startswith(MAGIC) else _gslib)(file, most)
-            grid = CartesianGrid(
-                dict(zip(_apart(found), columns.reshape(-1, *sides[::-1]), strict=True)), *georeference
-            )
+            labels, columns, sides, place = (_sgems if file.peek().startswith(MAGIC) else _gslib)(file, most)
+            grid = CartesianGrid(dict(zip(_apart(labels), columns.reshape(-1, *sides[::-1]), strict=True)), *place)
         names = list(grid.values) if variables is None else list(variables)
         if strange := [name for name in names if name not in grid.values]:
             raise ValueError(f"it has no variable {strange[0]!r}: give one of {', '.join(grid.values)}")
     values = {name: known_numbers(f"{path}, {name}", grid.values[name], missing, valid) for name in names}
-    return replace(grid, values={name: one if library else _typed(one) for name, one in values.items()})
+    return replace(grid, values={name: array if library else _typed(array) for name, array in values.items()})
 
 
 def is_grid(path: PathLike, rasters: bool = True) -> bool:
@@ -289,26 +272,26 @@ def is_grid(path: PathLike, rasters: bool = True) -> bool:
 _LIBRARIES = {"netcdf": read_netcdf, "raster": read_cells}
 """The readers of the kinds of grids that a library reads."""
 
-Read = tuple[list[str], Array, tuple[int, ...], Frame]
+Read = tuple[list[str], Array, tuple[int, ...], CellFrame]
 """The names of the variables, their values, nx ny nz, and the position of the cells."""
 
 
 def _typed(column: Array) -> Array:
     """Return a column as integers if all its values are known integers of a small type."""
     for kind in _WHOLE:
-        found, wrong = cast(column, kind)
+        integers, wrong = cast(column, kind)
         if not wrong.any():
-            return found
+            return integers
     return column
 
 
 def _gslib(file: BufferedReader, most: int) -> Read:
     """Return the variables of a grid's text."""
-    about, own = _geone_header(file), []
+    about, gslib = _geone_header(file), []
     if about.get("SORTING", "+X+Y+Z") != "+X+Y+Z":
         raise ValueError(f"its cells are sorted as {about['SORTING']}: save it with SORTING +X+Y+Z")
     if about:
-        found = [about.get(f"{key}{axis}", least) for key, least in zip("NSO", "110", strict=True) for axis in "XYZ"]
+        numbers = [about.get(f"{key}{axis}", least) for key, least in zip("NSO", "110", strict=True) for axis in "XYZ"]
         names, line = _text(file.readline(_LINE)).split(), len(about) + 2
         if not names:
             raise ValueError(f"line {line - 1} has no names of variables: it is cut short, or write them there")
@@ -319,21 +302,21 @@ def _gslib(file: BufferedReader, most: int) -> Read:
             raise ValueError(
                 f"line 2 is {second.strip()[:40]!r} and not the number of variables: give a grid of GSLIB or SGeMS"
             )
-        own = [] if count_of(second) else words[1:]
-        found, line = own or _of_title(title), 3 + int(words[0])
+        gslib = [] if count_of(second) else words[1:]
+        numbers, line = gslib or _of_title(title), 3 + int(words[0])
         for number in range(3, line):
             names.append(_text(file.readline(_LINE)).strip())
             if not names[-1]:
                 raise ValueError(f"line {number} has no name of a variable: it is cut short, or line 2 is wrong")
-    if len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
+    if len(numbers) not in (3, 6, 9, 10) or not _all_numbers(numbers):
         raise ValueError("its first two lines do not say how many cells it has: begin with nx ny nz, as 250 250 1")
-    if not all(map(_is_count, (*found[:3], *found[9:]))):
-        raise ValueError(f"its header says {' x '.join(found[:3])} cells: give whole numbers of 1 or more")
-    *sides, realisations = (int(word) for word in (*found[:3], *(found[9:] or "1")))
-    at, size = (found[3:6], found[6:9]) if own else (found[6:9], found[3:6])
-    if not own:  # a corner; in decimals, since a binary sum would change 0.1
+    if not all(map(_is_count, (*numbers[:3], *numbers[9:]))):
+        raise ValueError(f"its header says {' x '.join(numbers[:3])} cells: give whole numbers of 1 or more")
+    *sides, realisations = (int(word) for word in (*numbers[:3], *(numbers[9:] or "1")))
+    at, size = (numbers[3:6], numbers[6:9]) if gslib else (numbers[6:9], numbers[3:6])
+    if not gslib:  # a corner; in decimals, since a binary sum would change 0.1
         at = [str(Decimal(corner) + Decimal(width) / 2) for corner, width in zip(at, size, strict=False)]
-    georeference = frame(tuple(map(float, at)) or (0.0,) * 3, tuple(map(float, size)) or (1.0,) * 3)
+    place = frame(tuple(map(float, at)) or (0.0,) * 3, tuple(map(float, size)) or (1.0,) * 3)
     variables = len(names)
     if realisations > 1:
         names = [f"{name}__real{k}" for k in range(realisations) for name in names]
@@ -343,16 +326,16 @@ def _gslib(file: BufferedReader, most: int) -> Read:
     if os.fstat(file.fileno()).st_size - file.tell() < 2 * count - 1:  # a digit for each, and blanks between them
         raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
     blocks = _parsed(file, count, what, line).reshape(realisations, prod(sides), variables)
-    return names, blocks.transpose(0, 2, 1), tuple(sides), georeference
+    return names, blocks.transpose(0, 2, 1), tuple(sides), place
 
 
 def _geone_header(file: BufferedReader) -> dict[str, str]:
     """Return the fields of the lines with ``#`` that begin a text of geone, and read past them."""
-    found: dict[str, str] = {}
+    fields: dict[str, str] = {}
     while file.peek(1)[:1] == b"#":
         words = _text(file.readline(_LINE))[1:].split()
-        found[words[0] if len(words) == 2 else f"line {len(found)}"] = words[-1] if words else ""
-    return found
+        fields[words[0] if len(words) == 2 else f"line {len(fields)}"] = words[-1] if words else ""
+    return fields
 
 
 def _of_title(title: str) -> list[str]:
@@ -373,23 +356,21 @@ def number_of(word: Any) -> float | None:
 
 
 def _all_numbers(words: Iterable[Any]) -> bool:
-    return all((found := number_of(word)) is not None and isfinite(found) for word in words)
+    return all((number := number_of(word)) is not None and isfinite(number) for word in words)
 
 
 def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[np.float64]:
     """Return the ``count`` numbers of a text from here to its end; ``line`` is the number of the first line."""
-    found, at, lines = np.empty(count), 0, [b"\n"]
+    numbers, at, lines = np.empty(count), 0, [b"\n"]
     while more := file.readlines(2**20):
         lines, words = more, b"".join(more).split()
         if at + len(words) > count:
             raise ValueError(f"it has more values than its header says, {what}: correct the header")
         try:
-            found[at : at + len(words)] = list(map(float, words))
+            numbers[at : at + len(words)] = list(map(float, words))
         except ValueError:
-            strange = (
-                (n, word) for n, row in enumerate(lines, line) for word in row.split() if number_of(word) is None
-            )
-            number, wrong = next(strange)
+            every = ((n, word) for n, row in enumerate(lines, line) for word in row.split())
+            number, wrong = next(pair for pair in every if number_of(pair[1]) is None)
             raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
         at += len(words)
         line += len(lines)
@@ -397,15 +378,15 @@ def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[n
         raise ValueError(f"it has {at} values and its header says {what}: get it again, or correct the header")
     if not lines[-1][-1:].isspace():
         raise ValueError("it ends without the end of a line, as if cut short: get it again, or add the end of the line")
-    return found
+    return numbers
 
 
 def _apart(names: list[str]) -> list[str]:
     """Return distinct names: a repeated name gets a number."""
-    found: dict[str, None] = {}
-    for number, name in enumerate(names):
-        found[name if name not in found else f"{name}_{number}"] = None
-    return list(found)
+    distinct: dict[str, None] = {}
+    for k, name in enumerate(names):
+        distinct[name if name not in distinct else f"{name}_{k}"] = None
+    return list(distinct)
 
 
 def _text(data: bytes) -> str:
@@ -435,13 +416,12 @@ def _sgems(file: BufferedReader, most: int) -> Read:
     if version < 100:
         raise ValueError(f"it is of the version {version} of SGeMS's files: save it by a newer SGeMS")
     sides: tuple[int, ...] = take(">3I")
-    size, origin = (tuple(float(str(np.float32(one))) for one in take(">3f")) for _ in range(2))
+    size, origin = (tuple(float(str(np.float32(number))) for number in take(">3f")) for _ in range(2))
     (variables,) = take(">I")
     names = [word() for _ in range(variables)]
     if not prod(sides) * variables:
         raise ValueError(f"it has {' x '.join(map(str, sides))} cells and {variables} properties: save one with values")
-    georeference = frame(origin, size)
-    count = prod(sides) * variables
+    place, count = frame(origin, size), prod(sides) * variables
     check_size(count, 4 * count, most)
     if length - file.tell() < 4 * count:
         raise ValueError(
@@ -452,7 +432,7 @@ def _sgems(file: BufferedReader, most: int) -> Read:
     rest = file.read(16)
     if rest and not rest.startswith(_BLOCKS):
         raise ValueError("it is longer than its header says: get it again, or save it again")
-    return names, columns, sides, georeference
+    return names, columns, sides, place
 
 
 def write_grid(
@@ -492,8 +472,8 @@ def write_grid(
     The first line of a text is ``nx ny nz sx sy sz ox oy oz`` with the corner of the grid, half a cell before the first
     centre, see `read_grid`.
     """
-    arrays: dict[str, np.ma.MaskedArray[Any, Any]] = {str(name): np.ma.asanyarray(one) for name, one in values.items()}
-    georeference = check_grid(path, arrays.values(), origin, cell)
+    arrays: dict[str, Masked] = {str(name): np.ma.asanyarray(array) for name, array in values.items()}
+    place = check_grid(path, arrays.values(), origin, cell)
     shapes = {array.shape for array in arrays.values()}
     if len(shapes) != 1 or len(next(iter(shapes))) not in (2, 3):
         raise ValueError(f"the variables have the shapes {sorted(shapes)}; give (nz, ny, nx) or (ny, nx), one for all")
@@ -501,43 +481,43 @@ def write_grid(
         if not name.strip() or not name.isprintable():
             raise ValueError(f"a variable has the name {name!r}; give one of letters, digits and signs")
     sides = (1, *next(iter(shapes)))[-3:]
-    whole = Frame(*((*one, last)[:3] for one, last in zip(georeference, (0.0, 1.0), strict=True)))
-    layers = {name: np.ma.MaskedArray(one, np.isnan(one.data)).reshape(sides) for name, one in arrays.items()}
+    place = CellFrame((*place.origin, 0.0)[:3], (*place.cell, 1.0)[:3])
+    layers = {name: np.ma.MaskedArray(array, np.isnan(array.data)).reshape(sides) for name, array in arrays.items()}
     if _suffix(path) == ".tif":
         if sides[0] > 1:
             raise ValueError(f"{path} is a GeoTIFF, which has no layers: end its name in .gslib or .sgems")
         with atomic_path(path) as temporary:
-            write_cells(temporary, layers, whole.origin, whole.cell, crs)
+            write_cells(temporary, layers, *place, crs)
         return
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        file.writelines((_sgems_parts if _suffix(path) == ".sgems" else _gslib_parts)(layers, sides[::-1], whole))
+        file.writelines((_sgems_parts if _suffix(path) == ".sgems" else _gslib_parts)(layers, sides[::-1], place))
 
 
 def check_grid(
     path: PathLike, arrays: Iterable[Any], origin: Sequence[float] | None, cell: Sequence[float] | None
-) -> Frame:
+) -> CellFrame:
     """Check before a long run that such values and origin can be written; return the position of the cells."""
     target = Path(path)
     if _suffix(path) not in SUFFIXES:
         raise ValueError(f"{target} names no format of grids: end its name in one of {', '.join(SUFFIXES)}")
     check_target(target)
-    georeference = frame(origin, cell)
+    place = frame(origin, cell)
     if _suffix(path) == ".tif":
         require("rasters", "rasterio")
-        return georeference
+        return place
     for array in arrays:
         _check_values(target, np.ma.asanyarray(array))
     if _suffix(path) == ".sgems":
-        for axis, at, size in zip("xyz", *georeference, strict=False):
+        for axis, at, size in zip("xyz", *place, strict=False):
             if not abs(float(np.float32(at)) - at) <= size / 1000:
                 raise ValueError(
                     f"{target} would hold {axis} = {at} as a 32-bit float, more than a thousandth of a cell beside it: "
                     "end its name in .gslib, or give coordinates nearer to 0"
                 )
-    return georeference
+    return place
 
 
-def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
+def _check_values(target: Path, array: Masked) -> None:
     """Raise unless the format can hold the values of ``array``."""
     check_real("the grid", array)
     known = array.compressed()
@@ -546,27 +526,24 @@ def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
         if known.dtype.kind in "iu":
             wrong = kept.astype(np.float64) != known
         if wrong.any():
-            raise ValueError(
-                f"{target} cannot hold {known[wrong][0]}, since SGeMS has 32-bit floats: end its name in .gslib"
-            )
+            what = f"{known[wrong][0]}, since SGeMS has 32-bit floats"
+            raise ValueError(f"{target} cannot hold {what}: end its name in .gslib")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
         wrong = np.isnan(known_numbers("", known)) & ~np.isnan(known)
     if wrong.any():
-        raise ValueError(
-            f"{target} cannot hold {known[wrong][0]}, which is a code for an unknown value there: give NaN for unknown "
-            "values, or another number"
-        )
+        what = f"{known[wrong][0]}, which is a code for an unknown value there"
+        raise ValueError(f"{target} cannot hold {what}: give NaN for unknown values, or another number")
 
 
 def _suffix(path: PathLike) -> str:
     return Path(path).suffix.lower()
 
 
-def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference: Frame) -> Iterator[bytes]:
+def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], place: CellFrame) -> Iterator[bytes]:
     """Yield the text of a grid."""
-    sizes = [Decimal(repr(size)) for size in georeference.cell]
-    corners = [Decimal(repr(at)) - size / 2 for at, size in zip(georeference.origin, sizes, strict=True)]
+    sizes = [Decimal(repr(size)) for size in place.cell]
+    corners = [Decimal(repr(at)) - size / 2 for at, size in zip(place.origin, sizes, strict=True)]
     yield f"{' '.join(map(str, (*sides, *sizes, *corners)))}\n{len(layers)}\n".encode()
     yield "".join(f"{name}\n" for name in layers).encode()
     for layer in range(sides[2]):
@@ -575,14 +552,14 @@ def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference
             yield "".join(" ".join(words) + "\n" for words in cells).encode()
 
 
-def _words(row: np.ma.MaskedArray[Any, Any]) -> list[str]:
+def _words(row: Masked) -> list[str]:
     """Return each value as the shortest text that represents it."""
     data = row.data.astype(np.uint8) if row.dtype == bool else row.data
-    found: list[str] = np.where(np.ma.getmaskarray(row), str(NO_DATA), data.astype(str)).tolist()
-    return found
+    words: list[str] = np.where(np.ma.getmaskarray(row), str(NO_DATA), data.astype(str)).tolist()
+    return words
 
 
-def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference: Frame) -> Iterator[bytes]:
+def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], place: CellFrame) -> Iterator[bytes]:
     """Yield the parts of a binary grid of SGeMS."""
 
     def word(text: str) -> bytes:
@@ -590,7 +567,7 @@ def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], georeference
         return struct.pack(">I", len(data)) + data
 
     yield MAGIC + word("Cgrid") + word("grid") + struct.pack(">i", 100)
-    yield struct.pack(">3I6fI", *sides, *georeference.cell, *georeference.origin, len(layers))
+    yield struct.pack(">3I6fI", *sides, *place.cell, *place.origin, len(layers))
     yield b"".join(map(word, layers))
     for array in layers.values():
         yield array.astype(">f4").filled(NO_DATA).tobytes()

@@ -25,12 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.files import BYTES, Refused, check_size, explained, needs, read_npy, reading
-from simdtex.io.grids import Frame, count_of, frame, known_numbers, number_of
+from simdtex.io.grids import CellFrame, count_of, frame, known_numbers, number_of
 from simdtex.io.image import cast
 from simdtex.io.rasters import axis_of
 from simdtex.options import Brief, DataWarning, check_real, one_of
 
-PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
 
 SEVERAL = ("refuse", "mean", "most")
@@ -43,7 +42,6 @@ ROLES = ("x", "y", "z", "value")
 """What a column of a table can be."""
 
 _DIGITS = frozenset("+-.0123456789")
-
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(e[+-]?[0-9]+)?", re.IGNORECASE)
 _GROUPED = re.compile("[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 """A number with a decimal comma; and one whose comma may be between thousands."""
@@ -89,12 +87,12 @@ class HardData(Brief):
         """Return words for a datum: its line in the file, or its row, counted from 0."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
-    def upside_down(self, rows: int, lies: Frame | None = None) -> HardData:
+    def upside_down(self, rows: int, lies: CellFrame | None = None) -> HardData:
         """Return a table in cells with y counted from the other edge of a grid of so many rows, as coordinates."""
         points = self.points.copy()
         points[:, 1] = rows - 1 - np.floor(points[:, 1] + 0.5)  # the centre of its cell
         if lies:
-            points = np.array([at + size * one for at, size, one in zip(*lies, points.T, strict=False)]).T
+            points = np.array([at + size * line for at, size, line in zip(*lies, points.T, strict=False)]).T
         return replace(self, points=points, from_top=not self.from_top)
 
 
@@ -112,33 +110,29 @@ def read_hard_data(
     Parameters
     ----------
     table : path or pandas.DataFrame
-        A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
-        separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
-        line, or that of a first line ``sep=;``. Numbers have a decimal point, or all a decimal comma. A first line with
-        fewer than two numbers is a header, which units may follow; without one, a comment before the data that names an
-        axis is, as of `numpy.savetxt`. An empty cell, NaN, NA and the like are unknown values. A comment begins with
-        ``#``, in the line or after all its cells. A first column without a name is the index of pandas and is left out.
+        A text with a datum in each line: x, y and a value, or one value for each of several variables. The first of
+        semicolons, tabs, commas and blanks that occurs in the first line separates columns, or that of a first line
+        ``sep=;``. Numbers have a decimal point, or all a decimal comma. A first line with fewer than two numbers is a
+        header, which units may follow; without one, a comment before the data that names an axis is. An empty cell,
+        NaN, NA and the like are unknown values. A comment begins with ``#``. A first column without a name is left out.
         It may be compressed (``.gz``), the first sheet of ``.xlsx``, or ``.parquet``, with ``simdtex[tables]``.
 
-        Or a point set of Geo-EAS, recognised by a second line that begins with the number of columns: a title, that
-        number, the names of the columns, each in a line, perhaps with units after a tab or two blanks, and a datum in
-        each line, with blanks, commas or semicolons between numbers.
-
-        Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
+        Or a point set of Geo-EAS: a title, the number of columns, their names, each in a line, and a datum in each
+        line. Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
         The names of the columns ``"x"``, ``"y"``, ``"z"`` and ``"value"``, which may be a list for several variables.
-        Columns of a text without a header are called 1, 2 and so on. By default names that mean an axis are that axis,
-        in any order: x, Xcoord, Easting, lon, column; y, Y_loc, Northing, lat, row; z, if another column is left for
-        the value. All other columns are values. Without a header x and y are the first two columns.
+        Columns without a header are called 1, 2 and so on, and x and y are the first two. By default names that mean an
+        axis are that axis, in any order, as Xcoord, Easting, lon or column; z only if another column is left for the
+        value. All other columns are values.
     categories : mapping of str to float, optional
         The number of each category that the table gives as a text, for example ``{"sand": 1, "shale": 0}``.
     missing : iterable of float
         Further numbers that mean an unknown value.
     valid : (low, high), optional
-        The range of possible values. A known code of an unknown value (`simdtex.io.grids.MISSING`, or 1e21 and above
-        in size) outside of it is unknown. None: the range of the variable's values that are not such codes.
+        The range of possible values: codes of an unknown value (`simdtex.io.grids.MISSING`, or 1e21 and above in size)
+        outside of it are unknown. None: the range of the variable's values that are not such codes.
     max_pixels : int, optional
-        The most cells, or bytes of a text, to read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most cells, or bytes of a text, to read; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
 
     Returns
     -------
@@ -153,12 +147,7 @@ def read_hard_data(
     Raises
     ------
     ValueError
-        The file is missing, not a table, too large, has no rows, names no columns x and y, or has an invalid row; the
-        message names the line.
-
-    Notes
-    -----
-    Cost: about 10 s for a million rows of text.
+        The file is missing, no table, too large, names no columns x and y, or has an invalid row, whose line is named.
     """
     if isinstance(table, (str, os.PathLike)):
         name, suffix = os.fspath(table), Path(table).suffix.lower()
@@ -201,9 +190,9 @@ def _text(file: BufferedReader, suffix: str, most: int) -> tuple[str, bool]:
             check_size(about.num_rows * about.num_columns, 0, most)
             return _text_of(pandas.read_parquet(file))
         with zipfile.ZipFile(file) as archive:
-            check_size(0, sum(one.file_size for one in archive.infolist()), most)
+            check_size(0, sum(part.file_size for part in archive.infolist()), most)
         sheets = pandas.read_excel(file, sheet_name=None, header=None, dtype=object, na_filter=False)
-    (name, sheet), *more = ((name, one) for name, one in sheets.items() if len(sheets) < 2 or not one.empty)
+    (name, sheet), *more = ((name, page) for name, page in sheets.items() if len(sheets) < 2 or not page.empty)
     if more:
         warnings.warn(f"{file.name}: only the first of its sheets, {name}, is read", DataWarning, stacklevel=2)
     return sheet.to_csv(index=False, header=False), False
@@ -227,12 +216,12 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
         what = f"the point set has no line after the names of {width} columns" if width else "the table is empty"
         raise ValueError(f"{what}: give a line with x, y and a value for each datum")
     first, line = next(iter(kept.items()))
-    delimiter = said[1] if said else next((one for one in ";\t," if one in line.partition(" #")[0]), None)
+    delimiter = said[1] if said else next((sign for sign in ";\t," if sign in line.partition(" #")[0]), None)
     count = width or len(_cells(line, first, delimiter))
     rows = {number: _cells(line, number, delimiter, count) for number, line in kept.items()}
-    if (found := len(rows[first])) < 3:
+    if (cells := len(rows[first])) < 3:
         raise ValueError(
-            f"line {first} has {found} cell{'s' * (found != 1)}: give x, y and one value or more, "
+            f"line {first} has {cells} cell{'s' * (cells != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
         )
     for number, line in comments.items():
@@ -282,27 +271,26 @@ def _of_columns(
     if commas := [cell for cell in used if "," in cell and _COMMA.fullmatch(cell)]:
         if all(map(_GROUPED.fullmatch, commas)) or any("." in cell and number_of(cell) is not None for cell in used):
             raise ValueError(f"the comma of {commas[0]!r} may be one of thousands: write numbers with a decimal point")
-        cells = [[one.replace(",", ".") if _COMMA.fullmatch(one) else one for one in column] for column in cells]
-    found = {k: [number_of(cell) for cell in cells[k]] for k in points}
-    found |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
+        cells = [[cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in column] for column in cells]
+    numbers = {k: [number_of(cell) for cell in cells[k]] for k in points}
+    numbers |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
     if not categories and not (columns and "value" in columns):  # without names of wells
-        left = [k for k in values if all(one is None or isnan(one) for one in found[k])]
+        left = [k for k in values if all(number is None or isnan(number) for number in numbers[k])]
         if 0 < len(left) < len(values):
             values = [k for k in values if k not in left]
             shown = ", ".join(listed[k] for k in left)
             warnings.warn(f"left out, because they hold text: the columns {shown}", DataWarning, stacklevel=2)
     labels = tuple((names and names[k]) or name for k, name in zip(values, _plain(len(values)), strict=True))
-    at, numbers = (np.array([found[k] for k in some], np.float64).T.copy() for some in (points, values))
-    data = HardData(at, numbers, labels, lines, listed[points[1]].strip().lower() == "row")
+    at, measured = (np.array([numbers[k] for k in some], np.float64).T.copy() for some in (points, values))
+    data = HardData(at, measured, labels, lines, listed[points[1]].strip().lower() == "row")
     for k in (*points, *values):
-        if None in found[k]:
-            row = found[k].index(None)
+        if None in numbers[k]:
+            row = numbers[k].index(None)
             remedy = "write numbers with a decimal point"
             if k in values:
                 remedy += ", leave the cell of an unknown value empty, or give the numbers of categories (--categories)"
-            raise ValueError(
-                f"{data.where(row)} has {cells[k][row][:40]!r} in column {k + 1}, which is no number: {remedy}"
-            )
+            what = f"{cells[k][row][:40]!r} in column {k + 1}, which is no number"
+            raise ValueError(f"{data.where(row)} has {what}: {remedy}")
     return data
 
 
@@ -319,9 +307,8 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         chosen[role] = []
         for name in [wanted] if isinstance(wanted, str) else wanted:
             if role not in ROLES or name not in listed:
-                raise ValueError(
-                    f"there is no column {name!r} for {role!r}: name x, y, z, value of {', '.join(listed)}"
-                )
+                remedy = f"name x, y, z, value of {', '.join(listed)}"
+                raise ValueError(f"there is no column {name!r} for {role!r}: {remedy}")
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]
     for axis in "xyz":
@@ -335,10 +322,8 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         chosen[axis] = of_axis
         taken += of_axis
     if lacking := [axis for axis in "xy" if axis not in chosen]:
-        raise ValueError(
-            f"no column of {', '.join(listed)} is called {lacking[0]}, or a word for it: name the columns, "
-            f"{_example(listed, 'x')}"
-        )
+        what = f"no column of {', '.join(listed)} is called {lacking[0]}, or a word for it"
+        raise ValueError(f"{what}: name the columns, {_example(listed, 'x')}")
     values = chosen.get("value", [k for k in names if k not in taken])
     if not values:
         raise ValueError("the table has coordinates and no values: give x, y and one value or more")
@@ -363,8 +348,8 @@ def _table(array: Any) -> HardData:
     check_real("the hard data", numbers)
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
-    found: Floats = np.array(np.ma.filled(numbers.astype(np.float64), np.nan))
-    return HardData(found[:, :2], found[:, 2:], _plain(found.shape[1] - 2))
+    rows: Floats = np.array(np.ma.filled(numbers.astype(np.float64), np.nan))
+    return HardData(rows[:, :2], rows[:, 2:], _plain(rows.shape[1] - 2))
 
 
 def place_hard_data(
@@ -412,9 +397,8 @@ def place_hard_data(
     TypeError
         The table or the type is not of real numbers.
     ValueError
-        A coordinate is not finite, a datum is outside of the grid and `outside` is ``"refuse"``, two data of one cell
-        have different values and `several` is ``"refuse"``, the type cannot hold a value, or nothing is known; the
-        message names the row.
+        A datum is outside of the grid, two data of one cell have different values, the type cannot hold a value, or
+        nothing is known; the message names the row.
 
     Examples
     --------
@@ -455,21 +439,21 @@ def place_hard_data(
     placed = np.zeros((prod(sides), variables), dtype=kind)
     mask = np.ones((prod(sides), variables), dtype=bool)
     for k in range(variables):
-        rows_known = np.flatnonzero(known[:, k])
-        here, found = sites[rows_known], values[rows_known, k]
+        rows = np.flatnonzero(known[:, k])
+        here, counted = sites[rows], values[rows, k]
         if several != "refuse":
-            here, found = (_mean if several == "mean" else _most)(here, found)
-        placed[here, k], mask[here, k] = found, False
-        wrong = np.flatnonzero(placed[here, k] != found)
+            here, counted = (_mean if several == "mean" else _most)(here, counted)
+        placed[here, k], mask[here, k] = counted, False
+        wrong = np.flatnonzero(placed[here, k] != counted)
         if len(wrong):
-            one = int(rows_known[wrong[0]])
-            other = int(rows_known[(here == sites[one]) & (found != values[one, k])][0])
-            *layer, i, j = np.unravel_index(sites[one], sides)
+            first = int(rows[wrong[0]])
+            other = int(rows[(here == sites[first]) & (counted != values[first, k])][0])
+            *layer, i, j = np.unravel_index(sites[first], sides)
             raise ValueError(
-                f"{data.where(one)} and {data.where(other)} of the hard data are both at "
+                f"{data.where(first)} and {data.where(other)} of the hard data are both at "
                 f"{''.join(f'layer {z}, ' for z in layer)}row {i}, column {j} of the picture and have "
-                f"{values[one, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or let `several` say "
-                "that their mean or the most frequent counts"
+                f"{values[first, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or let `several` "
+                "say that their mean or the most frequent counts"
             )
     form = sides if variables == 1 else (*sides, variables)
     unknown = np.nan if kind.kind == "f" else 0
@@ -478,9 +462,9 @@ def place_hard_data(
 
 def _mean(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
     """Return each site once, with the mean of its values."""
-    found, inverse, counts = np.unique(sites, return_inverse=True, return_counts=True)
+    each, inverse, counts = np.unique(sites, return_inverse=True, return_counts=True)
     means = np.bincount(inverse, values / 2.0**64) / counts * 2.0**64  # no sum of doubles overflows
-    return found, (means if values.dtype.kind == "f" else np.floor(means + 0.5)).astype(values.dtype)
+    return each, (means if values.dtype.kind == "f" else np.floor(means + 0.5)).astype(values.dtype)
 
 
 def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
@@ -488,17 +472,14 @@ def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.int
     _, kinds = np.unique(values, return_inverse=True)
     pairs, first, counts = np.unique(sites * len(values) + kinds, return_index=True, return_counts=True)
     order = np.lexsort((first, -counts, pairs // len(values)))
-    found, chosen = np.unique(pairs[order] // len(values), return_index=True)
-    return found, values[first[order][chosen]]
+    each, chosen = np.unique(pairs[order] // len(values), return_index=True)
+    return each, values[first[order][chosen]]
 
 
 def _sites(
-    data: HardData, shape: tuple[int, ...], lies: Frame, skip: bool
+    data: HardData, shape: tuple[int, ...], lies: CellFrame, skip: bool
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return the index, row by row, of the site of each datum inside of the grid, and which data are inside.
-
-    Data outside are left out with a warning or, unless ``skip``, refused.
-    """
+    """Return the index, row by row, of the site of each datum inside of the grid, and which data are inside."""
     axes = data.points.shape[1]
     at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
     sides = (1, *shape)[: -axes - 1 : -1]  # along x, y and, of such data, z
@@ -526,7 +507,7 @@ def _sites(
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
     """Return the values in the type ``kind``; unknown values are 0."""
     values = np.where(np.isnan(data.values), 0.0, data.values)
-    found, wrong = cast(values, kind)
+    kept, wrong = cast(values, kind)
     wrong |= np.isinf(values)
     if kind.kind in "iu":
         wrong |= np.abs(values) >= 2**53  # the float64 of the table may have rounded these
@@ -537,4 +518,4 @@ def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
             f"{data.where(row)} of the hard data has {values[row, variable]} for {data.names[variable]}, which {kind} "
             f"cannot hold: give {remedy} within its range, or a dtype that holds it"
         )
-    return found
+    return kept

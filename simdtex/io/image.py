@@ -62,8 +62,7 @@ def read(
         ``.npy`` of shape (rows, cols) or (rows, cols, channels). HEIC and OpenEXR need ``simdtex[pictures]``. No other
         format is tried.
     max_pixels : int, optional
-        The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
-        2**27. The file's header is checked before anything is decoded.
+        The most pixels that are read, with 8 bytes for each; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
     palette : bool
         Whether a picture with a palette is read as the indices of its colours, (rows, cols) uint8, as categories
         need; the palette is then in the metadata. Other pictures are read as without it.
@@ -74,29 +73,23 @@ def read(
     Returns
     -------
     Image
-        Pixels keep their 8-bit, 16-bit, integer or float values. PGM and PPM give the numbers in the file, as uint8 if
-        the maximum in its header is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by their
-        colour profile if they have one. Fewer than 8 bits are scaled to 8, and 9 to 15 to 16, so that white is the
-        largest value; HEIC always has 8. A TIFF in which white is 0 is inverted. A fully opaque alpha channel is
-        removed; any other is kept as the last channel, and colours that were multiplied by it (TIFF, OpenEXR) are
-        divided by it. OpenEXR has linear values, float16 or float32, which are not changed for display. The orientation
-        in the EXIF data of a camera is applied.
+        Pixels keep their 8-bit, 16-bit, integer or float values; PGM and PPM give the numbers in the file. Palettes and
+        print colours (CMYK) become RGB. Fewer than 8 bits are scaled to 8, and 9 to 15 to 16, so that white is the
+        largest value. A TIFF in which white is 0 is inverted. A fully opaque alpha channel is removed; any other is the
+        last channel, and colours that were multiplied by it (TIFF, OpenEXR) are divided by it. OpenEXR has linear
+        values. The orientation in the EXIF data of a camera is applied.
 
     Raises
     ------
     ValueError
         The file is missing, no regular file, empty, damaged, of another format, which is named, or too large.
-
-    Notes
-    -----
-    The whole file is held in memory together with its pixels.
     """
     with reading(path, "the image", max_pixels) as most:
         data = Path(path).read_bytes()
-        found = read_bytes(os.fspath(path), data, max_pixels=most, palette=palette)
+        picture = read_bytes(os.fspath(path), data, max_pixels=most, palette=palette)
     if ascending is None or ascending == data.startswith(NUMPY):
-        return found
-    return replace(found, pixels=found.pixels[::-1])
+        return picture
+    return replace(picture, pixels=picture.pixels[::-1])
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette: bool = False) -> Image:
@@ -105,10 +98,10 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None, palette
     with explained(name, "the image", "an image"):
         if not data:
             raise Refused("is empty (0 bytes): give a file with an image in it")
-        found, metadata = decode(data, most, palette=palette)
+        stored, metadata = decode(data, most, palette=palette)
     with explained(name, "the image"):
-        pixels = native(pixels_of("the picture", np.ma.getdata(found)))
-    pixels = np.ma.MaskedArray(pixels, np.ma.getmaskarray(found)) if np.ma.is_masked(found) else pixels
+        pixels = native(pixels_of("the picture", np.ma.getdata(stored)))
+    pixels = np.ma.MaskedArray(pixels, np.ma.getmaskarray(stored)) if np.ma.is_masked(stored) else pixels
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
 
 
@@ -176,15 +169,15 @@ def read_mask(
     ValueError
         `read` cannot read the file, or it has another size.
     """
-    found = read(path, max_pixels=max_pixels, ascending=ascending)
-    pixels, white = found.pixels, found.metadata.white
+    picture = read(path, max_pixels=max_pixels, ascending=ascending)
+    pixels, white = picture.pixels, picture.metadata.white
     rows, cols = shape[:2]
     if pixels.shape[:2] != (rows, cols):
         raise ValueError(
             f"{os.fspath(path)}: the mask is {pixels.shape[1]} x {pixels.shape[0]} pixels (width x height) and must be "
             f"{cols} x {rows}: bring it to that size"
         )
-    colours, transparent = split_alpha(pixels, plain=found.metadata.plain)
+    colours, transparent = split_alpha(pixels, plain=picture.metadata.plain)
     bright = colours > (0.5 if colours.max() <= 1 else white / 2 if white else _half(pixels.dtype))
     return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
@@ -195,12 +188,7 @@ def _half(dtype: np.dtype[Any]) -> float:
 
 
 def as_array(name: str, values: Any) -> Array:
-    """Return an array-like as an ndarray, or a masked one as a masked array.
-
-    Arrays of other libraries, such as xarray and dask, are converted as a whole, with their axes by position. Raises
-    ValueError if rows have unequal lengths, and TypeError if NumPy cannot convert the array, for example from a GPU, or
-    if it is a path.
-    """
+    """Return an array-like, also of xarray, dask or a tensor, as an ndarray, or a masked one as a masked array."""
     first = values
     while isinstance(first, (list, tuple)) and first:
         first = first[0]
@@ -223,10 +211,10 @@ def as_array(name: str, values: Any) -> Array:
 def cast(values: Array, dtype: DTypeLike) -> tuple[Array, NDArray[np.bool_]]:
     """Return values in another type, and the mask of those that it cannot hold: integers inexact, floats infinite."""
     with np.errstate(invalid="ignore", over="ignore"):
-        found = values.astype(dtype)
-    if found.dtype.kind == "f":
-        return found, np.isinf(found) & np.isfinite(values)
-    return found, found != values
+        kept = values.astype(dtype)
+    if kept.dtype.kind == "f":
+        return kept, np.isinf(kept) & np.isfinite(values)
+    return kept, kept != values
 
 
 def plain_array(name: str, values: Any) -> Array:
@@ -299,16 +287,13 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Return rows and columns from WIDTHxHEIGHT, for example ``640x480``: 480 rows, 640 columns; or a square's side."""
+    """Return rows and columns from WIDTHxHEIGHT, for example 480 and 640 of ``640x480``, or a square's side."""
     width, height = parse_sides(text, "WIDTHxHEIGHT")
     return height, width
 
 
 def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...]:
-    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; a single number gives all sides.
-
-    ``2x`` and ``200%`` are multiples of the sides ``own`` of a sample, if it has them.
-    """
+    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; ``2x`` and ``200%`` multiply `own`."""
     sides, words = form.split("x"), re.split(r"\s*[xX\u00d7]\s*", text.strip())
     if own and (times := re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([xX\u00d7%])", text.strip())):
         factor = float(times[1]) / (100 if times[2] == "%" else 1)
@@ -378,13 +363,7 @@ def check_writable(
     metadata: Metadata | None = None,
     labels: bool = False,
 ) -> None:
-    """Raise ValueError before a long run unless its result can be written, without creating a file.
-
-    The file must be writable and its suffix name a format that holds pixels of this type and number of channels; None
-    is not checked. For other files than pictures, `suffixes` are the allowed ones, and only these are checked.
-    With the ``metadata`` of pixels, a format that would take their last channel for alpha is refused. A format that
-    changes pixels is refused if they are ``labels``, or indices of a palette.
-    """
+    """Raise ValueError before a long run unless such pixels, or a file of other `suffixes`, can be written."""
     target = Path(path)
     suffix = target.suffix.lower()
     known = _FORMATS if suffixes is None else suffixes
@@ -392,16 +371,17 @@ def check_writable(
     if suffix not in known:
         what = f"ends in {target.suffix}" if suffix else "has no suffix"
         raise ValueError(f"{target} {what}: end its name in one of {', '.join(sorted(known))}")
-    if suffix == ".exr" and suffixes is None:
+    if suffixes is not None:
+        return
+    if suffix == ".exr":
         require("pictures", "OpenEXR")
-    if suffixes is None:
-        metadata = metadata or NOTHING
-        other = suitable_suffix(dtype, channels, plain=metadata.plain)
-        check_holds(target, _FORMATS, dtype, channels, other)
-        if suffix in LOSSY and (labels or metadata.palette):
-            raise ValueError(f"{target}: JPEG changes labels and categories: end its name in {other} instead")
-        if metadata.plain and channels in _ALPHA and suffix not in _PLAIN:
-            raise ValueError(f"{target}: {suffix} shows band {channels} as alpha: end its name in {other} instead")
+    metadata = metadata or NOTHING
+    other = suitable_suffix(dtype, channels, plain=metadata.plain)
+    check_holds(target, _FORMATS, dtype, channels, other)
+    if suffix in LOSSY and (labels or metadata.palette):
+        raise ValueError(f"{target}: JPEG changes labels and categories: end its name in {other} instead")
+    if metadata.plain and channels in _ALPHA and suffix not in _PLAIN:
+        raise ValueError(f"{target}: {suffix} shows band {channels} as alpha: end its name in {other} instead")
 
 
 def check_holds(
@@ -418,12 +398,9 @@ def check_holds(
 
 
 def suitable_suffix(dtype: DTypeLike | None, channels: int | None, own: str = ".png", *, plain: bool = False) -> str:
-    """Return the suffix of a format that holds such pixels without loss: its own, else PNG, TIFF, or NumPy's own.
-
-    ``plain`` says that no channel is alpha.
-    """
+    """Return the suffix of a lossless format for such pixels, ``plain`` without alpha: its own, .png, .tif or .npy."""
     lossless = {*_PLAIN} if plain and channels in _ALPHA else _FORMATS.keys() - LOSSY
-    suffixes = (one for one in (own, ".png", ".tif", ".npy") if one.lower() in lossless)
+    suffixes = (suffix for suffix in (own, ".png", ".tif", ".npy") if suffix.lower() in lossless)
     return next(suffix for suffix in suffixes if _FORMATS[suffix.lower()].holds(dtype, channels))
 
 
@@ -512,10 +489,7 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
 
 
 def coloured(pixels: Array, palette: bytes | None) -> Array:
-    """Return the colours (rows, cols, 3 or 4) of indices (rows, cols) or, with alpha, (rows, cols, 2).
-
-    Without a palette return the pixels unchanged.
-    """
+    """Return the colours of indices (rows, cols) or, with alpha, (rows, cols, 2); without a palette the pixels."""
     if palette is None:
         return pixels
     indices = np.atleast_3d(pixels)
@@ -558,10 +532,9 @@ def write_tiff(path: Path, pages: Sequence[Array] | Array, metadata: Metadata = 
 
 def _tags(exif: bytes | None) -> list[tuple[int, str, int, bytes, bool]]:
     """Return the texts of EXIF data, such as camera, date, author and rights, as tags of a TIFF."""
-    found = PIL.Image.Exif()
-    found.load(exif or b"")
-    texts = {tag: value.encode("latin-1") for tag, value in found.items() if isinstance(value, str)}
-    return [(tag, "s", 0, text, True) for tag, text in texts.items()]
+    whole = PIL.Image.Exif()
+    whole.load(exif or b"")
+    return [(tag, "s", 0, text.encode("latin-1"), True) for tag, text in whole.items() if isinstance(text, str)]
 
 
 def fitting(profile: bytes | None, channels: int) -> bytes | None:
@@ -584,12 +557,7 @@ def profile_name(profile: bytes | None) -> str:
 
 
 def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> NDArray[np.uint8]:
-    """Return pixels of any shape and type in 8 bits for a preview.
-
-    uint8 is returned unchanged, bool as 0 and 255. For other types `limits` are the values shown as 0 and 255, None:
-    those of `array`. Values outside are clipped, and all are mid-grey if the limits are equal. With the sample's
-    smallest and largest value as `limits`, all previews of a run agree.
-    """
+    """Return pixels in 8 bits for a preview; ``limits`` are the values shown as 0 and 255, by default the extremes."""
     pixels = np.asarray(array)
     if pixels.dtype == np.uint8:
         return pixels
@@ -603,24 +571,15 @@ def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> N
     return np.round(np.clip(share, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
-EXAMPLES = ("brick", "grass", "gravel")
-"""The names of the grey samples."""
+EXAMPLES, TISSUE = ("brick", "grass", "gravel"), "tissue"
+"""The names of the grey samples, and of the sample in colour."""
 
-TISSUE = "tissue"
-"""The name of the sample in colour."""
-
-WALL = (264, 216)
-"""Rows and columns of the wall in scikit-image's brick, seen from the front: bricks 18 pixels wide."""
-
-TOP, BOTTOM = (70, 360), (11, 499)
-"""First column and width of the wall in the first and in the last row of the photograph."""
+WALL, TOP, BOTTOM = (264, 216), (70, 360), (11, 499)
+"""Rows and columns of brick seen from the front; first column and width of the photograph's first and last row."""
 
 
 def example(name: str) -> NDArray[np.uint8]:
-    """Return a picture of scikit-image: of `EXAMPLES` grey, (rows, cols); `TISSUE` has (128, 128, 3).
-
-    Brick is a wall seen from the front, 264 x 216.
-    """
+    """Return a picture of scikit-image: of `EXAMPLES` grey, `TISSUE` (128, 128, 3); brick is seen from the front."""
     import skimage
 
     library: Any = skimage  # which has no types

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from simdtex.io import rasters
-from simdtex.io.grids import Frame, frame
+from simdtex.io.grids import CellFrame, frame
 from simdtex.io.rasters import axis_attributes, axis_of, axis_place
 from simdtex.options import DataWarning
 
@@ -21,18 +21,14 @@ SAME = 0.01
 """The most by which cells of one place differ in their position, in cells."""
 
 
-class Place(NamedTuple):
-    """Where the cells of an array lie.
-
-    ``name`` is that of the array in messages, ``sides`` its numbers of cells along x, y and, of a volume, z, ``crs``
-    its coordinate reference system as WKT, empty if unknown, and ``about`` has the attributes of its axes, by name.
-    """
+class Location(NamedTuple):
+    """Where the cells of the array ``name`` lie; ``sides`` are its numbers of cells along x, y and, of a volume, z."""
 
     name: str
-    frame: Frame
+    frame: CellFrame
     sides: tuple[int, ...] = ()
-    crs: str = ""
-    about: Mapping[str, Mapping[str, str]] = {}
+    crs: str = ""  # WKT; empty if unknown
+    about: Mapping[str, Mapping[str, str]] = {}  # the attributes of its axes, by name
 
     @property
     def told(self) -> bool:
@@ -45,69 +41,64 @@ class Place(NamedTuple):
 
 
 def ascending(array: Any) -> Any:
-    """Return an array of xarray with its axes called z, y and x in this order, and in ascending order of coordinates.
-
-    Any other array, and one without the axes y and x, is returned as it is; of a list, each.
-    """
+    """Return an array of xarray, or each of a list, with the axes z, y and x in ascending order of coordinates."""
     if isinstance(array, (list, tuple)):
-        return type(array)([ascending(one) for one in array])
+        return type(array)([ascending(each) for each in array])
     if not hasattr(array, "coords"):
         return array
     named = {dim: axis for dim in array.dims if (axis := axis_of(str(dim)))}
     return rasters.ascending(array, named) if sorted(named.values())[:2] == ["x", "y"] else array
 
 
-def place_of(name: str, array: Any) -> Place | None:
+def place_of(name: str, array: Any) -> Location | None:
     """Return the place of an array that `ascending` has returned; None if it has no coordinates."""
     if not hasattr(array, "coords") or not {"x", "y"} <= {*array.dims} & {*array.coords}:
         return None
     lies = frame(*zip(*(axis_place(array, axis) for axis in "xyz"), strict=True))
-    about = array.attrs, *(one.attrs for one in array.coords.values() if one.ndim == 0)
-    crs = next((str(one[key]) for one in about for key in ("crs_wkt", "crs") if key in one), "")
+    about = array.attrs, *(coordinate.attrs for coordinate in array.coords.values() if coordinate.ndim == 0)
+    crs = next((str(attrs[key]) for attrs in about for key in ("crs_wkt", "crs") if key in attrs), "")
     sides = tuple(array.sizes[axis] for axis in "xyz" if axis in array.dims)
-    return Place(name, lies, sides, crs, axis_attributes(array))
+    return Location(name, lies, sides, crs, axis_attributes(array))
 
 
-def located(output: Mapping[str, Any], training: Any, origin: Any, cell: Any) -> Place | None:
-    """Return the place of an output; None if nothing gives it.
+def located(output: Mapping[str, Any], training: Any, origin: Any, cell: Any) -> Location | None:
+    """Return the place of an output from its arrays, else from ``origin`` and ``cell``, else from the training image.
 
-    The arrays of ``output``, by their names in messages, give it, else ``origin`` and ``cell``, as the user gave them,
-    else the training image. Arrays are as `ascending` returns them. Raises ValueError if two places differ.
+    Arrays are as `ascending` returns them. Raises ValueError if two places differ.
     """
     options, free = frame(origin, cell), origin is None and cell is None
-    last = {name: one[-1] if isinstance(one, tuple) else one for name, one in output.items()}  # of the pair of a guide
-    found = [place for name, one in last.items() if (place := place_of(name, one))]
-    told = [place for place in found if place.told]
+    last = {name: array[-1] if isinstance(array, tuple) else array for name, array in output.items()}  # of a guide
+    places = [place for name, array in last.items() if (place := place_of(name, array))]
+    told = [place for place in places if place.told]
     image = training[0] if isinstance(training, (list, tuple)) else training
-    own = None
+    trained = None
     try:
-        own = None if found else place_of("the training image", image)
+        trained = None if places else place_of("the training image", image)
     except ValueError as error:
         warnings.warn(f"the training image gives no place, since {error}", DataWarning, stacklevel=2)
-    first = told[0] if told else own if own and own.told else None
+    first = told[0] if told else trained if trained and trained.told else None
     if first is None:
-        return None if free else Place("the output", options)
+        return None if free else Location("the output", options)
     axes, both = None if free else len(options.origin), zip(first.frame, (origin, cell), strict=True)
-    wanted = frame(*(one[:axes] if given is None else given for one, given in both))
-    given = Place("that of origin and cell", wanted, about=first.about)
-    for other in (*told[1:], given) if told else ():
+    wanted = frame(*(numbers[:axes] if option is None else option for numbers, option in both))
+    asked = Location("that of origin and cell", wanted, about=first.about)
+    for other in (*told[1:], asked) if told else ():
         _check_same(first, other)
     if told or free:
         return first._replace(crs=next((place.crs for place in told if place.crs), first.crs))
-    return given._replace(crs=first.crs if origin is None or cell is None else "")
+    return asked._replace(crs=first.crs if origin is None or cell is None else "")
 
 
-def _check_same(one: Place, other: Place) -> None:
+def _check_same(first: Location, other: Location) -> None:
     """Raise unless cells lie at the same place."""
-    for at, size, to, side, n in zip(*one.frame, *other.frame, one.sides, strict=False):
+    for at, size, to, side, n in zip(*first.frame, *other.frame, first.sides, strict=False):
         if max(abs(to - at), abs(to - at + (n - 1) * (side - size))) > SAME * size:
-            raise ValueError(f"{one}, and {other}; give one place")
-    if one.crs and other.crs and one.crs != other.crs:
+            raise ValueError(f"{first}, and {other}; give one place")
+    if first.crs and other.crs and first.crs != other.crs:
         with suppress(ImportError):  # the extra rasters, without which only the texts can be compared
             from rasterio.crs import CRS
 
-            if CRS.from_user_input(one.crs) == CRS.from_user_input(other.crs):
+            if CRS.from_user_input(first.crs) == CRS.from_user_input(other.crs):
                 return
-        raise ValueError(
-            f"{one.name} and {other.name} have different coordinate reference systems; warp one of them, as by gdalwarp"
-        )
+        both = f"{first.name} and {other.name}"
+        raise ValueError(f"{both} have different coordinate reference systems; warp one of them, as by gdalwarp")

@@ -21,11 +21,10 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.files import Refused, check_array, check_beside, needs, quiet
+from simdtex.io.files import PathLike, Refused, check_array, check_beside, needs, quiet
 from simdtex.options import DataWarning, require
 
 Array = NDArray[Any]
-PathLike = str | os.PathLike[str]
 
 DRIVERS = (
     *("GTiff", "AAIGrid", "HFA", "EHdr", "ENVI", "GSAG", "GSBG", "GS7BG"),
@@ -50,7 +49,6 @@ MOST_PAGES = 2**16
 
 _TAGS = (33550, 33922, 34264, 34735, 42112, 42113, 50844)
 """TIFF tags of georeference, of what GDAL says of bands, of no-data, and of rational polynomials."""
-
 
 _NAMED = {"x": "east(ing)?|lon(g|gitude)?|col(umn)?", "y": "north(ing)?|lat(itude)?|row", "z": "lev(el)?|layer"}
 """Names of an axis that do not have its letter."""
@@ -120,7 +118,7 @@ class Georeference(NamedTuple):
     def values(self) -> Georeference | None:
         """Return what is said of the values, for a raster at no place; None if they are plain numbers without names."""
         about = {name: self.about.get(name, ()) for name in _OF_BANDS}
-        told = [*about["descriptions"], *about["units"], *about["offsets"], *(one != 1 for one in about["scales"])]
+        told = [*about["descriptions"], *about["units"], *about["offsets"], *(scale != 1 for scale in about["scales"])]
         return Georeference("", NOWHERE, about=about) if any(told) else None
 
     @property
@@ -130,13 +128,7 @@ class Georeference(NamedTuple):
 
 
 def axis_of(name: str) -> str | None:
-    """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None.
-
-    Examples
-    --------
-    >>> [axis_of(name) for name in ("X", "Ycoord", "Northing (m)", "lon", "UTM_X", "z_loc", "Zn", "depth")]
-    ['x', 'y', 'y', 'x', 'x', 'z', None, None]
-    """
+    """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None."""
     word = re.sub(r"\(.*|\[.*|[^a-z]", "", name.lower())
     around = "(utm|point|coord|loc|pos)?", "(m|km|ft|utm|(coord|loc|pos)[a-z]*)?"
     return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
@@ -178,11 +170,10 @@ def is_raster(file: BinaryIO) -> bool:
 
 
 def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeference]:
-    """Return the pixels of a raster of at most ``most`` pixels, as they are stored, and its georeference.
+    """Return the pixels of a raster, (rows, cols) or (rows, cols, bands), and its georeference.
 
-    Pixels are (rows, cols) or (rows, cols, bands) in the file's type. Unknown ones are NaN in floats, and masked in
-    integers. Alpha beside one or three bands is a band, else a mask. The first row is the northern one, and the first
-    column the western one, unless the raster is rotated or has rational polynomials.
+    Unknown pixels are NaN in floats, and masked in integers. The first row is the northern one and the first column the
+    western one, unless the raster is rotated or has rational polynomials.
     """
     needs("rasterio", "rasters", "a raster with georeference, no-data or descriptions of bands")
     import rasterio
@@ -226,10 +217,7 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
 
 
 def read_cells(path: PathLike, most: int) -> Library:
-    """Return a raster as a grid: its bands as variables, rows in ascending order of y, unknown values NaN.
-
-    Values are in physical units: the scale and the offset of a band are applied.
-    """
+    """Return a raster as a grid, its bands as variables in physical units: their scale and offset are applied."""
     pixels, geo = read_raster(path, most)
     names = [name or f"band {k}" for k, name in enumerate(geo.about["descriptions"], 1)]
     a, b, c, d, e, f = geo.transform
@@ -253,9 +241,7 @@ def write_cells(
     path: Path, layers: Mapping[str, Any], origin: Sequence[float], cell: Sequence[float], crs: str
 ) -> None:
     """Write variables (1, ny, nx), masked or NaN if unknown, as the bands of a GeoTIFF with the north at the top."""
-    bands: Any = np.ma.concatenate(  # type: ignore[no-untyped-call]
-        [one[:, ::-1] for one in layers.values()]
-    )
+    bands: Any = np.ma.concatenate([layer[:, ::-1] for layer in layers.values()])  # type: ignore[no-untyped-call]
     nodata = float("nan") if bands.dtype.kind == "f" else None
     if np.ma.is_masked(bands) and nodata is None:
         bands, nodata = bands.astype(np.result_type(bands.dtype, np.int16)), -9999.0
@@ -272,7 +258,7 @@ def write_raster(path: Path, bands: Array, geo: Georeference) -> None:
 
     bands = bands.astype({"float16": np.float32, "bool": np.uint8}.get(bands.dtype.name, bands.dtype))
     how = {"count": len(bands), "height": bands.shape[1], "width": bands.shape[2], "dtype": bands.dtype.name}
-    shown = [one.name for one in geo.about.get("colorinterp", ())][: len(bands)]
+    shown = [colour.name for colour in geo.about.get("colorinterp", ())][: len(bands)]
     if shown[:3] == ["red", "green", "blue"] and bands.dtype.kind == "u":
         how |= {"photometric": "RGB", "alpha": "YES" if shown[3:] == ["alpha"] else "NO"}
     how |= {"gcps": geo.points} if geo.points else {"transform": rasterio.Affine(*geo.transform)}
@@ -292,12 +278,10 @@ def write_raster(path: Path, bands: Array, geo: Georeference) -> None:
 
 
 def read_netcdf(path: PathLike, most: int) -> Library:
-    """Return the variables of a NetCDF or HDF5 file that have the axes y and x, or z, y and x, as a grid.
+    """Return the variables of a NetCDF or HDF5 file with the axes of the first that has y and x, or z, y and x.
 
-    All variables with the axes of the first such variable are read, in ascending order of the coordinates, unknown
-    values NaN. CF conventions and names such as lon, lat and northing tell the axes; without names of dimensions they
-    are (z, y, x) by position. A variable with further axes, for example time, gives one variable ``NAME[k]`` for each
-    of their steps.
+    CF conventions and names such as lon, lat and northing tell the axes, else their position. A variable with further
+    axes, for example time, gives one variable ``NAME[k]`` for each of their steps.
     """
     for library in ("xarray", "cf_xarray", "h5netcdf", "h5py"):
         needs(library, "simulate", "a NetCDF or HDF5 file")
@@ -314,10 +298,10 @@ def read_netcdf(path: PathLike, most: int) -> Library:
         means = {"x": ("X", "longitude"), "y": ("Y", "latitude"), "z": ("Z", "vertical")}
         known = {**guessed.coordinates, **guessed.axes}
         axes = {name: axis for axis, keys in means.items() for key in keys for name in known.get(key, ())}
-        found: dict[str, Any] = {}
+        variables: dict[str, Any] = {}
         notes: dict[str, str] = {}
-        for name, one in data.data_vars.items():
-            dims = [str(dim) for dim in one.dims]
+        for name, variable in data.data_vars.items():
+            dims = [str(dim) for dim in variable.dims]
             if all(dim.startswith("phony_dim") for dim in dims) and len(dims) in (2, 3):
                 named = dict(zip(dims, "zyx"[-len(dims) :], strict=True))
             else:
@@ -326,37 +310,36 @@ def read_netcdf(path: PathLike, most: int) -> Library:
             if not {"x", "y"} <= {*named.values()} or len({*named.values()}) < len(named):
                 continue
             notes |= {dim: f"{dim} counts cells of {axis}" for dim, axis in named.items() if _counted(dim)}
-            one = ascending(one, named)
+            variable = ascending(variable, named)
             try:
-                place = [axis_place(one, axis) for axis in "xyz"]
+                place = [(*axis_place(variable, axis), variable.sizes.get(axis)) for axis in "xyz"]
             except ValueError as error:
                 notes[str(name)] = f"{name} is left out, since {error}"
                 continue
-            if not found:
-                first, of_first, sizes = one, place, {axis: one.sizes.get(axis) for axis in "xyz"}
-            if (place, {axis: one.sizes.get(axis) for axis in "xyz"}) == (of_first, sizes):
-                found |= _steps(str(name), one)
-        if not found:
+            if not variables:
+                first, of_first = variable, place
+            if place == of_first:
+                variables |= _steps(str(name), variable)
+        if not variables:
             if notes:
                 raise Refused(f"has no even grid ({', '.join(notes.values())}): interpolate it first")
             raise Refused("has no variable with the axes y and x, or z, y and x: rename its dimensions")
-        for one in found.values():
-            check_array(one.shape, one.dtype.itemsize, most // len(found))
-        arrays = {name: _valid(one.load()) for name, one in found.items()}
+        for variable in variables.values():
+            check_array(variable.shape, variable.dtype.itemsize, most // len(variables))
+        arrays = {name: _valid(variable.load()) for name, variable in variables.items()}
         mapping = data.get(str({**first.attrs, **first.encoding}.get("grid_mapping", "")).partition(":")[0])
         crs = "" if mapping is None else _wkt(mapping.attrs)
     if notes:
         warnings.warn(f"{os.fspath(path)}: {', '.join(notes.values())}", DataWarning, stacklevel=2)
-    first = next(iter(arrays.values()))
-    origin, cell = zip(*of_first, strict=True)
-    told = {name: cf_attributes(one) for name, one in arrays.items()} | axis_attributes(first)
-    values = {name: one.values.reshape(-1, *one.shape[-2:]) for name, one in arrays.items()}
-    return values, origin, cell, crs, told
+    origin, cell, _ = zip(*of_first, strict=True)
+    told = {name: cf_attributes(array) for name, array in arrays.items()}
+    values = {name: array.values.reshape(-1, *array.shape[-2:]) for name, array in arrays.items()}
+    return values, origin, cell, crs, told | axis_attributes(next(iter(arrays.values())))
 
 
 def _counted(name: str) -> str | None:
     """Return the axis along which a dimension counts cells by its name, or None."""
-    return next((axis for axis, own in _COUNTED.items() if re.fullmatch(own, name.lower())), None)
+    return next((axis for axis, pattern in _COUNTED.items() if re.fullmatch(pattern, name.lower())), None)
 
 
 def _wkt(about: Mapping[Any, Any]) -> str:
@@ -395,10 +378,10 @@ def _check_own(path: PathLike) -> None:
     with h5py.File(path) as file:
 
         def found(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
-            one: Any = file[name] if isinstance(link, h5py.HardLink) else link
-            parts = one.virtual_sources() if getattr(one, "is_virtual", False) else ()
-            other = isinstance(one, h5py.ExternalLink) or any(part.file_name != "." for part in parts)
-            return name if other or getattr(one, "external", None) else None
+            target: Any = file[name] if isinstance(link, h5py.HardLink) else link
+            parts = target.virtual_sources() if getattr(target, "is_virtual", False) else ()
+            other = isinstance(target, h5py.ExternalLink) or any(part.file_name != "." for part in parts)
+            return name if other or getattr(target, "external", None) else None
 
         if (name := file.visititems_links(found)) is not None:
             raise Refused(f"takes {name[:100]} from another file: save all values in one file")
@@ -411,8 +394,8 @@ def cf_attributes(array: Any) -> dict[str, str]:
 
 def axis_attributes(array: Any) -> dict[str, dict[str, str]]:
     """Return the names and units of the coordinates of the axes of an array of xarray, by axis: x, y and z."""
-    own = sorted((dim for dim, one in array.coords.items() if one.dims in ((), (dim,))), key=array.dims.__contains__)
-    return {axis: cf_attributes(array.coords[dim]) for dim in own if (axis := axis_of(str(dim)))}
+    dims = sorted((dim for dim, at in array.coords.items() if at.dims in ((), (dim,))), key=array.dims.__contains__)
+    return {axis: cf_attributes(array.coords[dim]) for dim in dims if (axis := axis_of(str(dim)))}
 
 
 def _steps(name: str, array: Any) -> dict[str, Any]:
@@ -427,11 +410,9 @@ def _steps(name: str, array: Any) -> dict[str, Any]:
 
 
 def ascending(array: Any, named: Mapping[Any, str]) -> Any:
-    """Return an array of xarray with the axes that its dimensions mean, z, y and x, in ascending order of coordinates.
-
-    A coordinate of several axes, such as the longitude of each cell, is none of a grid, and is dropped.
-    """
-    array = array.drop_vars([key for key, own in array.coords.items() if own.ndim and own.dims != (key,)])
+    """Return an array of xarray with the axes z, y and x that its dimensions mean, in ascending order."""
+    # a coordinate of several axes, such as the longitude of each cell, is none of a grid
+    array = array.drop_vars([key for key, at in array.coords.items() if at.ndim and at.dims != (key,)])
     array = array.rename({dim: axis for dim, axis in named.items() if axis != dim})
     down = [axis for axis in named.values() if axis in array.coords and array[axis][0] > array[axis][-1]]
     in_order = iter(sorted(named.values(), reverse=True))

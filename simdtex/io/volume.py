@@ -2,9 +2,7 @@
 """Reading and writing of volumes, without a change of any value, and writing of realisations.
 
 A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
-picture. x is the column, y the row, z the depth. Realisations are an `xarray.DataArray`, as
-`simdtex.simulate` returns; they are written by xarray, as NumPy arrays, or as a grid. The extra ``simulate`` installs
-the libraries: ``pip install 'simdtex[simulate]'``.
+picture. Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns; the extra ``simulate`` installs xarray.
 """
 
 from __future__ import annotations
@@ -29,6 +27,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io import image
 from simdtex.io.decode import decode, is_stack, native, read_stack
 from simdtex.io.files import (
+    PathLike,
     Refused,
     atomic_folder,
     atomic_path,
@@ -55,7 +54,6 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[Any]
-PathLike = str | os.PathLike[str]
 
 # "" means a folder of slices
 _FORMATS = {
@@ -74,10 +72,9 @@ _COUNTS = re.compile(rb'NumberOfComponents="([0-9]+)|^\S+ ([0-9]+) ([0-9]+) \w+\
 
 
 def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
-    """Raise ValueError before a long run unless its result can be written, without creating a file.
+    """Raise ValueError before a long run unless such values can be written, without creating a file.
 
-    The file or folder of slices must be writable, and its suffix name a format that holds values of this type and
-    number of channels; None is not checked. A folder is only replaced if it contains only slices.
+    A folder is only replaced if it contains only slices.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -98,10 +95,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
 
 
 def is_volume(path: PathLike, channels: bool = False) -> bool:
-    """Return whether a file or folder holds a volume, by its suffix or, of TIFF and ``.npy``, by its axes.
-
-    A ``.npy`` has three axes or four; with ``channels`` one of three is a picture.
-    """
+    """Return whether a path holds a volume; with ``channels`` an ``.npy`` of three axes is a picture."""
     suffix = Path(path).suffix.lower()
     if os.path.isdir(path) or suffix not in (".tif", ".tiff", ".npy"):
         return os.path.isdir(path) or suffix in _READERS
@@ -123,8 +117,7 @@ def read(path: PathLike, *, max_pixels: int | None = None, ascending: bool = Fal
         points, with ``simdtex[volumes]``; ``.raw``, little-endian, x fastest, whose name says its size and type, as
         ``bonsai_256x256x256_uint8.raw``; or a folder of pictures whose names differ in a number.
     max_pixels : int, optional
-        The most values that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
-        2**27. The file's header is checked before anything is decoded.
+        The most values that are read, with 8 bytes for each; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
     ascending : bool
         Whether pictures, whose first row is the northern edge, are turned so that row 0 is the smallest y.
 
@@ -147,15 +140,16 @@ def read(path: PathLike, *, max_pixels: int | None = None, ascending: bool = Fal
     else:
         with reading(path, "the volume", max_pixels, kind="a volume") as most, quiet():
             values, georeference = _READERS[target.suffix.lower()](target, most)
-    found: dict[str, Array] = {}
+    variables: dict[str, Array] = {}
     pictures = ascending and (target.is_dir() or target.suffix.lower() in (".tif", ".tiff"))
-    for key, one in values.items():
-        if one.ndim not in (3, 4) or one.size == 0 or one.dtype.kind not in "buif":
-            raise ValueError(f"{name} has the shape {one.shape} and the type {one.dtype}: give numbers of three axes")
-        one = one[:, ::-1] if pictures else one
-        parts = [one] if one.ndim == 3 else np.moveaxis(one, -1, 0)
-        found |= {key if len(parts) == 1 else f"{key}_{k}": native(part) for k, part in enumerate(parts)}
-    return CartesianGrid(found, *georeference)
+    for key, array in values.items():
+        if array.ndim not in (3, 4) or array.size == 0 or array.dtype.kind not in "buif":
+            what = f"the shape {array.shape} and the type {array.dtype}"
+            raise ValueError(f"{name} has {what}: give numbers of three axes")
+        array = array[:, ::-1] if pictures else array
+        parts = [array] if array.ndim == 3 else np.moveaxis(array, -1, 0)
+        variables |= {key if len(parts) == 1 else f"{key}_{k}": native(part) for k, part in enumerate(parts)}
+    return CartesianGrid(variables, *georeference)
 
 
 _Read = tuple[dict[str, Array], tuple[tuple[float, ...], tuple[float, ...]]]
@@ -179,10 +173,10 @@ def _array(path: Path, most: int) -> _Read:
 
 def _slices(folder: Path, most: int) -> _Read:
     """Return the pictures of a folder, by the number in their names, as layers."""
-    names = sorted(one.name for one in folder.iterdir() if one.name[0] != ".")
-    found = [match for name in names if (match := _NUMBERED.fullmatch(name))]
-    layers = {int(match[2]): match[0] for match in found}
-    if not names or len(layers) < len(names) or len({match.group(1, 3) for match in found}) > 1:
+    names = sorted(path.name for path in folder.iterdir() if path.name[0] != ".")
+    numbered = [match for name in names if (match := _NUMBERED.fullmatch(name))]
+    layers = {int(match[2]): match[0] for match in numbered}
+    if not names or len(layers) < len(names) or len({match.group(1, 3) for match in numbered}) > 1:
         raise Refused("is a folder: keep only slices in it, whose names differ in their number, as slice-000.png")
     if missing := set(range(min(layers), max(layers))) - set(layers):
         raise Refused(f"has no slice of number {min(missing)}: add it")
@@ -201,10 +195,8 @@ def _raw(path: Path, most: int) -> _Read:
         raise Refused("is a .raw: name it with columns x rows x layers and type, as NAME_256x256x128_uint8.raw")
     shape, dtype = tuple(int(side) for side in said.group(3, 2, 1)), np.dtype(said[4].lower()).newbyteorder("<")
     check_size(prod(shape), 0, most)
-    if path.stat().st_size != prod(shape) * dtype.itemsize:
-        raise Refused(
-            f"has {path.stat().st_size} bytes, not {prod(shape) * dtype.itemsize} as its name says: rename it"
-        )
+    if (size := path.stat().st_size) != prod(shape) * dtype.itemsize:
+        raise Refused(f"has {size} bytes, not {prod(shape) * dtype.itemsize} as its name says: rename it")
     return {"value": np.fromfile(path, dtype).reshape(shape)}, _PLAIN
 
 
@@ -296,14 +288,14 @@ def _stored(path: Path, header: dict[str, Any], data: bytes, most: int) -> _Read
 
 def _placed(values: dict[str, Any], steps: NDArray[np.float64], origin: Any) -> _Read:
     """Return values along x, y and z, with a step from cell to cell in each row, and where the cells lie."""
-    own, at = np.diagonal(steps), np.array(origin, np.float64)
+    along, at = np.diagonal(steps), np.array(origin, np.float64)
     cell = np.linalg.norm(steps, axis=1)
-    if np.abs(steps - np.diag(own)).max() > 1e-6 * cell.max():
+    if np.abs(steps - np.diag(along)).max() > 1e-6 * cell.max():
         return values, frame(_PLAIN[0], cell.tolist())
-    for axis in (axis for axis in range(3) if own[axis] < 0):
-        at[axis] += own[axis] * (next(iter(values.values())).shape[2 - axis] - 1)
-        values = {key: np.flip(one, 2 - axis) for key, one in values.items()}
-    return values, frame(at.tolist(), np.abs(own).tolist())
+    for axis in (axis for axis in range(3) if along[axis] < 0):
+        at[axis] += along[axis] * (next(iter(values.values())).shape[2 - axis] - 1)
+        values = {key: np.flip(array, 2 - axis) for key, array in values.items()}
+    return values, frame(at.tolist(), np.abs(along).tolist())
 
 
 def _vtk(path: Path, most: int) -> _Read:
@@ -321,19 +313,19 @@ def _vtk(path: Path, most: int) -> _Read:
         extent = reader.reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT())
         sides = [last - first + 1 for first, last in zip(extent[4::-2], extent[5::-2], strict=True)]
         check_size(prod(sides) * max(1, sum(parts for parts, *_ in sums)), 0, most)
-        found = reader.read()
-    if not isinstance(found, pyvista.ImageData):
-        raise Refused(f"holds {type(found).__name__} of VTK: resample it to an image (ImageData, structured points)")
-    points, cells = (
-        {key: one for key, one in kind.items() if key[:3] != "vtk"} for kind in (found.point_data, found.cell_data)
-    )
+        grid = reader.read()
+    if not isinstance(grid, pyvista.ImageData):
+        raise Refused(f"holds {type(grid).__name__} of VTK: resample it to an image (ImageData, structured points)")
+    kinds = grid.point_data, grid.cell_data
+    points, cells = ({key: array for key, array in kind.items() if key[:3] != "vtk"} for kind in kinds)
     if bool(points) == bool(cells):
         raise Refused(f"has {'both point and' if points else 'no point or'} cell arrays: save one of the two kinds")
     shape = [max(1, side - bool(cells)) for side in sides]
-    values = {str(key): np.asarray(one).reshape(*shape, *one.shape[1:]) for key, one in (points or cells).items()}
-    steps = np.asarray(found.direction_matrix).T * np.array(found.spacing)[:, None]
+    arrays = points or cells
+    values = {str(key): np.asarray(array).reshape(*shape, *array.shape[1:]) for key, array in arrays.items()}
+    steps = np.asarray(grid.direction_matrix).T * np.array(grid.spacing)[:, None]
     corner = [bool(cells) and side > 1 for side in sides[::-1]]  # half a cell before the centre of the first
-    return _placed(values, steps, found.GetPoint(0) + np.array(corner) / 2 @ steps)
+    return _placed(values, steps, grid.GetPoint(0) + np.array(corner) / 2 @ steps)
 
 
 _READERS: dict[str, Callable[[Path, int], _Read]] = {
@@ -367,9 +359,8 @@ def write(path: PathLike, volume: ArrayLike) -> None:
 
     Notes
     -----
-    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file x varies fastest, then
-    y, then z, with the channels as a vector before them, as ParaView, 3D Slicer and Fiji expect. It is not compressed,
-    because not every version of ParaView can read compressed files.
+    A single channel is written without an axis, except in ``.npz`` and ``.npy``. In an NRRD file, which is not
+    compressed, x varies fastest, then y, then z, with the channels as a vector before them.
     """
     values = image.pixels_of("the volume", volume, 3)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
@@ -423,8 +414,7 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
     Raises
     ------
     ValueError
-        The suffix is unknown, or is that of a grid and there is a source map; the folder is missing or not writable,
-        `path` exists and may not be replaced, or a library is not installed.
+        The path cannot be written, a grid cannot hold the ``source`` map, or a library is not installed.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -445,18 +435,14 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     Parameters
     ----------
     path : path
-        ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed), which ``xarray.open_dataarray`` reads;
-        or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text, but
-        no units of coordinates.
-        ``.gslib`` (text) and ``.sgems`` are grids with a variable for each realisation, whose name is the array's name,
-        ``__real`` and the number, as in SGeMS: `simdtex.write_grid`. They keep origin and size of cells, and no
-        attributes; cells outside of the coordinate ``region`` are unknown values. An existing file is replaced, and an
-        existing store is an error.
-    array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
-        The result of `simdtex.simulate`; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
-        x), and its coordinates must be evenly spaced and ascend. Only ``.zarr`` and ``.nc`` need xarray. With
-        ``source=True`` the result is a Dataset: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by
-        name, and a grid cannot hold it. A grid has the variables of any other Dataset, for example of `estimate`.
+        ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed) for xarray; ``.npz`` for ``numpy.load``,
+        with ``values``, each coordinate under its name, and ``attributes``, a JSON text; or ``.gslib``, ``.sgems`` and
+        ``.tif``, grids with a variable for each realisation, ``NAME__real0`` and so on, see `simdtex.write_grid`, in
+        which cells outside of the coordinate ``region`` are unknown. An existing file is replaced, and an existing
+        store is an error.
+    array : DataArray, ([realisation, z,] y, x[, variable]), or Dataset
+        The result of `simdtex.simulate` or `simdtex.estimate`; attributes are texts and numbers. A grid needs evenly
+        spaced, ascending coordinates, and cannot hold the Dataset that ``source=True`` gives.
 
     Raises
     ------
@@ -471,16 +457,16 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     suffix = check_realisations_path(path, source="source_row" in several)
     if suffix in SUFFIXES:
         origin, cell = zip(*(axis_place(array, axis) for axis in "xyz"), strict=True)
-        arrays = sorted(several.values(), key=lambda one: one.ndim) or [array]
-        found = dict(pair for one in arrays for pair in _variables(one))
-        write_grid(path, found, origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
+        arrays = sorted(several.values(), key=lambda variable: variable.ndim) or [array]
+        layers = dict(pair for variable in arrays for pair in _variables(variable))
+        write_grid(path, layers, origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
         return
     if suffix == ".npz":
-        coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}
-        coordinates |= {name: one.values for name, one in (several or {"values": array}).items()}
+        members: Any = {**array.coords, **(several or {"values": array})}
+        named: dict[str, Any] = {str(name): np.asarray(member.values) for name, member in members.items()}
         attributes = np.array(json.dumps(array.attrs))
         with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, attributes=attributes, **coordinates)
+            np.savez_compressed(file, attributes=attributes, **named)
         return
     whole: Any = array if several else array.to_dataset(name=array.name or "realisations")
     if suffix == ".nc":

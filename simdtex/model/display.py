@@ -14,6 +14,7 @@ import numpy as np
 import PIL.Image
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.io.files import PathLike
 from simdtex.io.image import Metadata, pillow_bytes, read, split_alpha, to_display, write
 from simdtex.io.rasters import Georeference
 
@@ -30,10 +31,7 @@ _CATEGORIES = ("#f2ead3", "#1f4e79", "#8fbf9f", "#d08c3a", "#7a5195", "#4a4a4a",
 
 
 def temperature_colours(temperature: ArrayLike) -> Picture:
-    """Return temperatures as colours from near black (0, cold) to pale yellow (1, hot), sRGB in a last axis of 3.
-
-    Values outside 0 to 1 are clipped. Lightness grows in equal perceptual steps, so the map also reads in grey.
-    """
+    """Return temperatures as colours from near black (0, cold) to pale yellow (1, hot), sRGB in a last axis of 3."""
     share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
     return _temperature_table()[np.round(share * 255.0).astype(np.intp)]
 
@@ -49,10 +47,9 @@ def _temperature_table() -> Picture:
 
 
 def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
-    """Return a colour for each output pixel by its position in the sample, (rows, cols, 3) uint8.
+    """Return a colour for each position (rows, cols, 2) in the sample; a negative one is black.
 
-    ``source`` (rows, cols, 2) are rows and columns in the sample; a negative position is black. Neighbours in the
-    sample have similar colours of one lightness, so a copied patch is a smooth area and a seam is an edge.
+    Neighbours in the sample have similar colours of one lightness: a copied patch is smooth, and a seam is an edge.
     """
     positions = np.asarray(source)
     extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
@@ -63,20 +60,13 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
 
 
 def use_colours(counts: NDArray[np.intp]) -> Picture:
-    """Return a colour for each pixel of the sample by its number of uses, (sample rows, sample cols, 3) uint8.
-
-    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is the number of uses from
-    `simdtex.model.source_map.counts`: near black for a pixel that was never taken, pale yellow for the most used one.
-    """
+    """Return a colour for each pixel of the sample by its number of uses u: log(1 + u) / log(1 + max u)."""
     uses = np.log1p(counts)
     return temperature_colours(uses / (uses.max() or 1.0))
 
 
 def label_colours(count: int) -> Picture:
-    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, and distinct colours for all others.
-
-    Labels 1 to 7 have the colours of Okabe and Ito (2008), which colour-blind people can distinguish, too.
-    """
+    """Return colours for labels 0 to count - 1, (count, 3) uint8: those of Okabe and Ito (2008), then distinct ones."""
     number = np.arange(len(OKABE_ITO), max(count, len(OKABE_ITO)))
     hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: consecutive labels have distinct hues
     lightness = 0.62 + 0.16 * (number % 3 - 1)
@@ -107,21 +97,15 @@ def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:
     return np.round(curve * 255.0).astype(np.uint8)
 
 
-PathLike = str | os.PathLike[str]
-
-
 def write_labels(path: PathLike, labels: NDArray[np.uint8], place: Georeference | None = None) -> None:
     """Write labels (rows, cols) as the values of a picture; PNG and BMP have them as indices of `label_colours`."""
     write(path, labels, Metadata(palette=label_colours(256).tobytes(), geo=place))
 
 
 def read_labels(path: PathLike, transparent: int = 0) -> NDArray[Any]:
-    """Read a picture of labels, (rows, cols) of an integer type: its values or, with a palette, the indices.
-
-    Where the picture is transparent, the label is ``transparent``. Raises ValueError if the file is no such picture.
-    """
-    found = read(path, palette=True)
-    pixels, gone = split_alpha(found.pixels, plain=found.metadata.plain)
+    """Read labels (rows, cols): the values of a picture, or the indices of its palette; ``transparent`` where it is."""
+    picture = read(path, palette=True)
+    pixels, gone = split_alpha(picture.pixels, plain=picture.metadata.plain)
     if pixels.dtype.kind not in "iu" or (pixels.ndim == 3 and pixels.shape[2] > 1):
         raise ValueError(f"{os.fspath(path)} is no picture of labels; save it grey or with a palette, 0, 1, 2...")
     labels = pixels.reshape(pixels.shape[:2])
@@ -136,11 +120,7 @@ CELL = 12
 
 
 def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statistics: dict[str, Any]) -> str:
-    """Return HTML with a picture and its source map side by side, and the statistics below them.
-
-    ``made`` is (rows, cols, channels) or (depth, rows, cols, channels); a solid is shown by its middle slice. A source
-    map with several samples is not shown.
-    """
+    """Return HTML with a picture, or the middle slice of a solid, its source map of one sample, and statistics."""
     figures = []
     if made is not None:
         picture = _thinned(made[len(made) // 2] if made.ndim == 4 else made)
@@ -166,15 +146,14 @@ def choice_html(
 ) -> str:
     """Return HTML with a neighbourhood, candidates with bars of their probabilities, and a text below them.
 
-    ``offsets`` (N, 2 or 3) of the neighbours, of which those in the site's layer are shown; ``near`` (N, channels)
-    pixels, the whiter the less ``certain`` (N,), 0 to 1; ``candidates`` (n, 1 + N, channels) pixels of each candidate
-    and of its neighbours; ``probability`` and ``captions`` (n,).
+    Of the neighbours those in the site's layer are shown, the whiter the less ``certain``; ``candidates`` (n, 1 + N,
+    channels) are pixels of each candidate and of its neighbours.
     """
     layer = np.flatnonzero((offsets[:, :-2] == 0).all(1) & offsets.any(1))
     radius = int(np.abs(offsets[:, -1]).max())
     row, col = (offsets[layer, -2:] + radius).T
     limits = (min(near.min(), candidates.min()), max(near.max(), candidates.max()))
-    shown, own = to_display(near[layer], limits), to_display(candidates, limits)
+    shown, patches = to_display(near[layer], limits), to_display(candidates, limits)
 
     def square(pixels: NDArray[np.uint8], centre: NDArray[np.uint8]) -> NDArray[np.uint8]:
         cells = np.full((2 * radius + 1, 2 * radius + 1, pixels.shape[-1]), 255, np.uint8)
@@ -186,9 +165,9 @@ def choice_html(
     figures = [
         _figure(square(faded, np.full(faded.shape[-1], 255, np.uint8)), "the neighbourhood; white is not certain")
     ]
-    for one, share, caption in zip(own, probability, captions, strict=True):
+    for patch, share, caption in zip(patches, probability, captions, strict=True):
         bar = f'<div style="height:6px;background:#36c;width:{100 * share:.3g}%"></div>'
-        figure = _figure(square(one[1 + layer], one[0]), escape(caption))
+        figure = _figure(square(patch[1 + layer], patch[0]), escape(caption))
         figures.append(f'<div style="max-width:14em">{figure}{bar}</div>')
     row_of = f'<div style="display:flex;flex-wrap:wrap;gap:1em">{"".join(figures)}</div>'
     return f"<div>{row_of}<pre>{escape(text)}</pre></div>"

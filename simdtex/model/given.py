@@ -35,30 +35,17 @@ from simdtex.model.sample import Sample
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """The given values of an output.
+    """The given values of an output, of the sample's type.
 
-    Parameters
-    ----------
-    values : (H, W, C) array
-        Values of the sample's type.
-    known : (H, W, C) bool array
-        True for given values. A site with some variables given and others not relaxes, guided by the given ones, which
-        the output shows.
-    place : (H, W, 2 or 3) int32 array, optional
-        The position of each given site in the sample: row, column and, with several pictures, the number of the
-        picture; -1 for a site from elsewhere. None: all sites are from elsewhere.
-    suggests : bool
-        Whether sites from the sample suggest candidates that continue them. False if all such candidates are unknown:
-        the sites are then hard data, with every channel known.
-    outside : (H, W) bool array, optional
-        Sites that take no part. They are known, nothing is compared with their values, and the output shows these.
+    A site with some variables given and others not relaxes, guided by the given ones, which the output shows. Sites
+    ``outside`` take no part: they are known, nothing is compared with their values, and the output shows these.
     """
 
-    values: NDArray[Any]
-    known: NDArray[np.bool_]
-    place: NDArray[np.int32] | None = None
-    suggests: bool = True
-    outside: NDArray[np.bool_] | None = None
+    values: NDArray[Any]  # (H, W, C)
+    known: NDArray[np.bool_]  # (H, W, C)
+    place: NDArray[np.int32] | None = None  # (H, W, 2 or 3), the position in the sample; -1 from elsewhere
+    suggests: bool = True  # whether sites from the sample suggest candidates that continue them
+    outside: NDArray[np.bool_] | None = None  # (H, W)
 
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
@@ -92,8 +79,8 @@ class Given:
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of a level, with the known values at its sites."""
         sites = (slice(None, None, grid.step),) * len(grid.shape)
-        found: NDArray[Any] = np.where(self.known[sites], self.values[sites], picture)
-        return found
+        shown: NDArray[Any] = np.where(self.known[sites], self.values[sites], picture)
+        return shown
 
 
 class Stand(NamedTuple):
@@ -110,11 +97,7 @@ NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
-    """Return the sites of a level's lattice that receive values from between the sites, in ascending order.
-
-    ``known`` (H, W) or (D, H, W) is the mask of values, and the results are pixel indices. A value moves if none of the
-    sites around it is known.
-    """
+    """Return the sites of a level that receive values of the mask ``known`` from between the sites, in order."""
     step, place = grid.step, between(known, grid).astype(np.int64)
     nearest = (place + step // 2) // step
     if not grid.torus:
@@ -130,31 +113,23 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
 
 
 def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
-    """Return the places (n, 2 or 3) of the data between the sites of a lattice that have no given site around them.
-
-    ``known`` (H, W) or (D, H, W) is the mask of data; the sites around a datum are the corners of its cell.
-    """
-    step, own = grid.step, grid.decimated(known)
+    """Return the places (n, 2 or 3) of data between the sites, none of which is known at the corners of their cell."""
+    step, at_sites = grid.step, grid.decimated(known)
     place = np.argwhere(known)
     place = place[(place % step > 0).any(1)]
     represented = np.zeros(len(place), bool)
     for corner in product((0, 1), repeat=known.ndim):
         needed = (place % step >= corner).all(1)  # a datum in a site's row has none above or below
         site = place // step + corner
-        site = site % own.shape if grid.torus else np.minimum(site, np.array(own.shape) - 1)
-        represented |= needed & own[tuple(site.T)]
+        site = site % at_sites.shape if grid.torus else np.minimum(site, np.array(at_sites.shape) - 1)
+        represented |= needed & at_sites[tuple(site.T)]
     return place[~represented].astype(np.int32)
 
 
 def nearest_data(
     place: NDArray[np.integer], grid: Grid, order: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the data near each site of a lattice or a window of it, site by site, the nearest first.
-
-    ``place`` (n, 2 or 3) are the places of the data in pixels. The data of a site are the `MOST_NEAR` nearest within
-    the neighbourhood of ``order``. Returns the number of the site in the grid, the number of the datum, and its offset
-    (m, 2 or 3) from the site in pixels.
-    """
+    """Return the numbers of sites and of the `MOST_NEAR` data nearest to each, and their offsets in pixels."""
     step, reach, axes = grid.step, isqrt(order), place.shape[1]
     found: list[list[NDArray[np.int64]]] = [[], [], []]
     for by in product(range(-reach, reach + 2), repeat=axes):
@@ -173,16 +148,12 @@ def nearest_data(
     return site[rank < MOST_NEAR], datum[rank < MOST_NEAR], apart[rank < MOST_NEAR]
 
 
-class Planes(NamedTuple):
-    """The given values in the layout of a run's field, on the host.
+class GivenPlanes(NamedTuple):
+    """The given values in the layout of a run's field; a site that takes no part is known, and `UNKNOWN` in all."""
 
-    ``values`` (C, H, W) uint16, `UNKNOWN` in unknown channels; ``source`` (H, W) int32, -1 without a source; ``known``
-    (H, W) bool. A site that takes no part is known, and all its channels are `UNKNOWN`, which have no weight.
-    """
-
-    values: NDArray[np.uint16]
-    source: NDArray[np.int32]
-    known: NDArray[np.bool_]
+    values: NDArray[np.uint16]  # (C, H, W), `UNKNOWN` in unknown channels
+    source: NDArray[np.int32]  # (H, W), -1 without a source
+    known: NDArray[np.bool_]  # (H, W)
 
     @property
     def data(self) -> NDArray[np.bool_]:
@@ -190,7 +161,7 @@ class Planes(NamedTuple):
         return np.asarray(self.known & (self.values != UNKNOWN).any(0))
 
 
-def planes(given: Given, sample: Sample) -> Planes:
+def planes(given: Given, sample: Sample) -> GivenPlanes:
     """Return the given values in the channels of ``sample``; a site from the sample has all of them."""
     shape = given.whole.shape
     values = np.full((sample.channels, *shape), UNKNOWN, np.uint16)
@@ -200,7 +171,7 @@ def planes(given: Given, sample: Sample) -> Planes:
     values[:, source >= 0] = sample.working[: sample.channels, source[source >= 0]]
     if not given.suggests:
         source[:] = -1
-    return Planes(values, source, given.whole)
+    return GivenPlanes(values, source, given.whole)
 
 
 EXCLUDED = np.float32(2.0**40)
@@ -220,38 +191,24 @@ LEAST_SHARE = 1e-3
 
 
 class Kind(NamedTuple):
-    """Kinds of candidates.
+    """Kinds of candidates."""
 
-    ``of`` (n,), the kind of each candidate; ``shares`` (kinds,), the share of each kind in the sample's pixels that may
-    be taken; and ``probability`` (kinds, H, W) of each kind at each site, NaN where it is not given.
-    """
-
-    of: NDArray[np.intp]
-    shares: NDArray[np.float64]
-    probability: NDArray[np.float64]
+    of: NDArray[np.intp]  # (n,), the kind of each candidate
+    shares: NDArray[np.float64]  # (kinds,), in the pixels that may be taken
+    probability: NDArray[np.float64]  # (kinds, H, W), NaN where it is not given
 
 
 @dataclass(frozen=True, eq=False)
 class Soft:
-    """Soft data of an output.
+    """Soft data of an output: probabilities that add up to 1 at a site, or are NaN. A side of 1 is repeated."""
 
-    Parameters
-    ----------
-    categories : (categories, H, W) or (categories, D, H, W) float64 array, optional
-        The probability of each category of the first variable, in ascending order. A side of 1 is repeated.
-    images : (training images, H, W) float64 array, optional
-        The probability of each training image.
-
-    The probabilities of a site add up to 1, or are NaN where they are not given.
-    """
-
-    categories: NDArray[np.float64] | None = None
-    images: NDArray[np.float64] | None = None
+    categories: NDArray[np.float64] | None = None  # (categories, [D,] H, W), in ascending order
+    images: NDArray[np.float64] | None = None  # (training images, [D,] H, W)
 
     @property
     def rows(self) -> int:
         """Number of kinds."""
-        return sum(len(one) for one in (self.categories, self.images) if one is not None)
+        return sum(len(those) for those in (self.categories, self.images) if those is not None)
 
     @property
     def shares(self) -> tuple[float, ...] | None:
@@ -259,7 +216,7 @@ class Soft:
         if self.images is None:
             return None
         told = self.images[:, ~np.isnan(self.images[0])]
-        return tuple(max(LEAST_SHARE, float(one.sum()) / max(1, one.size)) for one in told)
+        return tuple(max(LEAST_SHARE, float(image.sum()) / max(1, image.size)) for image in told)
 
     def kinds(self, sample: Sample, source: NDArray[np.integer]) -> NDArray[np.uint16]:
         """Return the kinds of pixels (n,) of the sample as indices of rows of `costs`, (kinds of a pixel, n)."""
@@ -270,10 +227,7 @@ class Soft:
         return np.stack(found).astype(np.uint16)
 
     def costs(self, sample: Sample, grid: Grid, rate: float) -> NDArray[np.float32]:
-        """Return the cost of each kind at the sites of a lattice or a window of it, (kinds, *grid.shape).
-
-        ``rate`` is w N C sigma^2. A coarse level uses the probability at the site itself.
-        """
+        """Return the cost of each kind at the sites, (kinds, *grid.shape); ``rate`` is w N C sigma^2."""
         found = []
         for kind in self._all(sample, np.zeros(0, np.intp)):
             p = kind.probability
@@ -286,24 +240,20 @@ class Soft:
         return np.concatenate(found)
 
     def regions(self) -> NDArray[np.int32]:
-        """Return the region of each cell, -1 without probabilities of categories.
-
-        Cells of a region have the same probabilities of categories, in steps of 1/16, and are connected; parts of fewer
-        than `LEAST` cells are one region.
-        """
+        """Return the region of each cell, connected cells with like probabilities of categories; -1 without these."""
         from scipy.ndimage import label  # only for maps, since it loads slowly
 
         p = self.categories
         assert p is not None
         told, of = ~np.isnan(p[0]), np.full(p.shape[1:], -1, np.int32)
         alike = np.unique(np.rint(p[:, told] * ALIKE), axis=1, return_inverse=True)[1].ravel()
-        number, first = np.full(p.shape[1:], -1), 0
-        number[told] = alike
-        for one in range(alike.max(initial=-1) + 1):
-            parts, _ = label(number == one)
+        group, first = np.full(p.shape[1:], -1), 0
+        group[told] = alike
+        for k in range(alike.max(initial=-1) + 1):
+            parts, _ = label(group == k)
             large = np.bincount(parts.ravel()) >= LEAST
             large[0] = False
-            of[number == one] = first + np.where(large, large.cumsum(), 0)[parts[number == one]]
+            of[group == k] = first + np.where(large, large.cumsum(), 0)[parts[group == k]]
             first += 1 + int(large.sum())
         _, of[told] = np.unique(of[told], return_inverse=True)
         return of

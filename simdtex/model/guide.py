@@ -27,7 +27,7 @@ GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
 """A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
 
-class Planes(NamedTuple):
+class GuidePlanes(NamedTuple):
     """Working levels of a guide: (G, rows, cols) arrays for the pictures of the sample, (G, H, W) for the output."""
 
     samples: list[NDArray[np.uint16]]
@@ -36,18 +36,13 @@ class Planes(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """A guide, with a picture for each picture of the sample and one for the output.
+    """A guide, with a picture for each picture of the sample and one for the output."""
 
-    ``samples`` (rows, cols, G) have the sizes of the sample's pictures, ``output`` (H, W, G) is NaN where there is no
-    guide; ``labels`` says whether its numbers are labels, which are only equal or different; ``weight`` is the variance
-    of the guide in units of the pixels' variance. ``names`` are the labels of each channel, None: those of the samples.
-    """
-
-    samples: tuple[NDArray[Any], ...]
-    output: NDArray[Any]
-    labels: bool
-    weight: float
-    names: tuple[NDArray[Any], ...] | None = None
+    samples: tuple[NDArray[Any], ...]  # (rows, cols, G), of the sizes of the sample's pictures
+    output: NDArray[Any]  # (H, W, G), NaN where there is no guide
+    labels: bool  # whether its numbers are only equal or different
+    weight: float  # the variance of the guide in units of the pixels' variance
+    names: tuple[NDArray[Any], ...] | None = None  # the labels of each channel; None: those of the samples
 
     @property
     def channels(self) -> int:
@@ -69,16 +64,16 @@ class Guide:
             return self.names[channel]
         return np.unique(np.concatenate([np.unique(sample[..., channel]) for sample in self.samples]))
 
-    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+    def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return one channel for each of the guide's, or for each label if these are three or more."""
         silent = unknown_in(self.output)
         parts = [self._channel(channel, silent, spread, top) for channel in range(self.output.shape[-1])]
         counts = zip(*(part.samples for part in parts), strict=True)
         output = np.concatenate([part.output for part in parts])
         output[:, silent] = UNKNOWN
-        return Planes([np.concatenate(those) for those in counts], output)
+        return GuidePlanes([np.concatenate(those) for those in counts], output)
 
-    def _channel(self, channel: int, silent: NDArray[np.bool_], spread: float, top: int) -> Planes:
+    def _channel(self, channel: int, silent: NDArray[np.bool_], spread: float, top: int) -> GuidePlanes:
         samples = [sample[..., channel] for sample in self.samples]
         if self.output.dtype.kind == "f" or any(sample.dtype.kind == "f" for sample in samples):
             samples = [sample.astype(np.float64) for sample in samples]  # `stretch` takes the ends as the pixels' type
@@ -102,20 +97,16 @@ class Guide:
         height = float(top) if self.weight else 0.0
         if variance:
             height = min(sqrt(self.weight * spread / self.output.shape[-1] / variance) * most, top)
-        return Planes([_scaled(one, height, most) for one in unit], _scaled(wanted, height, most))
+        return GuidePlanes([_scaled(one, height, most) for one in unit], _scaled(wanted, height, most))
 
 
 @dataclass(frozen=True, eq=False)
 class Colocated:
-    """A guide of the known variables at sites whose other variables are unknown.
+    """A guide of the known variables at sites whose other variables are unknown."""
 
-    ``pictures`` (rows, cols, C) are the sample's, ``values`` (H, W, C) of the sample's type, and ``known`` (H, W, C) is
-    True for given values.
-    """
-
-    pictures: Pictures
-    values: NDArray[Any]
-    known: NDArray[np.bool_]
+    pictures: Pictures  # the sample's
+    values: NDArray[Any]  # (H, W, C), of the sample's type
+    known: NDArray[np.bool_]  # (H, W, C)
 
     @property
     def channels(self) -> int:
@@ -124,14 +115,14 @@ class Colocated:
         categories = [self.pictures.categories(variable) for variable in known]
         return sum(1 if names is None or len(names) < 3 else len(names) for names in categories)
 
-    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+    def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the channels of the known variables."""
         owner = scale.owners
         those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
         output = scale.levels(self.values)[those]
         for plane, channel in zip(output, those, strict=True):
             plane[~self.known[..., owner[channel]]] = UNKNOWN
-        return Planes([scale.levels(sample)[those] for sample in self.pictures.pixels], output)
+        return GuidePlanes([scale.levels(sample)[those] for sample in self.pictures.pixels], output)
 
 
 AROUND = 4
@@ -143,19 +134,14 @@ NEARNESS, FAR = 3.0, 300
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The smooth colours of a picture, and the places in it: a guide for its holes.
+    """The smooth colours of a picture, and the places in it: a guide for its holes."""
 
-    ``sample`` (rows, cols, C) is the picture, and ``known`` the mask of its known pixels. ``values`` (H, W, C) is the
-    output, and ``given`` the mask of its known pixels; ``corner`` is the first row and the first column of the output
-    in the sample, NaN for an axis that does not guide. ``colours`` says whether colours guide too.
-    """
-
-    sample: NDArray[Any]
-    known: NDArray[np.bool_]
-    values: NDArray[Any]
-    given: NDArray[np.bool_]
-    corner: tuple[float, float]
-    colours: bool = True
+    sample: NDArray[Any]  # (rows, cols, C)
+    known: NDArray[np.bool_]  # in the sample
+    values: NDArray[Any]  # (H, W, C), the output
+    given: NDArray[np.bool_]  # in the output
+    corner: tuple[float, float]  # row and column in the sample of the output's first; NaN for no guide
+    colours: bool = True  # whether colours guide too
 
     def halved(self) -> Surroundings:
         """Return the guide of a picture and an output of half the size."""
@@ -168,21 +154,19 @@ class Surroundings:
         """The number of channels: the colours, the row and the column."""
         return self.colours * int(self.sample.shape[-1]) + 2
 
-    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+    def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the means of the known colours around each pixel, its row and its column."""
         from scipy.ndimage import distance_transform_cdt  # only for a hole, since it loads slowly
 
         step = min(sqrt(NEARNESS * spread) / FAR, top / max(self.sample.shape[:2]))
         reach = AROUND + int(distance_transform_cdt(~self.given, metric="chessboard").max())
-        found = []
-        for picture, where, corner in (
-            (self.sample, self.known, tuple(0 * side for side in self.corner)),
-            (self.values, self.given, self.corner),
-        ):
-            colours = [smooth(scale.levels(picture), where, reach)] if self.colours else []
-            found.append(np.concatenate([*colours, _places(where.shape, corner, step, top)]))
-        sample, output = found
-        return Planes([sample], output)
+
+        def levels(picture: NDArray[Any], known: NDArray[np.bool_], corner: tuple[float, ...]) -> NDArray[np.uint16]:
+            colours = [smooth(scale.levels(picture), known, reach)] if self.colours else []
+            return np.concatenate([*colours, _places(known.shape, corner, step, top)])
+
+        sample = levels(self.sample, self.known, tuple(0 * side for side in self.corner))
+        return GuidePlanes([sample], levels(self.values, self.given, self.corner))
 
 
 AnyGuide = Guide | Colocated | Surroundings
@@ -190,11 +174,8 @@ AnyGuide = Guide | Colocated | Surroundings
 
 
 def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_], reach: int) -> NDArray[np.uint16]:
-    """Return the mean of the known pixels in a square of ``reach`` around each pixel of a picture (C, rows, cols).
-
-    One size of square for hole and picture: means over smaller ones differ more, so that a hole, whose pixels have the
-    means of large squares, would get no joints. 0 where no pixel is known. Cost: about six passes over the picture.
-    """
+    """Return the mean of the known pixels in a square around each pixel of a picture (C, rows, cols); 0 without any."""
+    # one size of square for hole and picture: means over smaller ones differ more, and a hole would get no joints
     count = np.maximum(sums_around(known, reach), 1)
     means = [sums_around(np.where(known, plane, 0), reach) // count for plane in levels]
     return np.array(means, np.uint16).reshape(levels.shape)

@@ -21,9 +21,8 @@ MOST_ORDER = 4096
 def neighbourhood_offsets(order: int, axes: int = 2) -> NDArray[np.int32]:
     """Return the offsets r - s of the neighbourhood of an order, equation (3): (N, axes) int32, in sites.
 
-    The neighbours are the sites within the distance sqrt(order), 1 to `MOST_ORDER`, in canonical order: by distance,
-    then layer, then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60. With 3 ``axes``, layer, row and
-    column, the neighbourhood is a ball: order 1 has 6, order 8 has 92.
+    The neighbours are the sites within the distance sqrt(order) in canonical order: by distance, then layer, then row,
+    then column. Order 8 has 24; with 3 ``axes``, layer, row and column, 92.
     """
     whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
@@ -60,40 +59,20 @@ LATTICE = np.dtype(
 class Grid:
     """The lattice of one level, equation (10), or a window of it: an array of sites with a shape and an origin.
 
-    Sites have numbers in C order: row ``cols`` + column in a picture. The arrays of a level have its sites only.
+    Sites have numbers in C order. The place of a site in the whole is the key of its random numbers, and its number in
+    a window is not: a window relaxes like the same sites of the whole, as far as it holds their neighbourhoods.
 
-    Parameters
-    ----------
-    shape : (int, int) or (int, int, int)
-        Rows and columns of sites, or layers, rows and columns.
-    torus : bool
-        Whether all axes of the whole lattice wrap around.
-    step : int
-        Pixels of the whole picture from site to site: 2**level.
-    picture : tuple of int, optional
-        The shape of the whole picture or volume in pixels. None: one pixel for each site, without a window.
-    origin : tuple of int, optional
-        The place in the whole lattice of the first site of a window. None: this is the whole lattice.
-    tile : (int, int), optional
-        Rows and columns of tiles. Neighbours in another tile are then read from an older picture, which lies below the
-        picture in the same array (`simdtex.methods.mrf.snapshot`).
-    key : (int, int, int)
-        The number of the picture's first pixel in a larger output, the columns of that, 0: those of the picture, and
-        its pixels along a pixel of the picture.
-
-    Notes
-    -----
-    The place of a site in the whole is the key of its random numbers, and its number in a window is not. So a window
-    relaxes like the same sites of the whole, as far as it holds their neighbourhoods.
+    With a ``tile``, neighbours in another tile are read from an older picture, which lies below the picture in the same
+    array (`simdtex.methods.mrf.snapshot`).
     """
 
-    shape: tuple[int, ...]
-    torus: bool = True
-    step: int = 1
-    picture: tuple[int, ...] | None = None
-    origin: tuple[int, ...] | None = None
-    tile: tuple[int, int] | None = None
-    key: tuple[int, int, int] = (0, 0, 1)
+    shape: tuple[int, ...]  # [layers,] rows and columns of sites
+    torus: bool = True  # whether all axes of the whole lattice wrap around
+    step: int = 1  # pixels from site to site: 2**level
+    picture: tuple[int, ...] | None = None  # the shape of the whole in pixels; None: one for each site
+    origin: tuple[int, ...] | None = None  # of a window, its first site in the whole lattice
+    tile: tuple[int, int] | None = None  # rows and columns
+    key: tuple[int, int, int] = (0, 0, 1)  # the first pixel in a larger output, its columns, pixels along a pixel
 
     @classmethod
     def of(cls, picture: tuple[int, ...], step: int = 1, torus: bool = True) -> Grid:
@@ -158,12 +137,7 @@ class Grid:
         return struct
 
     def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
-        """Return a window of this lattice of a picture.
-
-        ``top`` and ``left`` are row and column of its first site; on a torus they may have any value, and the window
-        continues across the seam. Raises ValueError if it is larger than the whole or, on an open lattice, reaches
-        beyond it.
-        """
+        """Return a window of this lattice of a picture; on a torus it may continue across the seam."""
         sides, first = self.whole.shape, np.add(self.first, (top, left))
         if not (0 < rows <= sides[0] and 0 < cols <= sides[1]):
             raise ValueError(f"a window of {rows}x{cols} sites does not fit a lattice of {sides[0]}x{sides[1]}")
@@ -218,10 +192,7 @@ class Grid:
         return array[..., : self.rows, :]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return each neighbour's number, (N, S); -1 outside an open lattice or a window, and for the site itself.
-
-        If there are tiles, `size` is added to the number of a neighbour in another tile.
-        """
+        """Return each neighbour's number, (N, S), plus `size` in another tile; -1 for none, and for the site itself."""
         itself = np.stack(np.unravel_index(sites, self.shape))[:, None]
         there = itself + offsets.T[:, :, None]
         sides = np.array(self.shape)[:, None, None]

@@ -61,26 +61,19 @@ and 0.6 or more of pictures of objects and of textures."""
 
 
 class Trend(NamedTuple):
-    """The trend of a picture of ``shape`` rows and columns, whose mean over the pixels of the fit is 0.
-
-    ``terms`` (6, C) are its coefficients, ``limits`` (2, C) its least and greatest value at pixels of the fit, which it
-    does not exceed elsewhere, and ``ends`` (2, C) those of the picture.
-    """
+    """The trend of a picture of ``shape`` rows and columns, whose mean over the pixels of the fit is 0."""
 
     shape: tuple[int, int]
-    terms: NDArray[np.float64]
-    limits: NDArray[np.float64]
-    ends: NDArray[Any]
+    terms: NDArray[np.float64]  # (6, C), the coefficients
+    limits: NDArray[np.float64]  # (2, C), its extremes at pixels of the fit, which it does not exceed elsewhere
+    ends: NDArray[Any]  # (2, C), the extremes of the picture
 
     def at(self, rows: NDArray[np.integer], cols: NDArray[np.integer], wraps: Axes = ()) -> NDArray[np.float64]:
-        """Return the trend at rows and columns, (rows, cols, C), and at the nearest edge of those beyond the picture.
-
-        Along the axes ``wraps`` it is the mean over the picture, and has the length 1; along both it is 0.
-        """
+        """Return the trend (rows, cols, C), beyond the picture that of the nearest edge; along ``wraps`` its mean."""
         if len(wraps) == 2:
             return np.zeros((1, 1, self.terms.shape[1]))
-        given = [np.arange(side) if n in wraps else (rows, cols)[n] for n, side in enumerate(self.shape)]
-        y, x = (_centred(np.clip(at, 0, side - 1), side) for at, side in zip(given, self.shape, strict=True))
+        lines = [np.arange(side) if n in wraps else (rows, cols)[n] for n, side in enumerate(self.shape)]
+        y, x = (_centred(np.clip(at, 0, side - 1), side) for at, side in zip(lines, self.shape, strict=True))
         found = np.clip(_sheet(self.terms, y[:, None, None], x[:, None]), *self.limits)
         return np.asarray(found.mean(wraps, keepdims=True)) if wraps else found
 
@@ -134,16 +127,13 @@ def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
 
 
 class Relit(NamedTuple):
-    """A picture in its light: ``whole`` (rows, cols, C), but for its part ``made``, which is made in even light.
-
-    The picture of ``trend`` begins at ``corner``. Along the axes ``wraps`` the light is even.
-    """
+    """A picture in its light: ``whole`` (rows, cols, C), but for its part ``made``, which is made in even light."""
 
     whole: NDArray[Any]
     made: Mask
     trend: Trend
-    corner: tuple[int, int] = (0, 0)
-    wraps: Axes = ()
+    corner: tuple[int, int] = (0, 0)  # where the picture of the trend begins
+    wraps: Axes = ()  # along which the light is even
 
     def __call__(self, image: NDArray[Any], level: int = 0) -> NDArray[Any]:
         """Return the picture with its part from ``image``, which is of its size or that of a level."""
@@ -166,10 +156,7 @@ class Light:
 
 
 def in_light(pictures: Pictures, light: str, categorical: Any = False) -> tuple[Pictures, Light]:
-    """Return the pictures of a sample with the option ``light``, ``"keep"`` or ``"even"``, and what was done.
-
-    Only pixels that are known and may be taken count. Raises ValueError if the values are categories.
-    """
+    """Return the pictures of a sample with the option ``light``, ``"keep"`` or ``"even"``, and what was done."""
     one_of("light", light, LIGHTS)
     about = {"light": light, **unevenness(pictures.pixels[0])}
     if light == "keep":
@@ -193,10 +180,7 @@ def trends(pixels: Sequence[NDArray[Any]], use: Sequence[Mask], categorical: Any
 
 
 def unevenness(picture: NDArray[Any]) -> dict[str, float]:
-    """Return how uneven the light of a picture (rows, cols, C) is, by the trend of its means over 8 x 8 blocks.
-
-    ``smooth`` is the trend's share of the variance of the means, and ``share`` its deviation in units of the pixels'.
-    """
+    """Return the share of the trend in the variance of 8 x 8 means, and its deviation in units of the pixels'."""
     if min(picture.shape[:2]) < BLOCKS or float(np.abs(picture).max()) > LARGEST:
         return {"smooth": 0.0, "share": 0.0}
     means = plane = picture.mean(-1, dtype=np.float64)
@@ -210,18 +194,15 @@ def unevenness(picture: NDArray[Any]) -> dict[str, float]:
 
 
 def light_sentence(light: dict[str, Any] | None) -> str:
-    """Return a sentence on a sample whose light is clearly uneven and is kept; "" for others.
-
-    ``light`` is the entry of `simdtex.run.Output.statistics`.
-    """
+    """Return a sentence on a sample whose light is clearly uneven and is kept; "" for others."""
     uneven = light and light["light"] == "keep" and light.get("smooth", 0) >= SMOOTH and light["share"] >= SHARE
     return "The sample's light is uneven; set light to even to remove that." if uneven else ""
 
 
 def sample_sentences(statistics: dict[str, Any]) -> str:
     """Return the sentences on a run's sample, on its lattice and its light, from the statistics; "" without any."""
-    found = [lattice_sentence(statistics.get("lattice")), light_sentence(statistics.get("light"))]
-    return " ".join(filter(None, found))
+    sentences = lattice_sentence(statistics.get("lattice")), light_sentence(statistics.get("light"))
+    return " ".join(filter(None, sentences))
 
 
 def _thinned(use: Mask) -> tuple[slice, slice]:

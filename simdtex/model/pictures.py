@@ -29,31 +29,14 @@ class NothingUsable(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """Pictures of one type that a texture is taken from.
+    """Pictures, or volumes, of one type and of any sizes that a texture is taken from."""
 
-    Parameters
-    ----------
-    pixels : tuple of (rows, cols, C) arrays
-        Pictures of any sizes, NaN where a pixel is unknown; or volumes (layers, rows, cols, C).
-    unknown : tuple of (rows, cols) bool arrays, optional
-        Unknown pixels in addition to NaN: they are never taken, and are no neighbours.
-    usable : tuple of (rows, cols) bool arrays, optional
-        True for pixels that may be taken; all pixels are neighbours. None: all may be taken.
-    categorical : tuple of C bools, optional
-        Whether the numbers of a variable (a channel) name categories. None: none do.
-    weights : tuple of C floats, optional
-        Weights of the variables, which are scaled to the same spread. None: all are on one scale, as colours are.
-    shares : tuple of floats, optional
-        The share of the output for each picture; they need not add up to 1. None: the pixels of all pictures have equal
-        weights.
-    """
-
-    pixels: tuple[NDArray[Any], ...]
-    unknown: tuple[Mask, ...] | None = None
-    usable: tuple[Mask, ...] | None = None
-    categorical: tuple[bool, ...] | None = None
-    weights: tuple[float, ...] | None = None
-    shares: tuple[float, ...] | None = None
+    pixels: tuple[NDArray[Any], ...]  # ([layers,] rows, cols, C), NaN where a pixel is unknown
+    unknown: tuple[Mask, ...] | None = None  # in addition to NaN: never taken, and no neighbours
+    usable: tuple[Mask, ...] | None = None  # pixels that may be taken; None: all
+    categorical: tuple[bool, ...] | None = None  # whether the numbers of a variable name categories; None: none do
+    weights: tuple[float, ...] | None = None  # of variables, scaled to one spread; None: on one scale, as colours
+    shares: tuple[float, ...] | None = None  # of the output, for each picture; None: all pixels have equal weights
     known: tuple[Mask, ...] | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -108,8 +91,8 @@ class Pictures:
     @property
     def channels(self) -> int:
         """Number of channels of working levels: one for a variable, or one for each category if these are 3 or more."""
-        found = [self.categories(variable) for variable in range(self.pixels[0].shape[-1])]
-        return sum(1 if those is None or len(those) < 3 else len(those) for those in found)
+        every = [self.categories(variable) for variable in range(self.pixels[0].shape[-1])]
+        return sum(1 if names is None or len(names) < 3 else len(names) for names in every)
 
 
 def kind(picture: NDArray[Any]) -> str:
@@ -128,8 +111,8 @@ def unknown_in(picture: NDArray[Any]) -> Mask:
     """Return where a picture ([layers,] rows, cols, C) is NaN in any channel."""
     if picture.dtype.kind != "f":
         return np.zeros(picture.shape[:-1], bool)
-    found: Mask = np.isnan(picture).any(-1)
-    return found
+    unknown: Mask = np.isnan(picture).any(-1)
+    return unknown
 
 
 def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
@@ -156,10 +139,7 @@ def few(pictures: Sequence[NDArray[Any]], most: int = CATEGORIES) -> bool:
 
 
 def halved(array: NDArray[Any], all_of_it: bool = False) -> NDArray[Any]:
-    """Return the means, in the same type, of squares of 2x2 of an array (rows, cols, ...); a mask is True if all are.
-
-    An odd last row or column is left out or, with ``all_of_it``, repeated.
-    """
+    """Return the means of squares of 2x2, of masks whether all are True; ``all_of_it`` repeats an odd last line."""
     if all_of_it:
         array = np.pad(array, [(0, side % 2) for side in array.shape[:2]] + [(0, 0)] * (array.ndim - 2), "edge")
     rows, cols = (side - side % 2 for side in array.shape[:2])
@@ -184,15 +164,11 @@ MOST_COPIES = 64
 
 @dataclass(frozen=True, eq=False)
 class Copy:
-    """A copy of a picture.
-
-    ``image``, the number of the picture; ``at``, int32 arrays that broadcast to the shape of the copy, the [layer,] row
-    and column in it of each pixel of the copy; ``inside`` ([layers,] rows, cols), False in the mirror image.
-    """
+    """A copy of the picture with the number ``image``."""
 
     image: int
-    at: tuple[NDArray[np.int32], ...]
-    inside: Mask
+    at: tuple[NDArray[np.int32], ...]  # the [layer,] row and column of each pixel, which broadcast to the copy
+    inside: Mask  # ([layers,] rows, cols), False in the mirror image
 
     def of(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
         """Return the copy of an array ([layers,] rows, cols, ...) that belongs to the picture."""
@@ -200,10 +176,7 @@ class Copy:
 
 
 def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Copy:
-    """Return the copy of a picture of ``shape``, turned by ``eighths`` from x to y and enlarged by sqrt(2)**halves.
-
-    x grows with the column and y with the row. A volume is turned about z, and its layers are enlarged as well.
-    """
+    """Return the copy of a picture of ``shape``, turned by ``eighths`` from x to y and enlarged by sqrt(2)**halves."""
     half = sqrt(0.5)
     cosines = (1.0, half, 0.0, -half, -1.0, -half, 0.0, half)
     cos, sin = cosines[eighths], cosines[(eighths - 2) % EIGHTHS]
@@ -248,20 +221,16 @@ class Turned:
         return Pictures(tuple(one.of(pictures.pixels) for one in copies), unknown, usable)
 
     def sources(self, place: NDArray[np.int32], several: bool) -> NDArray[np.int32]:
-        """Return the source map in the pictures themselves from one of the copies; -1 stays -1.
-
-        ``place`` is (..., 3), row, column and number of the copy, or (..., 2) with one copy, of volumes with the layer
-        before these; with ``several`` pictures the last number of the result is that of the picture.
-        """
+        """Return the source map in the pictures from one of the copies, with the picture's number if ``several``."""
         axes, none = len(self.copies[0].at), place[..., 0] < 0
         number = place[..., axes] if place.shape[-1] > axes else np.where(none, np.int32(-1), np.int32(0))
-        found = np.full((*place.shape[:-1], axes + several), -1, np.int32)
-        for k, one in enumerate(self.copies):
+        source = np.full((*place.shape[:-1], axes + several), -1, np.int32)
+        for k, copy in enumerate(self.copies):
             here = number == k
             at = tuple(place[here][:, :axes].T)
-            lines = [line[at] for line in np.broadcast_arrays(*one.at)]
-            found[here] = np.stack([*lines, np.full(at[0].size, one.image)][: axes + several], -1)
-        return found
+            lines = [line[at] for line in np.broadcast_arrays(*copy.at)]
+            source[here] = np.stack([*lines, np.full(at[0].size, copy.image)][: axes + several], -1)
+        return source
 
 
 def turned(
@@ -272,16 +241,16 @@ def turned(
 ) -> Turned:
     """Return the copies that any site requires, and their probabilities.
 
-    ``images`` (pictures, [D,] H, W) is the probability of each picture, adding up to 1, or NaN. ``rotation`` ([D,] H,
-    W) is in degrees from x to y, and ``scale`` 1/2 to 2; NaN takes any of another site.
+    ``images`` (pictures, [D,] H, W) are probabilities, ``rotation`` ([D,] H, W) degrees from x to y, and ``scale`` 1/2
+    to 2; NaN takes any of another site.
     """
     shape = images.shape[1:]
     turns = np.zeros(shape) if rotation is None else np.floor(rotation / (360 / EIGHTHS) + 0.5) % EIGHTHS
     sizes = np.zeros(shape) if scale is None else np.clip(np.floor(2 * np.log2(scale) + 0.5), -HALVES, HALVES)
     free = np.isnan(images[0]) | np.isnan(turns) | np.isnan(sizes)
     kind = np.where(free, 0, turns * (2 * HALVES + 1) + sizes + HALVES).astype(np.int64)
-    wanted = [(int(one), n) for one in np.unique(kind[~free]) for n in range(len(images))]
-    wanted = [(one, n) for one, n in wanted if images[n][(kind == one) & ~free].any()]
+    wanted = [(int(k), n) for k in np.unique(kind[~free]) for n in range(len(images))]
+    wanted = [(k, n) for k, n in wanted if images[n][(kind == k) & ~free].any()]
     if not wanted:
         raise ValueError("the maps of training images, rotation and scale have no number; leave them out")
     if len(wanted) > MOST_COPIES:
@@ -289,8 +258,8 @@ def turned(
             f"the maps ask for {len(wanted)} different copies of training images; round rotation and scale so that "
             f"there are {MOST_COPIES} or fewer"
         )
-    probability = np.stack([np.where(kind == one, images[n], 0) for one, n in wanted])
+    probability = np.stack([np.where(kind == k, images[n], 0) for k, n in wanted])
     probability[:, free] = np.nan
-    copies = [(n, one // (2 * HALVES + 1), one % (2 * HALVES + 1) - HALVES) for one, n in wanted]
+    copies = [(n, k // (2 * HALVES + 1), k % (2 * HALVES + 1) - HALVES) for k, n in wanted]
     sides = [picture.shape[:-1] for picture in pictures.pixels]
     return Turned(tuple(copy_of(n, sides[n], turn, halves) for n, turn, halves in copies), probability)

@@ -136,39 +136,31 @@ class Lattice(NamedTuple):
         return sqrt(float(((_inverse(self.basis) @ basis - np.eye(2)) ** 2).sum()))
 
     def fitting(self, shape: tuple[int, int]) -> tuple[int, int]:
-        """Return rows and columns near ``shape`` of a torus that holds the lattice almost undeformed.
-
-        Among the sizes within a quarter of ``shape``, a deformation of 1 % is as bad as a change in size of 20 %.
-        """
+        """Return rows and columns near ``shape`` of a torus that holds the lattice almost undeformed."""
         best = []
         for axis, wanted in enumerate(shape):
             sizes = np.arange(max(1, wanted - wanted // 4), wanted + wanted // 4 + 1)
             nodes = (sizes[:, None] * np.eye(2)[axis]) @ _inverse(self.basis)
             missed = np.sqrt((((np.rint(nodes) - nodes) @ self.basis) ** 2).sum(1))
-            cost = missed / sizes + 0.05 * abs(sizes - wanted) / wanted
+            cost = missed / sizes + 0.05 * abs(sizes - wanted) / wanted  # 1 % deformed is as bad as 20 % larger
             best.append(int(sizes[np.argmin(np.where((np.rint(nodes) == 0).all(1), np.inf, cost))]))
         return best[0], best[1]
 
 
 class Phases(NamedTuple):
-    """The phases of the sample's pictures and of the output as a guide: ``pictures`` and ``output`` are their lattices.
-
-    ``weight`` is the variance of the guide in units of the sample's variance.
-    """
+    """The phases of the sample's pictures and of the output as a guide, by the lattices of these."""
 
     pictures: tuple[Lattice, ...]
     output: Lattice
-    weight: float = 1.0
+    weight: float = 1.0  # the variance of the guide in units of the sample's
 
     def halved(self) -> Phases:
         """Return the phases of pictures and an output of half the size."""
         return Phases(tuple(one.halved() for one in self.pictures), self.output.halved(), self.weight)
 
     def waves(self, spread: float, top: int) -> Waves:
-        """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels, summed over channels.
-
-        Each of the guide's `WAVES` cosines has the variance 1/2.
-        """
+        """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels, summed over channels."""
+        # each of the cosines has the variance 1/2
         return Waves(*self, min(sqrt(2 * self.weight * spread / WAVES), top / 2))
 
     def statistics(self, shape: tuple[int, int]) -> dict[str, Any]:
@@ -217,9 +209,9 @@ class Waves(NamedTuple):
 
     def _phase(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
         parts = np.array(self.divisions).reshape(2, *[1] * np.broadcast(row, col).ndim)
-        one, other = np.floor(lattice.phases(row, col) * parts).astype(np.int64) % parts
-        found: NDArray[np.int32] = (one * self.divisions[1] + other).astype(np.int32)
-        return found
+        along, across = np.floor(lattice.phases(row, col) * parts).astype(np.int64) % parts
+        phase: NDArray[np.int32] = (along * self.divisions[1] + across).astype(np.int32)
+        return phase
 
     def half(self, step: int) -> float:
         """Return the squared difference, in levels, of pixels half a step apart: the mean along rows and columns."""
@@ -240,7 +232,7 @@ def parse_lattice(value: Any) -> Lattice | str | None:
     remedy = 'give "auto", "none", or two vectors in pixels: ((dy, dx), (dy, dx)), or the text "DY,DX,DY,DX"'
     parts: list[Any] = value.split(",") if isinstance(value, str) else []
     if isinstance(value, (tuple, list)):
-        parts = [number for one in value for number in (one if isinstance(one, (tuple, list)) else (one,))]
+        parts = [number for part in value for number in (part if isinstance(part, (tuple, list)) else (part,))]
     elif not isinstance(value, str):
         raise TypeError(f"lattice must be a text or two vectors, not {shown(value)}; {remedy}")
     try:
@@ -262,9 +254,8 @@ def phases(
 ) -> Phases | None:
     """Return the phases that guide an output; None if the sample has no lattice, or ``"auto"`` finds none that fits.
 
-    ``shape`` is that of the output; on a torus its lattice is deformed to fit. ``lattice`` is that of the largest
-    picture, or ``"auto"``. ``known`` are values (H, W, C) of the output, the mask (H, W) of known ones, and their
-    positions in the sample (H, W, 2 or 3), -1 or None if they are from elsewhere; they determine the output's phases.
+    ``lattice`` is that of the largest picture, or ``"auto"``. ``known`` are values (H, W, C) of the output, their mask
+    (H, W), and their positions in the sample (H, W, 2 or 3), -1 or None from elsewhere, which fix the output's phases.
     """
     planes, masks = plain(pictures)
     largest = max(range(len(planes)), key=lambda number: (planes[number].size, -number))
@@ -272,7 +263,7 @@ def phases(
     if found is None:
         return None
     reference = harmonics(planes[largest], masks[largest], found)
-    own = [
+    lattices = [
         found if number == largest else aligned(found, reference, harmonics(plane, mask, found))
         for number, (plane, mask) in enumerate(zip(planes, masks, strict=True))
     ]
@@ -289,18 +280,15 @@ def phases(
         values, where, place = known
         from_sample = None if place is None else where & (place[..., 0] >= 0)
         if place is not None and from_sample is not None and from_sample.any():
-            output = _continued(output, own, place, from_sample)
+            output = _continued(output, lattices, place, from_sample)
         else:
             theirs, _ = plain(Pictures((values,), weights=pictures.weights), like=pictures)
             output = aligned(output, reference, harmonics(theirs[0], where, output))
-    return Phases(tuple(own), output)
+    return Phases(tuple(lattices), output)
 
 
 def lattice_sentence(lattice: dict[str, Any] | None) -> str:
-    """Return a sentence on the deformation of a regular sample and any size that fits better; "" if it is 1 % or less.
-
-    ``lattice`` is the entry of `simdtex.run.Output.statistics`.
-    """
+    """Return a sentence on the deformation of a regular sample and any size that fits better; "" up to 1 %."""
     if not lattice or lattice["deformation"] <= NOTICED:
         return ""
     better = "; {1}x{0} pixels fit it better".format(*lattice["fitting"]) if lattice["fitting"] else ""
@@ -308,10 +296,7 @@ def lattice_sentence(lattice: dict[str, Any] | None) -> str:
 
 
 def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArray[np.int64]], list[NDArray[np.bool_]]]:
-    """Return pictures in one channel of integers, 0 to about 255, and the masks of known pixels.
-
-    The channel is the first principal component. ``like`` are the pictures that determine scale and component.
-    """
+    """Return the first principal component of pictures, scaled as ``like`` to 0..255, and masks of known pixels."""
     scale = like or pictures
     variables = [[p[..., v] for p in scale.pixels] for v in range(scale.pixels[0].shape[-1])]
     ends = [(min(p.min() for p in those), max(p.max() for p in those)) for those in variables]
@@ -324,24 +309,20 @@ def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArra
     theirs = [levels(p) for p in scale.pixels]
     by = principal(theirs)
     total = max(1, int(np.abs(by).sum()))
-    found = theirs if like is None else [levels(p) for p in pictures.pixels]
+    planes = theirs if like is None else [levels(p) for p in pictures.pixels]
     masks = list(pictures.known or [np.ones(p.shape[:2], bool) for p in pictures.pixels])
-    return [np.tensordot(by, one, 1) // total for one in found], masks
+    return [np.tensordot(by, plane, 1) // total for plane in planes], masks
 
 
 def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | None:
-    """Return the lattice of a picture (rows, cols) of integers, known where ``known``; None if it has none.
-
-    Each pair of peaks of the autocorrelation is reduced to the shortest vectors of its lattice. The result is the
-    lattice with the greatest mean autocorrelation over the nodes, or a much smaller one that is nearly as strong.
-    """
+    """Return the lattice of a picture (rows, cols) of integers with the greatest mean autocorrelation, or None."""
     if min(picture.shape) < LEAST_SIDE or not known.any():
         return None
     correlation = autocorrelation(picture, known)
-    found = followed(correlation, candidates(correlation))
-    found = [one for one in found if one.strength >= max(LEAST_STRENGTH, SIGNIFICANT * one.error * one.length)]
-    least = max([CONTRAST, *(OF_GREATEST * one.contrast for one in found)])
-    best = _best([one for one in found if one.contrast >= least])
+    lattices = followed(correlation, candidates(correlation))
+    lattices = [one for one in lattices if one.strength >= max(LEAST_STRENGTH, SIGNIFICANT * one.error * one.length)]
+    least = max([CONTRAST, *(OF_GREATEST * each.contrast for each in lattices)])
+    best = _best([each for each in lattices if each.contrast >= least])
     if best is None:
         best = _best(followed(correlation, candidates(correlation, sides=2)))
         if best is None or best.strength < STRIPES:
@@ -350,22 +331,18 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
 
 
 class Followed(NamedTuple):
-    """A lattice that was followed through the autocorrelation.
-
-    ``strength`` is the mean autocorrelation over all nodes but the origin, ``error`` its standard error, and
-    ``contrast`` the rise to it from the points between the nodes.
-    """
+    """A lattice that was followed through the autocorrelation."""
 
     lattice: Lattice
-    strength: float
-    error: float
-    contrast: float
+    strength: float  # the mean autocorrelation over all nodes but the origin
+    error: float  # its standard error
+    contrast: float  # the rise to it from the points between the nodes
 
     @property
     def length(self) -> float:
         """The root of the ratio of the longer vector to the shorter one."""
-        one, other = (sqrt(y * y + x * x) for y, x in self.lattice[:2])
-        return sqrt(max(one, other) / min(one, other))
+        lengths = [sqrt(y * y + x * x) for y, x in self.lattice[:2]]
+        return sqrt(max(lengths) / min(lengths))
 
 
 def _best(lattices: list[Followed]) -> Followed | None:
@@ -380,22 +357,18 @@ def _best(lattices: list[Followed]) -> Followed | None:
     return best
 
 
-def _by_strength(one: Followed) -> tuple[float, float]:
+def _by_strength(candidate: Followed) -> tuple[float, float]:
     """Return the order of lattices: by strength, and of equals the one with the smaller cell."""
-    return round(one.strength, 6), -round(one.lattice.cell, 6)
+    return round(candidate.strength, 6), -round(candidate.lattice.cell, 6)
 
 
 class Correlation(NamedTuple):
-    """The autocorrelation of a picture.
+    """The autocorrelation of a picture."""
 
-    ``values`` (2 m + 1, 2 n + 1), with the lag (0, 0) in the middle; ``around``, the greatest of 3x3 lags; ``length``,
-    the squared length of each lag; ``pixels``, the number of known pixels.
-    """
-
-    values: NDArray[np.float64]
-    around: NDArray[np.float64]
-    length: NDArray[np.int64]
-    pixels: int
+    values: NDArray[np.float64]  # (2 m + 1, 2 n + 1), with the lag (0, 0) in the middle
+    around: NDArray[np.float64]  # the greatest of 3x3 lags
+    length: NDArray[np.int64]  # the squared length of each lag
+    pixels: int  # known ones
 
     @property
     def reach(self) -> tuple[int, int]:
@@ -437,10 +410,7 @@ def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
 
 
 def candidates(correlation: Correlation, sides: int = 3) -> NDArray[np.int64]:
-    """Return the reduced bases (n, 2, 2) of pairs of peaks, each once, if the values rise along ``sides`` vectors.
-
-    The three shortest vectors of a lattice end at peaks; on the ridges of stripes only two of them do.
-    """
+    """Return the reduced bases (n, 2, 2) of pairs of peaks, each once, if the values rise along ``sides`` vectors."""
     values, (m, n) = correlation.values, correlation.reach
     peak = (values == _greatest(values, 2)) & (values > LEAST_PEAK)
     peak[:2] = peak[-2:] = peak[:, :2] = peak[:, -2:] = False  # cut by the border
@@ -511,10 +481,7 @@ def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[Followed]:
-    """Return each lattice with its vectors fitted to the peaks near its nodes, and its strength.
-
-    Lattices without enough nodes are left out. All are followed together, since their nodes are few.
-    """
+    """Return each lattice that has enough nodes with its vectors fitted to the peaks near them, and its strength."""
     bases, reach, away = pairs.astype(np.float64), np.array(correlation.reach), 1
     left = np.arange(len(pairs))
     while left.size:  # up to farther nodes as the vectors become exact
@@ -547,10 +514,7 @@ def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[Followe
 def _nodes(
     bases: NDArray[np.float64], reach: NDArray[np.int64], away: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the nodes of lattices (n, 2, 2) within ``away`` steps, without the origins.
-
-    These are the number of the lattice of each (k,), the node (k, 2), and its lag (k, 2).
-    """
+    """Return the lattice (k,), the node (k, 2) and the lag (k, 2) of nodes within ``away`` steps, without origins."""
     corners = (np.abs(_inverse(bases)) * reach[:, None]).sum(1)  # of the window
     limits = np.minimum(away, np.ceil(corners)).astype(np.int64)
     sides = 2 * limits + 1

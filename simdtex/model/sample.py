@@ -33,23 +33,17 @@ FEW = 1000
 
 
 class Places(NamedTuple):
-    """The places of a level's candidates: the crossings of some rows and columns of the sample.
+    """The places of a level's candidates: the crossings of some rows and columns of the sample."""
 
-    ``offsets`` (N, 2 or 3), the neighbourhood; ``spacing``, its spacing 2**level; ``step``, the pixels of the sample
-    from one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32, the pixel index of
-    each, row by row; ``allowed`` (n,), whether each is a candidate, or None if all are; ``reach`` (N,) int32, the pixel
-    offset of each neighbour; ``layers`` of crossings, 1 for pictures: a volume has the rows of all its layers.
-    """
-
-    offsets: NDArray[np.int32]
-    spacing: int
-    step: int
+    offsets: NDArray[np.int32]  # (N, 2 or 3), the neighbourhood
+    spacing: int  # 2**level
+    step: int  # pixels from one crossing to the next
     row: NDArray[np.int32]
     col: NDArray[np.int32]
-    everywhere: NDArray[np.int32]
-    allowed: NDArray[np.bool_] | None
-    reach: NDArray[np.int32]
-    layers: int = 1
+    everywhere: NDArray[np.int32]  # (n,), the pixel index of each crossing, row by row
+    allowed: NDArray[np.bool_] | None  # (n,), whether each is a candidate; None: all are
+    reach: NDArray[np.int32]  # (N,), the pixel offset of each neighbour
+    layers: int = 1  # of crossings; a volume has the rows of all its layers
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -64,20 +58,14 @@ class Places(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """The sample positions p that a site may take, at one level.
+    """The sample positions p that a site may take, at one level, as arrays of a machine."""
 
-    ``pixels`` (C, rows * cols) float32, the working grey levels including the margin; ``positions`` (n,) int32, the
-    pixel index of each p, row by row; ``size``, n; ``reach`` (N,) int32, the pixel offset of each
-    neighbour; ``index_of`` (rows * cols,) int32, the index of a pixel in ``positions`` or -1; ``guides``, the number of
-    guide channels, which are the last.
-    """
-
-    pixels: Any
-    positions: Any
-    size: int
-    reach: Any
-    index_of: Any
-    guides: int = 0
+    pixels: Any  # (C, rows * cols) float32, the working grey levels including the margin
+    positions: Any  # (n,) int32, the pixel index of each p, row by row
+    size: int  # n
+    reach: Any  # (N,) int32, the pixel offset of each neighbour
+    index_of: Any  # (rows * cols,) int32, the index of a pixel in positions or -1
+    guides: int = 0  # channels of guides, which are the last
 
     @property
     def plane(self) -> int:
@@ -97,80 +85,31 @@ class Candidates(NamedTuple):
 class Sample:
     """A sample in working grey levels: pictures one below another, or the layers of volumes.
 
-    `simdtex.model.scale` maps pixels to working levels. Pixels of the output are the sample's own, or differ from them
-    by the finish in steps of an eighth of a level, so the output has their full precision.
-
-    Parameters
-    ----------
-    pixels : (height, width, channels) array, or Pictures
-        As given by the user; any real type.
-    values : int
-        Number of values of a neighbourhood: channels times neighbours.
-    margin : int
-        Pixels by which each picture is continued by reflection on every side, for the neighbourhoods of its outer
-        pixels. The margin itself is never taken.
-    weight : float
-        Weight of the structure channel (`simdtex.model.scale`), which is matched like the other channels and never
-        shown; 0: none.
-    step : int
-        Pixels from site to site at the coarsest level; every picture begins at a multiple.
-    guides : sequence of AnyGuide
-        Guides, whose channels come last.
-    apart : int
-        The least distance between two pictures in pixels, if that is more than their margins: within it, a pixel has
-        no neighbour in another picture.
-    phases : Phases, optional
-        The guide by the sample's own lattice, which is no channel, see `phases_at`.
-    reduction : int
-        Pixels of the user's sample along a side of the square whose mean a pixel is.
-
-    Attributes
-    ----------
-    shown : int
-        Number of channels of working levels for the picture itself.
-    channels : int
-        Number of matched channels: those, and the structure channel.
-    guides : (G, H, W) uint16 array
-        Working levels of the output's guides.
-    known_variables : int
-        Number of the last guide channels that are variables known at sites whose other variables are unknown.
-    waves : Waves or None
-        The phases in working levels.
-    guided : list of (G, rows, cols) uint16 arrays
-        Working levels of the guides of each picture; empty without guides.
-    boxes : list of (int, int, int)
-        First row, number of rows and number of columns of each picture; of a volume its first layer, rows and columns.
-    layer : int
-        Rows of a layer of a volume with its margin; 0 for pictures.
-
-    Notes
-    -----
     A term of (12) is a square of a whole multiple of 2**-10 below 2**b, so a sum of `values` of them needs
     2 b + 20 + log2(values) bits. With 53 or fewer, float64 holds it and the NumPy twin, which rounds to float32 after
     each term, has the bits of a device's fma.
+
+    Of its attributes, ``shown`` is the number of channels of the picture itself, and ``channels`` that of these and the
+    structure channel; ``guides`` (G, H, W) and ``guided``, (G, rows, cols) of each picture, are levels of guides;
+    ``known_variables`` counts the last guide channels, which are variables known at sites whose others are unknown;
+    ``boxes`` are the first row (of a volume, layer), the rows and the columns of each picture; ``layer``, the rows of a
+    layer of a volume with its margin, is 0 for pictures.
     """
 
     def __init__(
         self,
         pixels: NDArray[Any] | Pictures,
-        values: int,
-        margin: int = 0,
-        weight: float = 0.0,
-        step: int = 1,
-        guides: Sequence[AnyGuide] = (),
-        apart: int = 0,
-        phases: Phases | None = None,
-        reduction: int = 1,
+        values: int,  # of a neighbourhood: channels times neighbours
+        margin: int = 0,  # pixels by which each picture is continued by reflection; they are never taken
+        weight: float = 0.0,  # of the structure channel, which is matched and never shown
+        step: int = 1,  # pixels from site to site at the coarsest level; every picture begins at a multiple
+        guides: Sequence[AnyGuide] = (),  # whose channels come last
+        apart: int = 0,  # the least distance between two pictures, if that is more than their margins
+        phases: Phases | None = None,  # the guide by the sample's own lattice, which is no channel
+        reduction: int = 1,  # pixels of the user's sample along a side of the square whose mean a pixel is
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
-        self.layout = {
-            "values": values,
-            "margin": margin,
-            "weight": weight,
-            "step": step,
-            "apart": apart,
-            "reduction": reduction,
-        }
+        self.layout = dict(values=values, margin=margin, weight=weight, step=step, apart=apart, reduction=reduction)
         self.phases, self.reduction = phases, reduction
         self.scale = Scale(self.pictures, values)
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
@@ -185,8 +124,8 @@ class Sample:
         for guide in guiding:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
-        told = (len(planes.output) for one, planes in zip(guides, guiding, strict=True) if isinstance(one, Colocated))
-        self.known_variables = sum(told)
+        known = (len(planes.output) for one, planes in zip(guides, guiding, strict=True) if isinstance(one, Colocated))
+        self.known_variables = sum(known)
         self.waves = phases and phases.waves(spread * self.shown, highest(values))
         self._lay(levels, margin, step, apart)
         self.channels = channels
@@ -273,10 +212,7 @@ class Sample:
         return np.stack([layer * self.layer + row, col], 1) * np.int32(spacing)
 
     def _crossings(self, radius: int, step: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
-        """Return rows and columns of places, without the margin, and a mask of those with a whole neighbourhood.
-
-        ``radius`` of the neighbourhood is in pixels.
-        """
+        """Return rows and columns of places, without the margin, and the mask of those with a whole neighbourhood."""
 
         def whole(at: NDArray[np.int32], first: int, size: int) -> NDArray[np.bool_]:
             inside: NDArray[np.bool_] = (at - radius >= first) & (at + radius < first + size)
@@ -284,65 +220,48 @@ class Sample:
 
         row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
         layer = np.arange(0, self.depth if self.layer else 1, step, dtype=np.int32)
-        found = np.zeros((layer.size, row.size, col.size), bool)
+        mask = np.zeros((layer.size, row.size, col.size), bool)
         for (top, rows, cols), levels in zip(self.boxes, self.levels, strict=True):
             down = whole(row, 0 if self.layer else top, rows)
             deep = whole(layer, top, levels.shape[1]) if self.layer else np.ones(1, bool)
-            found |= deep[:, None, None] & down[:, None] & whole(col, 0, cols)
+            mask |= deep[:, None, None] & down[:, None] & whole(col, 0, cols)
         if self.layer:
             row = ((layer + self.margin)[:, None] * np.int32(self.layer) + row).ravel()
-        return row, col, found.reshape(-1, col.size)
+        return row, col, mask.reshape(-1, col.size)
 
     def places(self, offsets: NDArray[np.int32], spacing: int, phases: int = 1, edges: str = "whole") -> Places:
-        """Return the places of the candidates of a level.
+        """Return the places of the candidates of a level, whose neighbourhood has the ``spacing`` 2**level.
 
         Places outside the pictures, unknown or unusable ones, and those with too large a share of unknown neighbours
-        (`UNSURE`) are no candidates.
-
-        Parameters
-        ----------
-        offsets : (N, 2 or 3) int32 array
-            The neighbourhood.
-        spacing : int
-            The spacing 2**level of the neighbourhood.
-        phases : int
-            The number of decimations along each axis, equation (10), whose pixels are places; it is rounded down to a
-            power of 2. From `spacing` on, every pixel is a place.
-        edges : {"whole", "reflect", "auto"}
-            ``"whole"``: places whose neighbourhood lies in their picture, equation (4), but all at a coarse level
-            with fewer than `FEW` of them. ``"reflect"``: all, if the margin is wide enough. ``"auto"``: whole at the
-            finest level, if those are three quarters of all places or more, else reflect.
-
-        Raises
-        ------
-        NothingUsable
-            No pixel of several pictures, or of one with gaps, is a candidate.
+        (`UNSURE`) are no candidates. ``phases``, rounded down to a power of 2, is the number of decimations along each
+        axis, equation (10), whose pixels are places; from `spacing` on, every pixel is one. ``edges`` says whether
+        neighbourhoods must be whole, equation (4); a coarse level with fewer than `FEW` such places reflects, too.
         """
         key = (offsets.tobytes(), spacing, phases, edges)
         if key in self._places:
             return self._places[key]
         step, margin = max(1, spacing >> (phases.bit_length() - 1)), self.margin
         row, col, whole = self._crossings(int(offsets.max()) * spacing, step)
-        found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
+        usable: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
         apart = self._in_pixels(offsets, spacing)
-        of_all, of_whole = np.count_nonzero(found), np.count_nonzero(found & whole)
+        of_all, of_whole = np.count_nonzero(usable), np.count_nonzero(usable & whole)
         reflects = {
             "auto": spacing > 1 or of_whole < ENOUGH_WHOLE * of_all,
             "whole": spacing > 1 and of_whole < FEW,
             "reflect": True,
         }
         if not reflects[edges]:
-            found &= whole
+            usable &= whole
         if self.pictures.clean:
-            row, col, allowed = row[found.any(1)], col[found.any(0)], None
+            row, col, allowed = row[usable.any(1)], col[usable.any(0)], None
         else:
             if self.pictures.known:
-                found &= self._sure(apart, row + margin, col + margin)
-            if not found.any():
+                usable &= self._sure(apart, row + margin, col + margin)
+            if not usable.any():
                 raise NothingUsable(
                     "nothing of the sample is usable at a level; give more of it, order=1 or 2, or fewer levels"
                 )
-            allowed = found.ravel()
+            allowed = usable.ravel()
         everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
         reach = apart @ np.array([self.cols, 1], np.int32)
         layers = len(set(((row + margin) // self.layer).tolist())) if self.layer else 1
@@ -358,9 +277,9 @@ class Sample:
         count = np.zeros((int(near.sum()), col.size), np.int16)
         for a, b in offsets:
             count += missing[np.ix_(row[near] + a, col + b)]
-        found = np.ones((row.size, col.size), bool)
-        found[near] = count <= UNSURE * len(offsets)
-        return found
+        sure = np.ones((row.size, col.size), bool)
+        sure[near] = count <= UNSURE * len(offsets)
+        return sure
 
     def fair(self, places: Places) -> NDArray[np.int64] | None:
         """Return the fair use of each place, (n,) integers in one unit; None if it is the same for all."""
@@ -388,25 +307,25 @@ class Sample:
         """Return the phases (waves, n) of pixels (n,) of a regular sample."""
         assert self.waves
         found = np.empty((WAVES, source.size), np.uint16)
-        for here, own, row, col in self._in_pictures(source):
-            found[:, own] = self.waves.sample(here, row, col)
+        for picture, there, row, col in self._in_pictures(source):
+            found[:, there] = self.waves.sample(picture, row, col)
         return found
 
     def phase_numbers_at(self, source: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the numbers (n,) of the phases of pixels (n,) of a regular sample."""
         assert self.waves
         found = np.empty(source.size, np.int32)
-        for here, own, row, col in self._in_pictures(source):
-            found[own] = self.waves.phase(here, row, col)
+        for picture, there, row, col in self._in_pictures(source):
+            found[there] = self.waves.phase(picture, row, col)
         return found
 
     def _in_pictures(self, source: NDArray[np.integer]) -> Iterator[tuple[int, NDArray[np.bool_], Any, Any]]:
         """Yield the number of each picture, which of the pixels (n,) are in it, and their rows and columns there."""
         row, col = np.divmod(source, self.cols) - np.full(2, self.margin)[:, None]
-        number = self.picture_of(source)
-        for here, (top, *_) in enumerate(self.boxes):
-            own = number == here
-            yield here, own, row[own] - top, col[own]
+        pictures = self.picture_of(source)
+        for picture, (top, *_) in enumerate(self.boxes):
+            there = pictures == picture
+            yield picture, there, row[there] - top, col[there]
 
     @property
     def hot(self) -> int:
@@ -419,10 +338,7 @@ class Sample:
         return machine.put(self.working.astype(np.float32))
 
     def candidates(self, machine: Any, places: Places, planes: Any | None = None, every: bool = False) -> Candidates:
-        """Return the candidates of a level as arrays of a machine; ``planes`` are the working levels if it has them.
-
-        With ``every`` the list has all places, and ``index_of`` has only the candidates among them.
-        """
+        """Return the candidates of a level, or ``every`` place in the list; ``planes`` are levels on the machine."""
         positions = places.positions
         index_of = np.full(self.rows * self.cols, -1, np.int32)
         index_of[positions] = np.arange(positions.size, dtype=np.int32)
@@ -450,10 +366,7 @@ class Sample:
         return tuple(line - np.int32(self.margin) for line in lines)
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return (row, column) in the user's sample of pixel indices, on a last axis; -1 for a pixel without source.
-
-        With a volume the result is (layer, row, column); with several pictures the number of the picture is the last.
-        """
+        """Return [layer,] row, column[, picture] in the user's sample of pixel indices; -1 without a source."""
         place = np.stack(self._coordinates(source), -1)
         if len(self.boxes) > 1:
             number = self.picture_of(source).astype(np.int32)
@@ -475,11 +388,9 @@ class Sample:
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
-        """Return the picture (rows, cols, C) of working levels and sources, in the sample's own type.
+        """Return the picture (rows, cols, C) of working levels (C, rows, cols) and pixel indices (rows, cols).
 
-        ``values`` (C, rows, cols) are working levels, of which the structure channel is not shown; ``source`` (rows,
-        cols) are pixel indices in the sample. A pixel is its source pixel plus the difference of the working level from
-        that of the source.
+        A pixel is its source pixel plus the difference of the working level from that of the source.
         """
         source = np.maximum(source, self.first)  # without a source: the difference from the first pixel
         own, usual = self.own(source), self.working[: self.shown, source]
@@ -490,8 +401,8 @@ class Sample:
 
     def own(self, source: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (..., C) at pixel indices, in the sample's own type."""
-        own: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
-        return own
+        pixels: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
+        return pixels
 
     def category(self, source: NDArray[Any]) -> NDArray[np.intp]:
         """Return the number of the category of the first variable of pixels (n,), in ascending order."""
@@ -514,11 +425,7 @@ class Sample:
         return found
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
-        """Return the pixels (rows, cols, C) of ``source``, plus the differences from `simdtex.methods.mrf.finish`.
-
-        ``source`` (rows, cols) are pixel indices; ``by`` (C, rows, cols) are working levels of 8-bit samples, and
-        `FINE`-ths of a working level of others.
-        """
+        """Return the pixels (rows, cols, C) at indices, plus the differences ``by`` (C, rows, cols) of the finish."""
         own, change = self.own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8 and self.direct:
             exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
@@ -543,10 +450,7 @@ def variance(*pictures: NDArray[np.integer]) -> float:
 
 
 def moved(own: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) -> NDArray[Any]:
-    """Return pixels of a sample plus a difference in units, as the closest legal ones; no difference keeps the pixel.
-
-    Legal are 0 to 255 for 8 bits, otherwise the range from the sample's smallest to its largest pixel.
-    """
+    """Return pixels plus a difference in units, as the closest of 0 to 255 for 8 bits, else of the sample's range."""
     with np.errstate(over="ignore"):  # half values beyond the largest double are clipped
         half = own.astype(np.float64) / 2 + by * (unit / 2)
     if pixels.dtype == np.bool_:

@@ -28,11 +28,10 @@ EXACT = 12
 
 
 class Scale:
-    """The map from the pixels of a sample to working levels.
+    """The map from the pixels of a sample to working levels, for neighbourhoods of so many ``values``.
 
-    ``values`` is the number of values of a neighbourhood: channels of working levels times neighbours. ``top`` is the
-    highest working level; ``direct`` is True if the channels of working levels are those of the pixels, and ``unit`` is
-    then one working level in the pixels' own unit.
+    ``top`` is the highest working level; ``direct`` is True if the channels of working levels are those of the pixels,
+    and ``unit`` is then one working level in the pixels' own unit.
     """
 
     def __init__(self, pictures: Pictures, values: int) -> None:
@@ -147,10 +146,7 @@ def highest(values: int) -> int:
 
 
 def stretch(pixels: NDArray[Any], top: int, ends: tuple[Any, Any] | None = None) -> tuple[NDArray[np.int64], float]:
-    """Return pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit.
-
-    ``ends`` are the pixels that become 0 and top; None: the least and the greatest pixel.
-    """
+    """Return pixels stretched over the integers 0..top from ``ends``, and the size of 1 in the pixels' unit."""
     low, high = ends or (pixels.min(), pixels.max())
     if pixels.dtype.kind in "iu":
         bounds = np.array([low, high]).astype(np.uint64)  # modulo 2**64, so a difference from the least is exact
@@ -188,15 +184,10 @@ SQUARINGS = 12
 def structure(
     pictures: Sequence[NDArray[np.integer]], weight: float, variance: float, top: int
 ) -> list[NDArray[np.uint16]]:
-    """Return the signed distance to the border between the bright and the dark of a sample, as working levels.
-
-    ``pictures`` (C, rows, cols) are working levels up to ``top``, of this ``variance``; the standard deviation of the
-    result is ``weight`` times the sample's, or less so that it fits 0..top. It has (rows, cols) for each picture, on
-    one scale: 0 in the middle of the widest dark part; constant if no pixel is brighter than its surroundings.
+    """Return the signed distance to the border between the bright and the dark of pictures (C, rows, cols), as levels.
 
     A pixel is bright if the first principal component of the sample, smoothed, exceeds the mean of its surroundings.
-    The value of a bright pixel is the distance to the nearest dark one, less half a pixel; the value of a dark pixel is
-    minus the distance to the nearest bright one, plus half a pixel. Both are limited to `REACH`.
+    The standard deviation of the result is ``weight`` times the sample's, or less so that it fits 0..top.
     """
     smooth = [np.stack([smoothed(channel) for channel in levels]) for levels in pictures]
     by = principal(smooth)
@@ -219,8 +210,7 @@ def structure(
 def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
     """Return the first principal component of pictures (C, rows, cols) of integers: (C,) weights, -127 to 127.
 
-    The weights add up to 0 or more; if both signs do, the first weight is positive. All arithmetic is on integers,
-    since the last bits of a library's eigenvectors differ from machine to machine.
+    All arithmetic is on integers, since the last bits of a library's eigenvectors differ from machine to machine.
     """
     channels = len(pictures[0])
     flat = [one.reshape(channels, -1).astype(np.int64) for one in pictures]
@@ -257,10 +247,7 @@ def smoothed(channel: NDArray[np.integer]) -> NDArray[np.int64]:
 
 
 def surroundings(component: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Return the sums of each pixel's surroundings (rows, cols), and the sum of their weights.
-
-    The mirror image continues the picture beyond its borders.
-    """
+    """Return the sums of each pixel's surroundings (rows, cols), mirrored at borders, and the sum of their weights."""
     total = 1
     for width in BOXES:
         for axis in (0, 1):

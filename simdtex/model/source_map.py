@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.files import atomic_path, read_npz, reading
+from simdtex.io.files import PathLike, atomic_path, read_npz, reading
 from simdtex.io.image import check_writable, plain_array, read, write
 
 SourceMap = NDArray[np.int32]
@@ -50,12 +50,7 @@ class Use(NamedTuple):
 def checked(source: ArrayLike) -> SourceMap:
     """Return a source map as (rows, cols, 2 or 3) int32; raise if ``source`` is not one."""
     positions = plain_array("the source map", source)
-    if (
-        positions.ndim != 3
-        or positions.shape[2] not in (2, 3)
-        or positions.size == 0
-        or positions.dtype.kind not in "iu"
-    ):
+    if not (positions.ndim == 3 and positions.shape[2] in (2, 3) and positions.size and positions.dtype.kind in "iu"):
         raise ValueError(
             f"a source map is (rows, cols, 2) or (rows, cols, 3) integers, not {positions.shape} of "
             f"{positions.dtype}: pass the one of a run"
@@ -180,7 +175,6 @@ def _starts(length: int, piece: int) -> NDArray[np.intp]:
     return np.arange(parts) * length // parts
 
 
-PathLike = str | os.PathLike[str]
 SOURCE_SUFFIXES = (".npz", ".npy", ".png")
 
 
@@ -313,7 +307,7 @@ def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceM
     path : path
         ``.npz``, ``.npy`` or ``.png``.
     max_pixels : int, optional
-        The most pixels to read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most pixels to read; None: ``SIMDTEX_MAX_PIXELS``, else 2**27.
 
     Returns
     -------
@@ -382,14 +376,14 @@ _AFTER = re.compile(r"(([0-9]+(k|px|bit)?|maps?|texture|tex|png|jpg|var|lod|(?<=
 """Words that may follow the word of the role; after a size, metalness and specular are a workflow."""
 
 
-class Maps(NamedTuple):
+class MaterialMaps(NamedTuple):
     """The maps of a folder: the role of each file, and the names of pictures with an unknown role."""
 
     files: dict[Path, str]
     unknown: list[str]
 
 
-def _split(path: str | os.PathLike[str]) -> tuple[str, str]:
+def _split(path: PathLike) -> tuple[str, str]:
     """Return the stem of a file's name, with a size, and the word of its role or, if it has none, the name and ""."""
     name = Path(path).stem
     parts = list(_PARTS.finditer(name))
@@ -397,12 +391,12 @@ def _split(path: str | os.PathLike[str]) -> tuple[str, str]:
     for first, last in ((i, j) for i in range(len(words)) for j in range(len(words), i, -1)):
         word, after, before = "".join(words[first:last]), words[last:], name[: parts[first].start()]
         if word in _WORDS and _AFTER.fullmatch(" ".join(after)) and (word not in LETTERS or before[-1:] in (*"_-. ",)):
-            sizes = [one for one in after if re.fullmatch("[0-9]+k|[0-9]{4}", one)]
+            sizes = [size for size in after if re.fullmatch("[0-9]+k|[0-9]{4}", size)]
             return re.sub(r"[\W_]", "", before).lower() + "".join(sizes), word
     return re.sub(r"[\W_]", "", name).lower(), ""
 
 
-def map_role(name: str | os.PathLike[str]) -> str | None:
+def map_role(name: PathLike) -> str | None:
     """Return the role of a map, one of `ROLES`, by the last word of its file's name, or None.
 
     Case does not matter. Words are separated by anything but letters and digits, or begin with a capital letter; a size
@@ -417,7 +411,7 @@ def map_role(name: str | os.PathLike[str]) -> str | None:
     return _WORDS.get(word) if word not in LETTERS or Path(name).name.startswith(("T_", "t_")) else None
 
 
-def find_maps(folder: str | os.PathLike[str], lead: Path | None = None) -> Maps:
+def find_maps(folder: PathLike, lead: Path | None = None) -> MaterialMaps:
     """Return the maps of the material in a folder, by their names; of several materials that of the map ``lead``.
 
     Hidden files, subfolders, and files that are no pictures are ignored. There are several materials if a role occurs
@@ -429,30 +423,30 @@ def find_maps(folder: str | os.PathLike[str], lead: Path | None = None) -> Maps:
         The folder cannot be read, has several materials and there is no `lead`, or a map in a format that is not read.
     """
     try:
-        found = sorted(path for path in Path(folder).iterdir() if path.name[0] != "." and path.is_file())
+        paths = sorted(path for path in Path(folder).iterdir() if path.name[0] != "." and path.is_file())
     except OSError as error:
         raise ValueError(
             f"{os.fspath(folder)} cannot be read ({error.strerror}): check the path of the folder"
         ) from None
-    names = {path: _split(path) for path in found if path.suffix.lower() in (*READABLE, *UNREADABLE)}
+    names = {path: _split(path) for path in paths if path.suffix.lower() in (*READABLE, *UNREADABLE)}
     files = {}
     for path, (stem, word) in names.items():
-        beside = {other for one, other in names.values() if one == stem}
+        beside = {other for base, other in names.values() if base == stem}
         minecraft = {"", "n", "s"} <= beside <= {"", *LETTERS}  # LabPBR, whose albedo has no word
         if map_role(path) or minecraft or (word and (beside >= {"d", "n"} or not beside <= {"", *LETTERS})):
             files[path] = _WORDS.get(word, "albedo")
     unknown = [path.name for path in names if path not in files and path.suffix.lower() in READABLE]
     if len({(names[path][0], role) for path, role in files.items()}) > len(set(files.values())):
         if lead is None:
-            one = {names[path][0]: str(path) for path in sorted(files, key=lambda path: files[path] == "albedo")}
-            some = " or ".join(sorted(one.values())[:4])
-            raise ValueError(f"{folder} holds {len(one)} materials: instead of it give a map of one, such as {some}")
+            each = {names[path][0]: str(path) for path in sorted(files, key=lambda path: files[path] == "albedo")}
+            some = " or ".join(sorted(each.values())[:4])
+            raise ValueError(f"{folder} holds {len(each)} materials: instead of it give a map of one, such as {some}")
         stem, whole = _split(lead)[0], {names[path][0] for path, role in files.items() if role == "albedo"}
         unknown += [p.name for p in files if names[p][0] not in {stem, *whole} and names[p][0].startswith(stem)]
         files = {path: role for path, role in files.items() if names[path][0] == stem}
     if unread := [path for path in files if path.suffix.lower() in UNREADABLE]:
         raise ValueError(f"{unread[0]} is of a format that is not read: save it as TIFF or as 16-bit PNG")
-    return Maps(files, unknown)
+    return MaterialMaps(files, unknown)
 
 
 def unit_normals(pixels: NDArray[Any], where: NDArray[np.bool_]) -> NDArray[Any]:

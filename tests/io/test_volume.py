@@ -18,61 +18,54 @@ from volumes import loaded, noise
 from simdtex.cli.inputs import Reading, read_pixels
 from simdtex.io import files, image, volume
 
-WHOLE = ["uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"]
-HOLDS = {
-    ".npz": ([*WHOLE, "bool", "float16", "float32", "float64", ">i4"], [None, 1, 3, 5]),
-    ".NPY": ([*WHOLE, "bool", "float16", "float32", "float64", ">f8"], [None, 1, 3, 5]),
-    ".tif": ([*WHOLE, "float16", "float32", "float64", ">u2"], [None, 1, 2, 3, 4, 5]),
-    ".nrrd": ([*WHOLE, "float32", "float64", ">f4"], [None, 1, 2, 3, 4, 11]),
-    "": (["uint8", "uint16", ">u2"], [None, 1, 2, 3, 4]),
+WHOLE = ("uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64")
+FORMATS = {
+    ".npz": (("bool", "float16", "uint64", ">i4"), (None, 1, 5)),
+    ".NPY": (("bool", "float64", ">f8"), (None, 1, 3)),
+    ".tif": ((*WHOLE, "float16", "float32", "float64", ">u2"), (None, 1, 2, 3, 4, 5)),
+    ".nrrd": ((*WHOLE, "float32", "float64", ">f4"), (None, 1, 3, 11)),
+    "": (("uint8", "uint16", ">u2"), (None, 1, 2, 3, 4)),
 }
-ROUND_TRIPS = [(s, dtype, c) for s, (types, channels) in HOLDS.items() for dtype in types for c in channels]
+"""The table of formats: the types and the numbers of channels that each holds."""
 
 
-@pytest.mark.parametrize(("suffix", "dtype", "channels"), ROUND_TRIPS)
-def test_what_is_written_is_read_as_what_it_was(tmp_path, suffix, dtype, channels):
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_what_is_written_is_read_as_what_it_was(tmp_path, suffix):
     """By the libraries of the formats and by `read`, also an alpha that is opaque."""
-    values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
-    if channels in (2, 4):
-        values[..., -1] = np.iinfo(dtype).max if values.dtype.kind in "iu" else 1
-    path = tmp_path / f"block{suffix}"
-    volume.check_writable(path, values.dtype, channels or 1)
-    volume.write(path, values)
-    assert volume.is_volume(path)
-    grid = volume.read(path)
-    assert (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
-    for back in (loaded(path), stacked(grid)):
-        assert back.dtype.newbyteorder("=") == values.dtype.newbyteorder("=")
-        np.testing.assert_array_equal(back.reshape(4, 3, 5, -1), values.reshape(4, 3, 5, -1))
-    assert loaded(path).ndim == (3 if channels is None or (channels == 1 and suffix not in (".npz", ".NPY")) else 4)
+    path, (types, numbers) = tmp_path / f"block{suffix}", FORMATS[suffix]
+    for dtype, channels in [*((dtype, None) for dtype in types), *((types[-1], channels) for channels in numbers)]:
+        values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
+        if channels in (2, 4):
+            values[..., -1] = np.iinfo(dtype).max if values.dtype.kind in "iu" else 1
+        volume.check_writable(path, values.dtype, channels or 1)
+        volume.write(path, values)
+        grid = volume.read(path)
+        assert volume.is_volume(path) and (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
+        for back in (loaded(path), stacked(grid)):
+            assert back.dtype.newbyteorder("=") == values.dtype.newbyteorder("=")
+            np.testing.assert_array_equal(back.reshape(4, 3, 5, -1), values.reshape(4, 3, 5, -1))
+        assert loaded(path).ndim == (3 if channels is None or (channels == 1 and suffix not in (".npz", ".NPY")) else 4)
+    for shape in ((1, 1, 1), (1, 4, 3), (3, 1, 4), (2, 5, 1), (1, 2, 2, 3)):
+        volume.write(path, noise(shape))
+        np.testing.assert_array_equal(loaded(path), noise(shape), strict=True)
     assert os.listdir(tmp_path) == [path.name]
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".npy", ".tiff", ".nrrd", ""])
-@pytest.mark.parametrize("shape", [(1, 1, 1), (1, 4, 3), (3, 1, 4), (2, 5, 1), (1, 2, 2, 3), (1001, 1, 1)])
-def test_every_shape_survives(tmp_path, suffix, shape):
-    values = noise(shape)
-    volume.write(tmp_path / f"block{suffix}", values)
-    np.testing.assert_array_equal(loaded(tmp_path / f"block{suffix}"), values, strict=True)
-
-
-@pytest.mark.parametrize("channels", [None, 3])
-def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path, channels):
-    values = noise((2, 3, 4) if channels is None else (2, 3, 4, 3), "uint16")
+def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path):
+    values = noise((2, 3, 4, 3), "uint16")
     volume.write(tmp_path / "a.nrrd", values)
     header, data = (tmp_path / "a.nrrd").read_bytes().split(b"\n\n", 1)
     assert data == values.tobytes()
-    text = header.decode()
-    fields = dict(line.split(": ", 1) for line in text.splitlines()[1:] if not line.startswith("#"))
-    assert fields["sizes"] == ("4 3 2" if channels is None else "3 4 3 2")
-    assert fields["kinds"] == ("" if channels is None else "vector ") + "domain domain domain"
-    assert (fields["type"], fields["encoding"]) == ("uint16", "raw")
-    assert "space" not in text.replace("sourceforge", "")
-    in_fortran_order, _ = nrrd.read(str(tmp_path / "a.nrrd"))
-    np.testing.assert_array_equal(in_fortran_order, values.T)
+    fields = dict(line.split(": ", 1) for line in header.decode().splitlines()[1:] if not line.startswith("#"))
+    assert (fields["type"], fields["encoding"], fields["sizes"]) == ("uint16", "raw", "3 4 3 2")
+    assert fields["kinds"] == "vector domain domain domain" and b"space" not in header.replace(b"sourceforge", b"")
+    np.testing.assert_array_equal(nrrd.read(str(tmp_path / "a.nrrd"))[0], values.T)
 
 
 def test_slices_are_pictures_and_pages(tmp_path):
+    """Of which a folder is replaced as a whole, and whose numbers have as many digits as they need."""
+    volume.write(tmp_path / "a", noise((1001, 1, 1)))
+    assert len(os.listdir(tmp_path / "a")) == 1001 and (tmp_path / "a" / "slice-1000.png").exists()
     values = noise((3, 4, 5, 3))
     volume.write(tmp_path / "a.tif", values)
     volume.write(tmp_path / "a", values)
@@ -86,27 +79,27 @@ def test_slices_are_pictures_and_pages(tmp_path):
                 np.testing.assert_array_equal(np.asarray(picture), values[z])
 
 
-@pytest.mark.parametrize(
-    ("name", "dtype", "channels", "remedy"),
-    [
+def test_formats_that_cannot_hold_the_values(tmp_path):
+    for name, dtype, channels, remedy in (
         ("a.tif", "bool", 1, ".npz"),
         ("a.nrrd", "bool", 3, ".npz"),
         ("a.nrrd", "float16", 1, ".tif"),
         ("a.tiff", "longdouble", 1, ".npz"),
-        ("a", "bool", 1, ".npz"),
         ("a", "float32", 3, ".nrrd"),
         ("a", "uint8", 5, ".nrrd"),
         ("a", "int16", None, ".nrrd"),
-    ],
-)
-def test_formats_that_cannot_hold_the_values(tmp_path, name, dtype, channels, remedy):
-    sentence = rf"cannot hold .*: end its name in \{remedy} instead$"
-    with pytest.raises(ValueError, match=sentence) as said:
-        volume.check_writable(tmp_path / name, dtype, channels)
-    assert np.dtype(dtype).name in str(said.value)
-    with pytest.raises(ValueError, match=sentence):
-        volume.write(tmp_path / name, np.zeros((2, 2, 2, channels or 1), dtype))
-    volume.check_writable(tmp_path / f"a{remedy}", dtype, channels)
+    ):
+        sentence = rf"cannot hold {dtype.replace('longdouble', 'float128')} .*: end its name in \{remedy} instead$"
+        with pytest.raises(ValueError, match=sentence):
+            volume.check_writable(tmp_path / name, dtype, channels)
+        with pytest.raises(ValueError, match=sentence):
+            volume.write(tmp_path / name, np.zeros((2, 2, 2, channels or 1), dtype))
+        volume.check_writable(tmp_path / f"a{remedy}", dtype, channels)
+    with pytest.raises(TypeError, match="real"):
+        volume.write(tmp_path / "a.npy", np.zeros((2, 2, 2), complex))
+    for shape in [(4, 4), (2, 2, 2, 2, 2), (0, 2, 2)]:
+        with pytest.raises(ValueError, match=re.escape(str(shape))):
+            volume.write(tmp_path / "a.npy", np.zeros(shape))
     assert os.listdir(tmp_path) == []
 
 
@@ -114,41 +107,22 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").touch()
-    for path, words in [
-        (tmp_path / "none" / "a.tif", "the folder .* does not exist"),
-        (tmp_path / "a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
-        (tmp_path / "file", "is a file"),
-        (tmp_path / "full", "holds other files"),
-        (tmp_path / "file" / "a", "the folder .* does not exist"),
-        (tmp_path / ("a" * 300), "cannot be written"),
+    for name, words in [
+        ("none/a.tif", "the folder .* does not exist"),
+        ("a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
+        ("file", "is a file"),
+        ("full", "holds other files"),
+        ("file/a", "the folder .* does not exist"),
+        ("a" * 300, "cannot be written"),
     ]:
         with pytest.raises(ValueError, match=words):
-            volume.check_writable(path, np.uint8, 3)
-        with pytest.raises(ValueError, match=words):
-            volume.write(path, noise((1, 2, 2)))
+            volume.check_writable(tmp_path / name, np.uint8, 3)
     (tmp_path / "slices").mkdir()
     volume.check_writable(tmp_path / "slices")
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
     for name in ("a.npz", "a", "slices"):
         with pytest.raises(ValueError, match="not writable"):
             volume.check_writable(tmp_path / name)
-
-
-def test_a_folder_of_slices_is_replaced_as_a_whole(tmp_path):
-    volume.write(tmp_path / "a", noise((5, 2, 2)))
-    values = noise((3, 2, 2), seed=1)
-    volume.write(tmp_path / "a", values)
-    np.testing.assert_array_equal(loaded(tmp_path / "a"), values, strict=True)
-    assert os.listdir(tmp_path) == ["a"]
-
-
-def test_write_checks_its_array(tmp_path):
-    with pytest.raises(TypeError, match="real"):
-        volume.write(tmp_path / "a.npy", np.zeros((2, 2, 2), complex))
-    for shape in [(4, 4), (2, 2, 2, 2, 2), (0, 2, 2)]:
-        with pytest.raises(ValueError, match=re.escape(str(shape))):
-            volume.write(tmp_path / "a.npy", np.zeros(shape))
-    assert os.listdir(tmp_path) == []
 
 
 def stacked(grid):
@@ -185,17 +159,12 @@ def test_a_damaged_or_large_volume_gets_one_sentence(tmp_path, suffix):
         volume.read(tmp_path / f"none{suffix}")
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no FIFO on this system")
 def test_only_regular_files_are_read(tmp_path):
     """None of the readers waits for a FIFO, or reads a device; a folder is slices or nothing."""
     (tmp_path / "empty").mkdir()
-    for suffix in (".nrrd", ".mhd", ".vti", ".vtk", ".raw", ".tif", ".npy", ".npz", ".png", ".exr", ".gslib"):
+    for suffix in (".nrrd", ".mhd", ".vti", ".raw", ".tif", ".npy", ".npz", ".png", ".gslib"):
         path = tmp_path / f"pipe{suffix}"
         os.mkfifo(path)
-        with pytest.raises(ValueError, match="is not a regular file"):
-            read_pixels(path, Reading(deep=True))
-        path.unlink()
-        path.symlink_to("/dev/zero")
         with pytest.raises(ValueError, match="is not a regular file"):
             read_pixels(path, Reading(deep=True))
     with pytest.raises(ValueError, match="is a folder: keep only slices in it"):
@@ -220,13 +189,12 @@ def metaimage(path, values, *more, data="LOCAL"):
 
 
 HEADERS = {
-    "a.nrrd": lambda path, data: path.write_bytes(NRRD.format("raw", f"data file: {data}").encode()),
     "a.nhdr": lambda path, data: path.write_bytes(NRRD.format("raw", f"datafile: {data}").encode()),
     "a.mhd": lambda path, data: metaimage(path, BLOCK, data=data),
 }
 
 
-@pytest.mark.parametrize("name", HEADERS)
+@pytest.mark.parametrize("name", ["a.nhdr", "a.mhd"])
 def test_a_header_names_a_file_in_its_folder_alone(tmp_path, name):
     (tmp_path / "own" / "sub").mkdir(parents=True)
     path = tmp_path / "own" / name
@@ -236,17 +204,16 @@ def test_a_header_names_a_file_in_its_folder_alone(tmp_path, name):
     np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], BLOCK)
     (path.parent / "link.raw").symlink_to(tmp_path / "secret.raw")
     os.mkfifo(path.parent / "pipe.raw")
-    for data in (f"{tmp_path}/secret.raw", "../secret.raw", "sub/block.raw", "LIST", "block%d.raw 1 4 1"):
+    for data in ("../secret.raw", "sub/block.raw", "LIST", "block%d.raw 1 4 1"):
         HEADERS[name](path, data)
         with pytest.raises(ValueError, match=r"names the data file .*: put the data into one file in the folder"):
             volume.read(path)
     HEADERS[name](path, "link.raw")
     with pytest.raises(ValueError, match=r"refers to .*secret\.raw in another folder: save all values in one file"):
         volume.read(path)
-    for data, words in (("pipe.raw", "not a regular file"), ("none.raw", "does not exist"), ("sub", "is a folder")):
-        HEADERS[name](path, data)
-        with pytest.raises(ValueError, match=words):
-            volume.read(path)
+    HEADERS[name](path, "pipe.raw")
+    with pytest.raises(ValueError, match="not a regular file"):
+        volume.read(path)
 
 
 @pytest.mark.parametrize("kind", ["gzip", "bzip2", "mhd"])
@@ -263,11 +230,11 @@ def test_data_unpack_to_what_the_header_states_and_no_further(tmp_path, kind):
     path = tmp_path / ("a.mhd" if kind == "mhd" else "a.nrrd")
     write(path, BLOCK.tobytes())
     np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], BLOCK)
-    write(path, BLOCK.tobytes() + bytes(2**27))
+    write(path, BLOCK.tobytes() + bytes(2**24))
     tracemalloc.start()
     try:
         np.testing.assert_array_equal(stacked(volume.read(path, max_pixels=100_000))[..., 0], BLOCK)
-        assert tracemalloc.get_traced_memory()[1] < 2**23
+        assert tracemalloc.get_traced_memory()[1] < 2**22
     finally:
         tracemalloc.stop()
     write(path, BLOCK.tobytes()[:-1])
@@ -279,12 +246,6 @@ def test_data_unpack_to_what_the_header_states_and_no_further(tmp_path, kind):
     ("fields", "origin", "cell", "turned"),
     [
         ("spacings: 2 3 0.5\n", (0, 0, 0), (2, 3, 0.5), ()),
-        (
-            "space dimension: 3\nspace directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (1,2,3)\n",
-            (1, 2, 3),
-            (2, 3, 4),
-            (),
-        ),
         (
             "space: LPS\nspace directions: (-2,0,0) (0,3,0) (0,0,-4)\nspace origin: (1,2,3)\n",
             (-7, 2, -9),
@@ -312,7 +273,7 @@ def test_the_kinds_of_an_nrrd_say_which_axis_has_variables(tmp_path):
             volume.read(tmp_path / "a.nrrd")
 
 
-@pytest.mark.parametrize(("dtype", "channels"), [("uint8", None), ("int16", 3), ("float32", None), ("int64", 2)])
+@pytest.mark.parametrize(("dtype", "channels"), [("int16", 3), ("float32", None), ("int64", 2)])
 def test_a_metaimage_is_read_with_its_place(tmp_path, dtype, channels):
     values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
     metaimage(
@@ -338,8 +299,7 @@ def vti(path, values, cells=False, origin=(10, 20, 30)):
     found.save(path)
 
 
-@pytest.mark.parametrize("suffix", [".vti", ".vtk"])
-@pytest.mark.parametrize(("dtype", "variables"), [("uint8", 1), ("int16", 3), ("float32", 2)])
+@pytest.mark.parametrize(("suffix", "dtype", "variables"), [(".vti", "uint8", 1), (".vtk", "int16", 3)])
 def test_points_and_cells_of_vtk(tmp_path, suffix, dtype, variables):
     pytest.importorskip("pyvista")
     values = noise((4, 3, 5, variables), dtype)
@@ -385,15 +345,14 @@ def test_a_sentence_names_the_extra(tmp_path, monkeypatch, name, library):
 # raw values and slices
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "float32"])
-def test_a_raw_volume_says_its_shape_in_its_name(tmp_path, dtype):
-    values = noise((4, 3, 5), np.dtype(dtype).newbyteorder("<"))
-    path = tmp_path / f"bonsai_5x3x4_{dtype}.raw"
+def test_a_raw_volume_says_its_shape_in_its_name(tmp_path):
+    values = noise((4, 3, 5), "<f4")
+    path = tmp_path / "bonsai_5x3x4_float32.raw"
     path.write_bytes(values.tobytes())
     np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], values)
     for name, words in [
         ("bonsai.raw", "name it with columns x rows x layers and type, as"),
-        (f"bonsai_5x3x5_{dtype}.raw", r"has \d+ bytes, not \d+ as its name says"),
+        ("bonsai_5x3x5_float32.raw", r"has \d+ bytes, not \d+ as its name says"),
         ("bonsai_99999x99999x99999_uint8.raw", "no more than"),
     ]:
         path = path.rename(tmp_path / name)
@@ -436,9 +395,8 @@ def test_a_terrain_with_a_mask_and_overviews_is_one_picture(tmp_path):
     inner = {"subfiletype": 4, "photometric": "mask"}
     for masked, pages in ((True, [(mask, inner)]), (False, [(terrain[::2, ::2], reduced)])):
         path = stack(tmp_path / "a.tif", terrain, *pages)
-        assert not volume.is_volume(path)
         found = image.read(path)
-        assert not found.metadata.more
+        assert not volume.is_volume(path) and not found.metadata.more
         np.testing.assert_array_equal(found.pixels, np.where(mask, terrain, np.nan) if masked else terrain)
     for kind in (None, "palette"):  # a preview before the picture
         more = {"photometric": "palette", "colormap": noise((3, 256), "uint16")} if kind else {}
@@ -496,7 +454,7 @@ def test_the_limit_holds_for_each_page_and_for_all(tmp_path, monkeypatch):
     path = stack(tmp_path / "a.tif", *noise((9, 30, 40)))
     with pytest.raises(ValueError, match="has 10800 pixels and no more than 10000"):
         volume.read(path, max_pixels=10_000)
-    large = 2**14
+    large = 2**13
     for number in (3, 8):  # the third is one that tifffile takes to be like the others
         pages = list(noise((9, 30, 40)))
         pages[number] = np.zeros((large, large), np.uint8)
@@ -507,57 +465,43 @@ def test_the_limit_holds_for_each_page_and_for_all(tmp_path, monkeypatch):
                 ValueError, match=r"pages of several sizes or types|page is damaged, or of another size"
             ):
                 read_pixels(path, Reading(deep=True))
-            assert tracemalloc.get_traced_memory()[1] < 2**24
+            assert tracemalloc.get_traced_memory()[1] < 2**23
         finally:
             tracemalloc.stop()
 
 
-@pytest.mark.parametrize("bits", [1, 2, 4, 8, 10, 12, 14, 16])
 @pytest.mark.parametrize("photometric", ["minisblack", "miniswhite"])
-def test_few_bits_and_white_is_zero(tmp_path, bits, photometric):
+def test_few_bits_and_white_is_zero(tmp_path, photometric):
     """Stacks and pictures have the same values, at full scale; a mask of them has white."""
-    top = 2**bits - 1
-    full = 255 if bits <= 8 else 65535
-    values = np.stack([np.arange(32, dtype=np.uint16).reshape(4, 8) * top // 31] * 3)
-    written = values.astype(bool) if bits == 1 else values.astype(np.uint8 if bits <= 8 else np.uint16)
     path = tmp_path / "a.tif"
-    if bits in (8, 16, 1):
-        stack(path, *written, photometric=photometric)
-    else:
-        packed = [packed_bits(page, bits) for page in values]
-        packed_tiff(path, packed, (4, 8), bits, photometric == "miniswhite")
-    expected = np.rint(values * (full / top))
-    expected = full - expected if photometric == "miniswhite" else expected
-    found = image.read(path).pixels
-    assert found.dtype == (np.uint8 if bits <= 8 else np.uint16)
-    np.testing.assert_array_equal(found, expected[0])
-    np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], expected)
-    np.testing.assert_array_equal(image.read_mask(path, (4, 8)), expected[0] > full / 2)
+    for bits in (1, 2, 4, 8, 10, 12, 14, 16):
+        top, full = 2**bits - 1, 255 if bits <= 8 else 65535
+        values = np.stack([np.arange(32, dtype=np.uint16).reshape(4, 8) * top // 31] * 3)
+        if bits in (8, 16, 1):
+            written = values.astype(bool if bits == 1 else np.uint8 if bits == 8 else np.uint16)
+            stack(path, *written, photometric=photometric)
+        else:
+            packed_tiff(path, values, bits, photometric == "miniswhite")
+        expected = np.rint(values * (full / top))
+        expected = full - expected if photometric == "miniswhite" else expected
+        found = image.read(path).pixels
+        assert found.dtype == (np.uint8 if bits <= 8 else np.uint16)
+        np.testing.assert_array_equal(found, expected[0])
+        np.testing.assert_array_equal(stacked(volume.read(path))[..., 0], expected)
+        np.testing.assert_array_equal(image.read_mask(path, (4, 8)), expected[0] > full / 2)
 
 
-def packed_bits(values, bits):
-    """The bytes of rows of values of so many bits."""
-    rows = ["".join(f"{value:0{bits}b}" for value in row) for row in values]
-    return b"".join(int(row, 2).to_bytes(len(row) // 8, "big") for row in rows)
-
-
-def packed_tiff(path, pages, shape, bits, white_is_zero):
+def packed_tiff(path, pages, bits, white_is_zero):
     """Write a TIFF of pages of packed bits, which tifffile does not write."""
-    data = b"II*\0\0\0\0\0"
-    link = 4
+    data, link, (rows, cols) = b"II*\0\0\0\0\0", 4, pages[0].shape
     for page in pages:
-        begin, data = len(data), data + page + bytes(len(page) % 2)
-        entries = [
-            (256, 4, shape[1]),
-            (257, 4, shape[0]),
-            (258, 3, bits),
-            (259, 3, 1),
-            (262, 3, int(not white_is_zero)),
-        ]
-        entries += [(273, 4, begin), (277, 3, 1), (278, 4, shape[0]), (279, 4, len(page))]
+        packed = ["".join(f"{value:0{bits}b}" for value in row) for row in page]
+        packed = b"".join(int(row, 2).to_bytes(len(row) // 8, "big") for row in packed)
+        begin, data = len(data), data + packed + bytes(len(packed) % 2)
+        entries = [(256, 4, cols), (257, 4, rows), (258, 3, bits), (259, 3, 1), (262, 3, int(not white_is_zero))]
+        entries += [(273, 4, begin), (277, 3, 1), (278, 4, rows), (279, 4, len(packed))]
         data = data[:link] + struct.pack("<I", len(data)) + data[link + 4 :]
-        data += struct.pack("<H", len(entries)) + b"".join(
-            struct.pack("<HHII", tag, kind, 1, n) for tag, kind, n in entries
-        )
+        table = b"".join(struct.pack("<HHII", tag, kind, 1, n) for tag, kind, n in entries)
+        data += struct.pack("<H", len(entries)) + table
         link, data = len(data), data + bytes(4)
     path.write_bytes(data)

@@ -5,15 +5,13 @@ import tracemalloc
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl
-from commands import refused, run
-from live import Fake
+from commands import run
 from scipy.ndimage import gaussian_filter
 from skimage import data
 
 import simdtex
 from simdtex.io import image
 from simdtex.jobs.filling.job import plan_filling
-from simdtex.live.job import Picture
 from simdtex.model.light import ROUND, light_sentence, trend, unevenness
 
 QUICK = {"order": 2, "rng": 1, "xi": -8.0, "free_sweeps": 0, "device": REFERENCE}
@@ -40,7 +38,7 @@ def clouds(pixels):
     return gaussian_filter(pixels.astype(float), 12, mode="wrap").std()
 
 
-@pytest.mark.parametrize("method, more", [("mrf", {"order": 8}), ("multires", {}), ("pyramid", {"iterations": 2})])
+@pytest.mark.parametrize("method, more", [("multires", {}), ("pyramid", {"iterations": 2})])
 def test_an_output_of_a_shaded_sample_is_even(any_device, method, more):
     def made(sample, **options):
         how = {"method": method, "device": opencl(any_device)} | more | options
@@ -130,13 +128,15 @@ def test_what_wraps_around_is_even(seamless, kept):
     assert abs(across) < 0.15 and abs(along - kept) < 0.15
 
 
-def test_values_of_categories_have_no_light(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    image.write("few.png", (GRAIN > 100) * np.uint8(255))
-    image.write("grain.png", GRAIN)
-    refused("categories, or at most 16", "synth", "few.png", "-o", "out.png", "--light", "even")
-    refused("categories, or at most 16", "tile", "grain.png", "-o", "out.png", "--light", "even", "--categorical")
-    refused("unknown light 'dark'; choose one of: keep, even", "fill", "few.png", "-o", "out.png", "--light", "dark")
+def test_values_of_categories_have_no_light():
+    few = (GRAIN[:32, :32] > 100) * np.uint8(255)
+    for sample, how, words in (
+        (few, {"light": "even"}, "categories, or at most 16"),
+        (GRAIN[:32, :32], {"light": "even", "categorical": True}, "categories, or at most 16"),
+        (few, {"light": "dark"}, "unknown light 'dark'; choose one of: keep, even"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            simdtex.synthesize(sample, (8, 8), **how)
 
 
 def test_uneven_light_is_said_where_it_is_clear(tmp_path, monkeypatch):
@@ -165,21 +165,6 @@ def test_tiles_and_the_store_have_it(tmp_path):
     made = simdtex.synthesize(sample, (12, 14), store=simdtex.TileStore(tmp_path / "out.zarr", 8), **how)
     assert_same_bits(made.compute(), simdtex.synthesize(sample, (12, 14), **how))
     assert zarr.open_group(tmp_path / "out.zarr", mode="r").attrs["simdtex"]["light"] == "even"
-    with pytest.raises(ValueError, match="unknown light 'dim'"):
-        simdtex.synthesize(sample, (18, 20), light="dim")
-
-
-def test_the_page_asks_for_it_and_starts_anew():
-    page = Fake(Picture("shaded.png", shaded(GRAIN), None))
-    try:
-        before = page.result(width=20, height=18, options={"order": 2})
-        assert "light is uneven" in before["note"]
-        told = page.result(width=20, height=18, options={"order": 2, "light": "even"})
-        assert told["note"] == "" and "--light even" in told["command"]
-        even = simdtex.synthesize(shaded(GRAIN), (18, 20), order=2, rng=7, light="even", device=REFERENCE)
-        assert_same_bits(page.latest.image, even)
-    finally:
-        page.session.close(10)
 
 
 def test_a_large_picture_is_judged_by_a_part_of_its_pixels():

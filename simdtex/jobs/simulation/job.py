@@ -22,7 +22,7 @@ from simdtex.checkpoint import Checkpointing, digest
 from simdtex.driver import Device, Kept, Seed, drive, run
 from simdtex.inputs import check_inputs, check_known
 from simdtex.io.hard_data import HardData
-from simdtex.io.places import Place
+from simdtex.io.places import Location
 from simdtex.jobs.simulation.maps import (
     Cells,
     Maps,
@@ -519,7 +519,7 @@ class Estimation:
     training: Pictures
     known: Given
     shape: tuple[int, ...]
-    place: Place | None
+    place: Location | None
     units: str
     attributes: dict[str, Any]
     options: mrf.Options

@@ -18,7 +18,7 @@ from simdtex.driver import check_sides
 from simdtex.inputs import Inputs, Placing, as_known, check_mask, check_samples
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.image import AXES, as_array
-from simdtex.io.places import Place, ascending, located
+from simdtex.io.places import Location, ascending, located
 from simdtex.model.given import Given
 from simdtex.model.pictures import HALVES, Pictures, Turned, turned
 from simdtex.options import check_real, one_of, require, within_32_bits
@@ -177,7 +177,7 @@ class Cells(NamedTuple):
     given: dict[str, Any]
     about: dict[str, str]
     size: tuple[int, ...]
-    place: Place | None
+    place: Location | None
     several: str
     put: Placing
 
@@ -226,7 +226,7 @@ def plan_cells(
     return Cells(pictures, channel_axis, given, described(training, given["known"]), size, place, several, put)
 
 
-def _size(shape: Any, given: dict[str, Any], place: Place | None, axes: int, channel_axis: int | None) -> Any:
+def _size(shape: Any, given: dict[str, Any], place: Location | None, axes: int, channel_axis: int | None) -> Any:
     """Return the sides of ``shape``, ``like``, the known values or the first map that is an array; None without any."""
     like, known = given["like"], given["known"]
     if axes == 2 and isinstance(shape, (tuple, list)) and len(shape) == 3:
@@ -247,7 +247,7 @@ def _size(shape: Any, given: dict[str, Any], place: Place | None, axes: int, cha
     return next((one for one in shapes if len(one) == axes), None)
 
 
-def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any], dict[str, float]]:
+def grid_axes(size: tuple[int, ...], place: Location | None) -> tuple[dict[str, Any], dict[str, float]]:
     """Return the coordinates of cells and the sizes of a cell as attributes; without a place, columns and rows."""
     at, sides = place.frame if place else ((), ())
     found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
@@ -257,7 +257,7 @@ def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any
     return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
 
 
-def georeferenced(made: Any, place: Place | None) -> Any:
+def georeferenced(made: Any, place: Location | None) -> Any:
     """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
     if place is None or not place.crs:
         return made

@@ -54,7 +54,7 @@ from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
 from simdtex.methods.mrf.plan import MrfPlan
 from simdtex.methods.mrf.problem import Input
-from simdtex.model.guide import Planes
+from simdtex.model.guide import GuidePlanes
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import Lattice, Phases
@@ -74,9 +74,9 @@ class Ready:
         """Number of planes."""
         return len(self.samples[0])
 
-    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+    def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the planes unchanged, and no planes of the output."""
-        return Planes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
+        return GuidePlanes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
 
 
 def described(plan: Input) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, Planes, Soft
+from simdtex.model.given import Given, GivenPlanes, Soft
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.options import SMALLER
@@ -38,7 +38,7 @@ class Input:
     schedule: schedules.Schedule
     levels: int
     given: Given | None = None
-    planes: Planes | None = None
+    planes: GivenPlanes | None = None
     soft: Soft | None = None
     remedy: str = SMALLER
     reduction: int = 1
