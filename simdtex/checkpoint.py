@@ -42,9 +42,9 @@ LOST = 300.0
 
 NAMES = {
     **{"job": "call", "shape": "shape of the output", "pictures": "sample", "usable": "mask", "given": "known"},
-    **{"place": "known_source", "pixels": "sample", "hole": "mask"},
+    **{"place": "known_source", "pixels": "sample", "hole": "mask", "options": "option {}", "maps": "{}"},
 }
-"""Names of the fields of a job in messages, if they differ from the field's own."""
+"""Names of the fields of a job in messages, if they differ from the field's own; ``{}`` is the name of a part."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,7 @@ class Checkpoint:
         """Lock the file, and start a run or resume the run in the file; yield its seed and its checkpointing.
 
         ``job`` is the public function; ``inputs()`` returns everything but the seed that determines the result, by
-        name; ``rng`` None takes the seed of the run in the file. Raises ValueError if the file is of another run,
-        version or format, is damaged or in use, or cannot be written.
+        name; ``rng`` None takes the seed of the run in the file.
         """
         if self._used:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
@@ -164,13 +163,8 @@ class Checkpoint:
                 )
         command = self._command or (about or {}).get("command")
         seed = as_seed(None) if seed is None else seed
-        self._about = {
-            "version": simdtex.__version__,
-            "seed": seed,
-            "inputs": now,
-            "command": command,
-            "device": device,
-        }
+        self._about = {"version": simdtex.__version__, "seed": seed, "inputs": now, "command": command}
+        self._about["device"] = device
         if about is None:
             self._write(None)
         return seed, found
@@ -182,13 +176,12 @@ class Checkpoint:
             old, new = before.get(name), now.get(name)
             if old == new:
                 continue
+            what = NAMES.get(name, name)
             if isinstance(old, dict) and isinstance(new, dict):
-                inside = next(one for one in {**old, **new} if old.get(one) != new.get(one))
-                old, new = old.get(inside), new.get(inside)
-                name = (
-                    f"option {inside}" if name == "options" else inside if name == "maps" or inside in NAMES else name
-                )
-            raise self._another(NAMES.get(name, name), _shown(old, new))
+                part = next(part for part in {**old, **new} if old.get(part) != new.get(part))
+                old, new = old.get(part), new.get(part)
+                what = what.format(part) if "{" in what else NAMES.get(part, what)
+            raise self._another(what, _shown(old, new))
         if seed is not None and seed != about["seed"]:
             raise self._another("seed", f" ({about['seed']}, not {seed})")
 
@@ -198,10 +191,7 @@ class Checkpoint:
         )
 
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
-        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop; return whether it did.
-
-        Raises KeyboardInterrupt if the run is to stop here.
-        """
+        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop here; return whether it did."""
         stopping = self.stopping
         wrote = (now or stopping or time.perf_counter() >= self._next) and self._save(tree)
         if stopping or (wrote and self.stopping):
@@ -250,10 +240,7 @@ def begin_run(
 
 
 def read(path: Path) -> tuple[dict[str, Any], Any]:
-    """Return the description of the run in a checkpoint, and its state.
-
-    Raises ValueError if the file is no checkpoint, is damaged, or of another format or version.
-    """
+    """Return the description of the run in a checkpoint, and its state."""
     try:
         about, tree = read_state(path)
     except Damaged:

@@ -78,25 +78,18 @@ def drive(
     checkpointing: Checkpointing | None = None,
     others: Sequence[Callable[[Any], Observer]] = (),
 ) -> tuple[NDArray[Any], Output]:
-    """Run a plan to its end, and return its result.
+    """Run a plan to its end; return the picture, channels last, and the `simdtex.run.Output`.
 
     Parameters
     ----------
-    plan : Plan
-    machine : Machine
-    seed : int
+    plan, machine, seed
+        The plan, its machine and its seed.
     callback : callable, optional
         Called with a `simdtex.run.Progress` after every part of a step.
     checkpointing : Checkpointing, optional
         The state to continue from, and the function that receives every later state.
     others : sequence of callables
         Each makes a further observer of the run, whose statistics the output has too.
-
-    Returns
-    -------
-    image : (rows, cols, channels) array
-        The picture in the sample's type; a block is (depth, rows, cols, channels).
-    output : simdtex.run.Output
     """
     began, worked = time.perf_counter(), machine.seconds
     run = plan.on(machine, seed)
@@ -129,11 +122,10 @@ def _saved(run: Run, state: Any, observers: Sequence[Observer]) -> Tree:
     return {"state": run.save(state), "observers": [observer.save() for observer in observers]}
 
 
-class Job(Protocol):
+class Call(Protocol):
     """The checked input of a public function: a frozen dataclass, whose fields identify a run in a checkpoint.
 
-    Fields declared with ``compare=False`` do not. ``options`` are those of the method, ``channel_axis`` is that of the
-    picture, and ``light`` puts the light of the place back into it.
+    Fields declared with ``compare=False`` do not.
     """
 
     @property
@@ -146,7 +138,7 @@ class Job(Protocol):
 
     @property
     def light(self) -> Light:
-        """What was done to the light of the pictures."""
+        """What was done to the light of the pictures; it puts the light of the place back into the output."""
 
     def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
@@ -167,18 +159,9 @@ class SingleRun:
 
 
 def run(
-    name: str,
-    job: Job,
-    rng: Seed,
-    device: Device,
-    callback: Callback | None,
-    checkpoint: Kept,
+    name: str, job: Call, rng: Seed, device: Device, callback: Callback | None, checkpoint: Kept
 ) -> tuple[NDArray[Any], Output]:
-    """Run the job of a public function on a device; return the picture with the axes of the sample, and the output.
-
-    ``name`` is that of the function, and a `Checkpointing` as ``checkpoint`` keeps states in memory; all others are the
-    parameters that public functions share.
-    """
+    """Run the call of a public function of this name; return the picture with the axes of the sample, and the output."""
     machine = open_machine(device)
     machine.profile()  # forget what was before
     axis, light = job.channel_axis, job.light
