@@ -191,7 +191,7 @@ class Checkpoint:
         )
 
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
-        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop here; return whether it did."""
+        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop here; return whether so."""
         stopping = self.stopping
         wrote = (now or stopping or time.perf_counter() >= self._next) and self._save(tree)
         if stopping or (wrote and self.stopping):

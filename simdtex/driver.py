@@ -161,7 +161,7 @@ class SingleRun:
 def run(
     name: str, job: Call, rng: Seed, device: Device, callback: Callback | None, checkpoint: Kept
 ) -> tuple[NDArray[Any], Output]:
-    """Run the call of a public function of this name; return the picture with the axes of the sample, and the output."""
+    """Run the call of a public function of this name; return the picture with its axes, and the output."""
     machine = open_machine(device)
     machine.profile()  # forget what was before
     axis, light = job.channel_axis, job.light

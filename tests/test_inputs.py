@@ -178,6 +178,7 @@ BAD = {
     "empty": ({"sample": GREY[:0]}, ValueError, "the sample is empty"),
     "infinite": ({"sample": at(FLOAT, (2, 3), -np.inf)}, ValueError, "infinite, the first at row 2, column 3"),
     "NaN": ({"sample": FLOAT * np.nan}, ValueError, "a sample has no known pixel; leave it out"),
+    "grey and colour": ({"sample": [GREY, COLOUR], "channel_axis": -1}, ValueError, "the samples have 2 and 3 axes"),
     "two types": ({"sample": [GREY, FLOAT]}, ValueError,
                   "sample 1 has 1 channel of float64 and sample 0 1 channel of uint8; convert them to one type"),
     # masks

@@ -22,9 +22,9 @@ from simdtex.options import GREATEST, MOST, UNSET, Number, Whole, real, resolve,
 
 SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)
 STRANGE = [
-    *(0, -1, 1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, -(2**63) - 1, 10**400, 10**5000),
+    *(0, -1, 1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, -(2**63) - 1, 10**400, 10**5000, (), (0,), [], [[]], {}),
     *(nan, inf, -inf, 1e308, -1e308, 1e-320, 5e-324, -3e6, np.float32(3e38), np.int64(2**62), 1j),
-    *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", (), [], [[]], {}, object(), np.zeros(0), np.zeros((2, 2))),
+    *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", object(), np.zeros(0), np.zeros((2, 2))),
 ]
 VERBS = {
     *("blend", "compare", "count", "cover", "evaluate", "exchange", "fade", "follow", "give"),

@@ -171,7 +171,6 @@ def _prepare_caches() -> None:
         _compile_anew("", "an earlier process that used OpenCL crashed", again)
 
 
-
 def _compile_anew(report: str, why: str, remedy: str = "") -> None:
     """Warn that all kernels are compiled anew, and add to the reports, so that later processes do not read them."""
     global _reported

@@ -9,7 +9,7 @@ import pytest
 from commands import refused, run
 
 from simdtex import commands as cli
-from simdtex.cli.command import Pair, Place, check_places
+from simdtex.cli.command import Pair, PathType, check_places
 from simdtex.io import image
 
 COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
@@ -31,7 +31,7 @@ def parameters(*roles):
         (name, option)
         for name, command in COMMANDS.items()
         for option in command.params
-        if isinstance(option.type, (Place, Pair)) and (option.type.role in roles or isinstance(option.type, Pair))
+        if isinstance(option.type, (PathType, Pair)) and (option.type.role in roles or isinstance(option.type, Pair))
     ]
 
 
@@ -39,9 +39,9 @@ def test_every_path_has_a_role():
     """An option that is new fails here, until it has a role or is known to name no file."""
     for name, option in ((name, option) for name, command in COMMANDS.items() for option in command.params):
         kind, where = option.type, f"{name} {option.name}: give it a role of simdtex.cli.command"
-        if isinstance(kind, (Place, Pair)):
+        if isinstance(kind, (PathType, Pair)):
             assert kind.role in READ + WRITE
-            if isinstance(kind, Place) and option.name in ("output", "outputs", "stages", "report", "source_map"):
+            if isinstance(kind, PathType) and option.name in ("output", "outputs", "stages", "report", "source_map"):
                 assert kind.role in WRITE, where
             if option.name in ("sample", "samples", "picture", "training_image") and isinstance(option, click.Argument):
                 assert kind.role in READ, where
@@ -175,7 +175,7 @@ def test_a_missing_input_and_an_empty_path_are_named(folder):
             rest = [{"sample.png": "in", "out.png": "out"}.get(word, word) for word in rest]
         missing = "none.npz" if given.type.role == "enter" else "none.png"
         refused("does not exist: check the path", name, *reading(given, missing), *rest)
-        if isinstance(given.type, Place) and given.type.role == "read":
+        if isinstance(given.type, PathType) and given.type.role == "read":
             refused("is a folder", name, *words(given, "in"), *rest)
     for args, said in ((("",), "the path is empty"), (("a.png", "--also", ""), "'' must be MAP=OUT")):
         done = run("synth", *args, "-o", "o.png")
