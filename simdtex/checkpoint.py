@@ -171,7 +171,8 @@ class Checkpoint:
 
     def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
         """Raise if the file belongs to another run; the message gives the difference."""
-        before = about["inputs"]
+        before = about["inputs"] | {"seed": about["seed"]}
+        now = now | {"seed": about["seed"] if seed is None else seed}
         for name in {**before, **now}:
             old, new = before.get(name), now.get(name)
             if old == new:
@@ -181,14 +182,10 @@ class Checkpoint:
                 part = next(part for part in {**old, **new} if old.get(part) != new.get(part))
                 old, new = old.get(part), new.get(part)
                 what = what.format(part) if "{" in what else NAMES.get(part, what)
-            raise self._another(what, _shown(old, new))
-        if seed is not None and seed != about["seed"]:
-            raise self._another("seed", f" ({about['seed']}, not {seed})")
-
-    def _another(self, what: str, shown: str) -> ValueError:
-        return ValueError(
-            f"the checkpoint {self.path} is of another {what}{shown}; give the same, or a new file for this run"
-        )
+            raise ValueError(
+                f"the checkpoint {self.path} is of another {what}{_shown(old, new)}; give the same, or a new file for "
+                "this run"
+            )
 
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
         """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop here; return whether so."""

@@ -135,18 +135,17 @@ def test_story_runs(any_device, page, tmp_path, monkeypatch):
         if kind == "python":
             exec(compile(small(text), page_id(page), "exec"), names)
             continue
-        words = shlex.split(small(text))[1:]
-        words += ["--order", "8"] if {"synth", "fill", "extend", "tile", "tileset", "simulate"} & {*words} else []
-        words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
+        words = quick(text)[1:]
         assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
 def quick(line):
     """The words of a command that makes a small thing soon."""
     words = shlex.split(small(line))
-    words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
-    words += ["--order", "8"] if {"fill", "extend", "tile"} & set(words) else []
-    words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
+    named = set(words)
+    if {"fill", "extend", "tile", "tileset"} & named or ({"synth", "simulate"} & named and "--method" not in words):
+        words += ["--order", "8"]
+    words += ["--band", "3"] if {"--seamless", "tile"} & named else []  # no more fits a small picture
     words += ["--order", "4", "--seeds", "1", "--size", "12x12"] if "schedules" in words else []
     words += ["--order", "2", "--size", "9x8"] if "maspar" in words[1:2] else []
     return words

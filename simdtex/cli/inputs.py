@@ -134,17 +134,6 @@ def without_alpha(one: Read, count: int) -> np.ma.MaskedArray[Any, Any]:
     return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
 
 
-def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = None) -> None:
-    """Say so if the format of an output changes pixels that are to stay as they are, or loses the georeference."""
-    from simdtex.io.image import LOSSY, suitable_suffix
-
-    if path.suffix.lower() in LOSSY:
-        suffix = suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
-        note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
-    if metadata and metadata.geo and path.suffix.lower() not in (".tif", ".tiff"):
-        note(f"{path} holds no georeference; end its name in .tif to keep it")
-
-
 def read_picture(path: Path, how: Reading = PLAIN) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
@@ -226,14 +215,22 @@ def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
         raise ValueError(f"{option} names {counts}; give one for each sample")
 
 
-def check_output(path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False) -> None:
-    """Raise unless a picture can be written like ``pixels``, which are labels if there are few of them."""
+def check_output(
+    path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False, kept: bool = False
+) -> None:
+    """Raise unless a picture can be written like ``pixels``; say so if its format loses what is to be ``kept``."""
     from simdtex.io import image
     from simdtex.model.pictures import few
 
-    lossy = path.suffix.lower() in image.LOSSY
+    suffix = path.suffix.lower()
+    lossy = suffix in image.LOSSY
     labels = lossy and bool(categorical or few([planes(np.ma.getdata(pixels))]))
     image.check_writable(path, pixels.dtype, channels(pixels), metadata=metadata, labels=labels)
+    if kept and lossy:
+        better = image.suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
+        note(f"{path}: JPEG changes all pixels a little; end its name in {better} to keep the known pixels exactly")
+    if kept and metadata and metadata.geo and suffix not in (".tif", ".tiff"):
+        note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
 def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
@@ -504,9 +501,7 @@ def arranged(
         output.read(samples)
         writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
     else:
-        check_output(output, pixels, metadata, options.get("categorical"))
-        if kept:
-            note_lossy(output, pixels, metadata)
+        check_output(output, pixels, metadata, options.get("categorical"), kept)
         writers = [lambda made, run: image.write(output, made, metadata)]
     writers += [partial(one.write, metadata) for one in others]
     if source_map:
