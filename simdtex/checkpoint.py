@@ -31,14 +31,11 @@ from simdtex.random import as_seed
 FORMAT = 10
 """Format of the file; all other formats are rejected."""
 
-FIRST = 1.0
-"""The least seconds before the first state is written."""
+FIRST, LOST = 1.0, 300.0
+"""The least seconds before the first state is written, and the most between two, whatever time writing takes."""
 
 SHARE = 75
 """Time between two writes in units of the duration of the last one: writing takes at most 1/76 of the time."""
-
-LOST = 300.0
-"""The most seconds between two writes, even if writing then takes a larger share of the time."""
 
 NAMES = {
     **{"job": "call", "shape": "shape of the output", "pictures": "sample", "usable": "mask", "given": "known"},
@@ -49,15 +46,11 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Checkpointing:
-    """The state from which a run continues, and the function that receives every later state.
+    """The state from which a run continues, and the function that receives every later state."""
 
-    ``found`` is None for a new run. ``offer(info, tree)`` is called after every step; ``tree()`` returns the state, for
-    a later `found`, and ``now=True`` requires that it is written. ``stopping()`` returns whether the run is to stop.
-    """
-
-    found: Any = None
-    offer: Callable[..., Any] = lambda info, tree, *, now=False: None
-    stopping: Callable[[], bool] = lambda: False
+    found: Any = None  # None for a new run
+    offer: Callable[..., Any] = lambda info, tree, *, now=False: None  # is told each step; `tree()` returns the state
+    stopping: Callable[[], bool] = lambda: False  # whether the run is to stop
 
 
 class Checkpoint:
@@ -114,10 +107,7 @@ class Checkpoint:
         return f"Checkpoint({str(self.path)!r})"
 
     def stop(self) -> None:
-        """Write the state after the current step, and raise KeyboardInterrupt there.
-
-        A callback or a signal handler may call it.
-        """
+        """Write the state after the current step, and raise KeyboardInterrupt there; callbacks may call this."""
         self.stopping = True
 
     def remove(self) -> None:
@@ -128,11 +118,7 @@ class Checkpoint:
     def begin(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
     ) -> Iterator[tuple[int, Checkpointing]]:
-        """Lock the file, and start a run or resume the run in the file; yield its seed and its checkpointing.
-
-        ``job`` is the public function; ``inputs()`` returns everything but the seed that determines the result, by
-        name; ``rng`` None takes the seed of the run in the file.
-        """
+        """Lock the file, and start or resume a run of this public function; yield its seed and its checkpointing."""
         if self._used:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
         self._used = True

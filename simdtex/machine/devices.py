@@ -191,11 +191,9 @@ def intel_library() -> Path | None:
 
 @contextmanager
 def _icd_folder() -> Iterator[None]:
-    """Point the loader to a temporary folder that lists all runtimes and the Intel runtime from the package index.
-
-    The .icd file in Intel's wheel names a path that does not exist, and the loader reads a single folder. A folder
-    that the user has set is not changed, and on Windows runtimes are found in the registry.
-    """
+    """Point the loader to a temporary folder that lists all runtimes and the Intel runtime from the package index."""
+    # The .icd file in Intel's wheel names a path that does not exist, and the loader reads a single folder, which the
+    # user may have set. On Windows runtimes are found in the registry.
     library = intel_library() if sys.platform == "linux" else None
     if library is None or any(os.environ.get(name) for name in _ICD_VARIABLES):
         yield
@@ -439,10 +437,7 @@ def devices(probe: bool = True) -> list[DeviceInfo]:
 
 
 def probe(info: DeviceInfo) -> DeviceInfo:
-    """Build and run a tiny program on a device, and return its line with `usable` and `reason`.
-
-    It runs in this process, unless a process crashed at this point before.
-    """
+    """Return the line of a device after a tiny program on it, in this process unless one has crashed in that before."""
     if info.handle is None:
         return info
     reason = failures([info.index])[0] if apart else failure(info.handle)
@@ -450,11 +445,7 @@ def probe(info: DeviceInfo) -> DeviceInfo:
 
 
 def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
-    """Return a usable device, by a part of its name, its index or its line; None takes SIMDTEX_DEVICE, or the first.
-
-    Devices are probed in order of preference, in this process, and only until one is usable; devices that `text` does
-    not match are never probed.
-    """
+    """Return a usable device, by a part of its name, its index or its line; None takes SIMDTEX_DEVICE, or the first."""
     if isinstance(text, DeviceInfo):
         text = text if text.reason != _NOT_PROBED else probe(text)
         if text.usable:
@@ -477,7 +468,7 @@ def choose(
     listing: Sequence[DeviceInfo],
     check: Callable[[DeviceInfo], DeviceInfo] = lambda info: info,
 ) -> DeviceInfo:
-    """Return a device of a listing, best first; ``check`` probes a line and returns it.
+    """Return a device of a listing, best first; ``check`` probes a line, only until one is usable, and returns it.
 
     The text is a part of a device's name, platform or version (case does not matter), or an index. If several devices
     match, the result is the one whose whole name, as printed, is the text, else the only usable one, or the only one by

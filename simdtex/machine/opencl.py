@@ -382,10 +382,7 @@ class OpenCL:
             )
 
     def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
-        """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
-
-        ``table`` is the number of bytes that each site has in a table, in addition to its neighbourhood.
-        """
+        """Return the number of sites, each with ``table`` bytes, that fit the scratch memory and 4e9 multiply-adds."""
         fit = self.scratch // (table + 8 * neighbours * (1 + channels))
         return max(1, min(fit, int(4e9) // (2 * candidates * neighbours * channels)))
 

@@ -155,6 +155,7 @@ def test_what_is_no_checkpoint(place):
     refused("nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
     (place / "other").mkdir()
     refused("other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
+    refused("--workers requires the .zarr store of --tiles; leave it out", "resume", "sample.png", "--workers", 2)
     refused("sample.png is no checkpoint, or is damaged; give another file", "resume", "sample.png")
     refused("sample.png is an input and would be overwritten", *SYNTH, "--checkpoint", "sample.png")
     refused("out.png would be written twice", *SYNTH, "--checkpoint", "out.png")
