@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import fields, replace
 from functools import partial
-from math import inf
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -22,7 +21,6 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import Checkpoint, Checkpointing, begin_run
 from simdtex.machine import Machine, open_machine
 from simdtex.model.light import Light
-from simdtex.options import real_array, whole
 from simdtex.run import Callback, Observer, Output, Progress
 
 Seed = int | np.random.Generator | None
@@ -190,31 +188,3 @@ def identities(job: Any) -> dict[str, Any]:
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
     """Return a picture (rows, cols, channels) with the axes of the sample."""
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
-
-
-def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
-    """Return the options, with the channels of the picture ``start`` moved to the last axis."""
-    start = options.get("start")
-    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
-        return options
-    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
-
-
-def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
-    """Return the rows and columns of an output; raise unless they are two integers of at least ``least``."""
-    rows, cols = check_sides(shape, ("rows", "columns"), least)
-    return rows, cols
-
-
-def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
-    """Return the sides of an output, called ``names``; raise unless they are integers of at least ``least``."""
-    try:
-        sides = tuple(shape)
-    except TypeError:
-        sides = ()
-    if len(sides) != len(names):
-        count = {2: "two", 3: "three"}[len(names)]
-        raise ValueError(f"shape must be {count} integers ({', '.join(names)}), not {shape!r}")
-    for name, side in zip(names, sides, strict=True):
-        whole(f"{name} of the output", side, least, inf)  # `within_32_bits` limits their product in one sentence
-    return tuple(int(side) for side in sides)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from math import prod
+from math import inf, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
-from simdtex.options import DataWarning, check_real
+from simdtex.options import DataWarning, check_real, real_array, whole
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
@@ -35,6 +35,34 @@ class Inputs(NamedTuple):
     def plain(self) -> bool:
         """Whether there is one sample and no other array."""
         return self.pictures.clean and self.given is None and self.guide is None
+
+
+def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
+    """Return the options, with the channels of the picture ``start`` moved to the last axis."""
+    start = options.get("start")
+    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
+        return options
+    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
+
+
+def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
+    """Return the rows and columns of an output; raise unless they are two integers of at least ``least``."""
+    rows, cols = check_sides(shape, ("rows", "columns"), least)
+    return rows, cols
+
+
+def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
+    """Return the sides of an output, called ``names``; raise unless they are integers of at least ``least``."""
+    try:
+        sides = tuple(shape)
+    except TypeError:
+        sides = ()
+    if len(sides) != len(names):
+        count = {2: "two", 3: "three"}[len(names)]
+        raise ValueError(f"shape must be {count} integers ({', '.join(names)}), not {shape!r}")
+    for name, side in zip(names, sides, strict=True):
+        whole(f"{name} of the output", side, least, inf)  # `within_32_bits` limits their product in one sentence
+    return tuple(int(side) for side in sides)
 
 
 def check_inputs(

@@ -432,12 +432,15 @@ def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass
 class Folder:
-    """The maps of a folder, for a folder ``output``."""
+    """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``.
+
+    ``maps`` are those that are read, ``lead`` first.
+    """
 
     found: Maps
-    lead: Path  # the map whose pixels decide the arrangement
+    lead: Path
     output: Path
-    maps: list[Also] = field(default_factory=list)  # those that are read, the lead first
+    maps: list[Also] = field(default_factory=list)
 
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
