@@ -80,7 +80,10 @@ def stopping(monkeypatch, after, kind=signal.SIGTERM):
         count[0] += 1
         if count[0] % after == 0:
             os.kill(os.getpid(), kind)
-            time.sleep(0.001)  # a handler runs between two instructions
+            for _ in range(1000):  # a handler runs in the main thread, whose turn may come late
+                if self.stopping:
+                    break
+                time.sleep(0.001)
         return wrote
 
     monkeypatch.setattr(Checkpoint, "_save", counted)
