@@ -236,10 +236,10 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
 
 def check_version(name: str, about: dict[str, Any], known: int) -> None:
     """Raise unless a state with the description ``about`` has a known format and this version."""
-    wrote, own = about.get("version"), simdtex.__version__
+    wrote, version = about.get("version"), simdtex.__version__
     wrong = f"format {about.get('format')} and this simdtex reads {known}" if about.get("format") != known else ""
-    if not wrong and wrote != own:
-        wrong = f"simdtex {wrote} and this is {own}, whose results may differ"
+    if not wrong and wrote != version:
+        wrong = f"simdtex {wrote} and this is {version}, whose results may differ"
     if wrong:
         raise ValueError(f"{name} is of {wrong}; go on with the code of simdtex {wrote} that wrote it, or begin anew")
 
@@ -259,8 +259,8 @@ def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
 def read_state(path: Path) -> tuple[dict[str, Any], Any]:
     """Return the arguments of `write_state`; raise Damaged if the content of the file has changed, and OSError."""
     try:
-        with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files}
+        with read_checked(path) as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
         about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
         return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
     except (ValueError, KeyError, BadZipFile):
@@ -269,7 +269,7 @@ def read_state(path: Path) -> tuple[dict[str, Any], Any]:
 
 def _shown(old: Any, new: Any) -> str:
     """Return both values in parentheses, or nothing if they are long."""
-    words = [value_text(one) for one in (old, new)]
+    words = [value_text(value) for value in (old, new)]
     return "" if any("sha256:" in word or len(word) > 60 for word in words) else f" ({words[0]}, not {words[1]})"
 
 
@@ -318,18 +318,18 @@ def like(template: Any, node: Any) -> Any:
     """Return the tree ``node`` with the tuple types of ``template``, a tree of the same form."""
     if not (isinstance(node, (list, tuple)) and isinstance(template, tuple) and len(node) == len(template)):
         return node
-    inside = [like(one, value) for one, value in zip(template, node, strict=True)]
+    inside = [like(form, value) for form, value in zip(template, node, strict=True)]
     kind: Any = type(template)
     return tuple(inside) if kind is tuple else kind(*inside)
 
 
 def digest(*arrays: NDArray[Any]) -> str:
     """Return the SHA-256 of the types, shapes and bytes, in C order, of arrays."""
-    found = hashlib.sha256()
+    total = hashlib.sha256()
     for array in arrays:
-        found.update(f"{array.dtype.str}{array.shape}".encode())
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
+        total.update(f"{array.dtype.str}{array.shape}".encode())
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()
 
 
 def identity(thing: Any) -> Any:
@@ -345,9 +345,9 @@ def identity(thing: Any) -> Any:
     if isinstance(thing, Real):
         return "nan" if thing != thing else float(thing)  # 1 and 1.0 are equal, and so are two NaN
     if isinstance(thing, (list, tuple)):
-        return [identity(one) for one in thing]
+        return [identity(item) for item in thing]
     if isinstance(thing, dict):
-        return {str(name): identity(one) for name, one in thing.items()}
+        return {str(name): identity(item) for name, item in thing.items()}
     if is_dataclass(thing):
         return {field.name: identity(getattr(thing, field.name)) for field in fields(thing)}
     return f"{type(thing).__qualname__} {getattr(thing, 'name', '')}".strip()

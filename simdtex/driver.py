@@ -182,7 +182,7 @@ def run(
 
 def identities(job: Any) -> dict[str, Any]:
     """Return the fields of a job that identify its run."""
-    return {one.name: getattr(job, one.name) for one in fields(job) if one.compare}
+    return {field.name: getattr(job, field.name) for field in fields(job) if field.compare}
 
 
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:

@@ -111,8 +111,8 @@ class Numbers:
         """Raise unless the value is such a tuple."""
         if not isinstance(value, tuple) or not value:
             raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
-        for number in value:
-            real(f"one of {name}", number, 0, self.most)
+        for item in value:
+            real(f"one of {name}", item, 0, self.most)
         if not any(value):
             raise ValueError(f"{name} are all 0; give a number above 0")
 
@@ -387,8 +387,9 @@ class Brief:
 
     def __repr__(self) -> str:
         """Return the fields with the shape and the type of arrays, whose values would fill pages, without functions."""
-        values = {one.name: getattr(self, one.name) for one in fields(self) if one.repr}  # type: ignore[arg-type]
-        told = [f"{name}={_short(one)}" for name, one in values.items() if one is not None and not callable(one)]
+        names = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
+        values = {name: getattr(self, name) for name in names}
+        told = [f"{name}={_short(value)}" for name, value in values.items() if not (value is None or callable(value))]
         return f"{type(self).__name__}({', '.join(told)})"
 
 
@@ -396,5 +397,5 @@ def _short(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {'x'.join(map(str, value.shape))}"
     if isinstance(value, dict):
-        value = {name: _short(one) for name, one in value.items()}
+        value = {name: _short(item) for name, item in value.items()}
     return shown(value)
