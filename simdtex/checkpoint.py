@@ -31,33 +31,26 @@ from simdtex.random import as_seed
 FORMAT = 10
 """Format of the file; all other formats are rejected."""
 
-FIRST = 1.0
-"""The least seconds before the first state is written."""
+FIRST, LOST = 1.0, 300.0
+"""The least seconds before the first state is written, and the most between two, whatever time writing takes."""
 
 SHARE = 75
 """Time between two writes in units of the duration of the last one: writing takes at most 1/76 of the time."""
 
-LOST = 300.0
-"""The most seconds between two writes, even if writing then takes a larger share of the time."""
-
 NAMES = {
     **{"job": "call", "shape": "shape of the output", "pictures": "sample", "usable": "mask", "given": "known"},
-    **{"place": "known_source", "pixels": "sample", "hole": "mask"},
+    **{"place": "known_source", "pixels": "sample", "hole": "mask", "options": "option {}", "maps": "{}"},
 }
-"""Names of the fields of a job in messages, if they differ from the field's own."""
+"""Names of the fields of a job in messages, if they differ from the field's own; ``{}`` is the name of a part."""
 
 
 @dataclass(frozen=True)
 class Checkpointing:
-    """The state from which a run continues, and the function that receives every later state.
+    """The state from which a run continues, and the function that receives every later state."""
 
-    ``found`` is None for a new run. ``offer(info, tree)`` is called after every step; ``tree()`` returns the state, for
-    a later `found`, and ``now=True`` requires that it is written. ``stopping()`` returns whether the run is to stop.
-    """
-
-    found: Any = None
-    offer: Callable[..., Any] = lambda info, tree, *, now=False: None
-    stopping: Callable[[], bool] = lambda: False
+    found: Any = None  # None for a new run
+    offer: Callable[..., Any] = lambda info, tree, *, now=False: None  # is told each step; `tree()` returns the state
+    stopping: Callable[[], bool] = lambda: False  # whether the run is to stop
 
 
 class Checkpoint:
@@ -114,10 +107,7 @@ class Checkpoint:
         return f"Checkpoint({str(self.path)!r})"
 
     def stop(self) -> None:
-        """Write the state after the current step, and raise KeyboardInterrupt there.
-
-        A callback or a signal handler may call it.
-        """
+        """Write the state after the current step, and raise KeyboardInterrupt there; callbacks may call this."""
         self.stopping = True
 
     def remove(self) -> None:
@@ -128,12 +118,7 @@ class Checkpoint:
     def begin(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
     ) -> Iterator[tuple[int, Checkpointing]]:
-        """Lock the file, and start a run or resume the run in the file; yield its seed and its checkpointing.
-
-        ``job`` is the public function; ``inputs()`` returns everything but the seed that determines the result, by
-        name; ``rng`` None takes the seed of the run in the file. Raises ValueError if the file is of another run,
-        version or format, is damaged or in use, or cannot be written.
-        """
+        """Lock the file, and start or resume a run of this public function; yield its seed and its checkpointing."""
         if self._used:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
         self._used = True
@@ -164,44 +149,32 @@ class Checkpoint:
                 )
         command = self._command or (about or {}).get("command")
         seed = as_seed(None) if seed is None else seed
-        self._about = {
-            "version": simdtex.__version__,
-            "seed": seed,
-            "inputs": now,
-            "command": command,
-            "device": device,
-        }
+        self._about = {"version": simdtex.__version__, "seed": seed, "inputs": now, "command": command}
+        self._about["device"] = device
         if about is None:
             self._write(None)
         return seed, found
 
     def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
         """Raise if the file belongs to another run; the message gives the difference."""
-        before = about["inputs"]
+        before = about["inputs"] | {"seed": about["seed"]}
+        now = now | {"seed": about["seed"] if seed is None else seed}
         for name in {**before, **now}:
             old, new = before.get(name), now.get(name)
             if old == new:
                 continue
+            what = NAMES.get(name, name)
             if isinstance(old, dict) and isinstance(new, dict):
-                inside = next(one for one in {**old, **new} if old.get(one) != new.get(one))
-                old, new = old.get(inside), new.get(inside)
-                name = (
-                    f"option {inside}" if name == "options" else inside if name == "maps" or inside in NAMES else name
-                )
-            raise self._another(NAMES.get(name, name), _shown(old, new))
-        if seed is not None and seed != about["seed"]:
-            raise self._another("seed", f" ({about['seed']}, not {seed})")
-
-    def _another(self, what: str, shown: str) -> ValueError:
-        return ValueError(
-            f"the checkpoint {self.path} is of another {what}{shown}; give the same, or a new file for this run"
-        )
+                part = next(part for part in {**old, **new} if old.get(part) != new.get(part))
+                old, new = old.get(part), new.get(part)
+                what = what.format(part) if "{" in what else NAMES.get(part, what)
+            raise ValueError(
+                f"the checkpoint {self.path} is of another {what}{_shown(old, new)}; give the same, or a new file for "
+                "this run"
+            )
 
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
-        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop; return whether it did.
-
-        Raises KeyboardInterrupt if the run is to stop here.
-        """
+        """Write the state ``tree()`` if it is due, ``now`` is true, or the run is to stop here; return whether so."""
         stopping = self.stopping
         wrote = (now or stopping or time.perf_counter() >= self._next) and self._save(tree)
         if stopping or (wrote and self.stopping):
@@ -250,10 +223,7 @@ def begin_run(
 
 
 def read(path: Path) -> tuple[dict[str, Any], Any]:
-    """Return the description of the run in a checkpoint, and its state.
-
-    Raises ValueError if the file is no checkpoint, is damaged, or of another format or version.
-    """
+    """Return the description of the run in a checkpoint, and its state."""
     try:
         about, tree = read_state(path)
     except Damaged:
@@ -266,10 +236,10 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
 
 def check_version(name: str, about: dict[str, Any], known: int) -> None:
     """Raise unless a state with the description ``about`` has a known format and this version."""
-    wrote, own = about.get("version"), simdtex.__version__
+    wrote, version = about.get("version"), simdtex.__version__
     wrong = f"format {about.get('format')} and this simdtex reads {known}" if about.get("format") != known else ""
-    if not wrong and wrote != own:
-        wrong = f"simdtex {wrote} and this is {own}, whose results may differ"
+    if not wrong and wrote != version:
+        wrong = f"simdtex {wrote} and this is {version}, whose results may differ"
     if wrong:
         raise ValueError(f"{name} is of {wrong}; go on with the code of simdtex {wrote} that wrote it, or begin anew")
 
@@ -289,8 +259,8 @@ def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
 def read_state(path: Path) -> tuple[dict[str, Any], Any]:
     """Return the arguments of `write_state`; raise Damaged if the content of the file has changed, and OSError."""
     try:
-        with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files}
+        with read_checked(path) as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
         about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
         return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
     except (ValueError, KeyError, BadZipFile):
@@ -299,7 +269,7 @@ def read_state(path: Path) -> tuple[dict[str, Any], Any]:
 
 def _shown(old: Any, new: Any) -> str:
     """Return both values in parentheses, or nothing if they are long."""
-    words = [value_text(one) for one in (old, new)]
+    words = [value_text(value) for value in (old, new)]
     return "" if any("sha256:" in word or len(word) > 60 for word in words) else f" ({words[0]}, not {words[1]})"
 
 
@@ -348,18 +318,18 @@ def like(template: Any, node: Any) -> Any:
     """Return the tree ``node`` with the tuple types of ``template``, a tree of the same form."""
     if not (isinstance(node, (list, tuple)) and isinstance(template, tuple) and len(node) == len(template)):
         return node
-    inside = [like(one, value) for one, value in zip(template, node, strict=True)]
+    inside = [like(form, value) for form, value in zip(template, node, strict=True)]
     kind: Any = type(template)
     return tuple(inside) if kind is tuple else kind(*inside)
 
 
 def digest(*arrays: NDArray[Any]) -> str:
     """Return the SHA-256 of the types, shapes and bytes, in C order, of arrays."""
-    found = hashlib.sha256()
+    total = hashlib.sha256()
     for array in arrays:
-        found.update(f"{array.dtype.str}{array.shape}".encode())
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
+        total.update(f"{array.dtype.str}{array.shape}".encode())
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()
 
 
 def identity(thing: Any) -> Any:
@@ -375,9 +345,9 @@ def identity(thing: Any) -> Any:
     if isinstance(thing, Real):
         return "nan" if thing != thing else float(thing)  # 1 and 1.0 are equal, and so are two NaN
     if isinstance(thing, (list, tuple)):
-        return [identity(one) for one in thing]
+        return [identity(item) for item in thing]
     if isinstance(thing, dict):
-        return {str(name): identity(one) for name, one in thing.items()}
+        return {str(name): identity(item) for name, item in thing.items()}
     if is_dataclass(thing):
         return {field.name: identity(getattr(thing, field.name)) for field in fields(thing)}
     return f"{type(thing).__qualname__} {getattr(thing, 'name', '')}".strip()

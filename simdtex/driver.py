@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import fields, replace
 from functools import partial
-from math import inf
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -22,7 +21,6 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import Checkpoint, Checkpointing, begin_run
 from simdtex.machine import Machine, open_machine
 from simdtex.model.light import Light
-from simdtex.options import real_array, whole
 from simdtex.run import Callback, Observer, Output, Progress
 
 Seed = int | np.random.Generator | None
@@ -78,25 +76,18 @@ def drive(
     checkpointing: Checkpointing | None = None,
     others: Sequence[Callable[[Any], Observer]] = (),
 ) -> tuple[NDArray[Any], Output]:
-    """Run a plan to its end, and return its result.
+    """Run a plan to its end; return the picture, channels last, and the `simdtex.run.Output`.
 
     Parameters
     ----------
-    plan : Plan
-    machine : Machine
-    seed : int
+    plan, machine, seed
+        The plan, its machine and its seed.
     callback : callable, optional
         Called with a `simdtex.run.Progress` after every part of a step.
     checkpointing : Checkpointing, optional
         The state to continue from, and the function that receives every later state.
     others : sequence of callables
         Each makes a further observer of the run, whose statistics the output has too.
-
-    Returns
-    -------
-    image : (rows, cols, channels) array
-        The picture in the sample's type; a block is (depth, rows, cols, channels).
-    output : simdtex.run.Output
     """
     began, worked = time.perf_counter(), machine.seconds
     run = plan.on(machine, seed)
@@ -129,11 +120,10 @@ def _saved(run: Run, state: Any, observers: Sequence[Observer]) -> Tree:
     return {"state": run.save(state), "observers": [observer.save() for observer in observers]}
 
 
-class Job(Protocol):
+class Call(Protocol):
     """The checked input of a public function: a frozen dataclass, whose fields identify a run in a checkpoint.
 
-    Fields declared with ``compare=False`` do not. ``options`` are those of the method, ``channel_axis`` is that of the
-    picture, and ``light`` puts the light of the place back into it.
+    Fields declared with ``compare=False`` do not.
     """
 
     @property
@@ -146,7 +136,7 @@ class Job(Protocol):
 
     @property
     def light(self) -> Light:
-        """What was done to the light of the pictures."""
+        """What was done to the light of the pictures; it puts the light of the place back into the output."""
 
     def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
@@ -167,18 +157,9 @@ class SingleRun:
 
 
 def run(
-    name: str,
-    job: Job,
-    rng: Seed,
-    device: Device,
-    callback: Callback | None,
-    checkpoint: Kept,
+    name: str, job: Call, rng: Seed, device: Device, callback: Callback | None, checkpoint: Kept
 ) -> tuple[NDArray[Any], Output]:
-    """Run the job of a public function on a device; return the picture with the axes of the sample, and the output.
-
-    ``name`` is that of the function, and a `Checkpointing` as ``checkpoint`` keeps states in memory; all others are the
-    parameters that public functions share.
-    """
+    """Run the call of a public function of this name; return the picture with its axes, and the output."""
     machine = open_machine(device)
     machine.profile()  # forget what was before
     axis, light = job.channel_axis, job.light
@@ -201,37 +182,9 @@ def run(
 
 def identities(job: Any) -> dict[str, Any]:
     """Return the fields of a job that identify its run."""
-    return {one.name: getattr(job, one.name) for one in fields(job) if one.compare}
+    return {field.name: getattr(job, field.name) for field in fields(job) if field.compare}
 
 
 def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
     """Return a picture (rows, cols, channels) with the axes of the sample."""
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
-
-
-def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
-    """Return the options, with the channels of the picture ``start`` moved to the last axis."""
-    start = options.get("start")
-    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
-        return options
-    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
-
-
-def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
-    """Return the rows and columns of an output; raise unless they are two integers of at least ``least``."""
-    rows, cols = check_sides(shape, ("rows", "columns"), least)
-    return rows, cols
-
-
-def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
-    """Return the sides of an output, called ``names``; raise unless they are integers of at least ``least``."""
-    try:
-        sides = tuple(shape)
-    except TypeError:
-        sides = ()
-    if len(sides) != len(names):
-        count = {2: "two", 3: "three"}[len(names)]
-        raise ValueError(f"shape must be {count} integers ({', '.join(names)}), not {shape!r}")
-    for name, side in zip(names, sides, strict=True):
-        whole(f"{name} of the output", side, least, inf)  # `within_32_bits` limits their product in one sentence
-    return tuple(int(side) for side in sides)

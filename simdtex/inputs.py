@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from math import prod
+from math import inf, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
-from simdtex.options import DataWarning, check_real
+from simdtex.options import DataWarning, check_real, real_array, whole
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or a function that also knows the origin and the cells of the grid."""
@@ -36,16 +36,33 @@ class Inputs(NamedTuple):
         """Whether there is one sample and no other array."""
         return self.pictures.clean and self.given is None and self.guide is None
 
-    def identity(self, name: str) -> Any:
-        """Return the arrays of an argument, as a part of the identity of a run."""
-        if name in ("sample", "training"):
-            return self.pictures.pixels, self.pictures.known
-        if name in ("mask", "guide"):
-            return self.pictures.usable if name == "mask" else self.guide
-        given = self.given if self.given and self.given.given_mask.any() else None
-        if name == "known_source":
-            return given and given.place
-        return given and (np.where(given.given_mask, given.values, 0), given.given_mask)
+
+def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
+    """Return the options, with the channels of the picture ``start`` moved to the last axis."""
+    start = options.get("start")
+    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
+        return options
+    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
+
+
+def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
+    """Return the rows and columns of an output; raise unless they are two integers of at least ``least``."""
+    rows, cols = check_sides(shape, ("rows", "columns"), least)
+    return rows, cols
+
+
+def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
+    """Return the sides of an output, called ``names``; raise unless they are integers of at least ``least``."""
+    try:
+        sides = tuple(shape)
+    except TypeError:
+        sides = ()
+    if len(sides) != len(names):
+        count = {2: "two", 3: "three"}[len(names)]
+        raise ValueError(f"shape must be {count} integers ({', '.join(names)}), not {shape!r}")
+    for name, side in zip(names, sides, strict=True):
+        whole(f"{name} of the output", side, least, inf)  # `within_32_bits` limits their product in one sentence
+    return tuple(int(side) for side in sides)
 
 
 def check_inputs(
@@ -58,20 +75,14 @@ def check_inputs(
     guide: Any = None,
     place: Placing = place_hard_data,
 ) -> Inputs:
-    """Check the arrays of a job, and return them; the parameters are those of `simdtex.synthesize`.
-
-    ``sample`` may already be checked. ``place(table, shape, dtype)`` places a table of known values.
-    """
+    """Check the arrays of a job, as in `simdtex.synthesize`, and return them; ``sample`` may already be checked."""
     pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
     given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
     return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
 
 
 def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
-    """Check a sample, or a list or tuple of samples, with the ``mask`` or masks of usable pixels, and return them.
-
-    With 3 ``axes`` the samples are volumes.
-    """
+    """Check a sample, or a list or tuple of samples, with the mask or masks of usable pixels, and return them."""
     several = is_several(sample, channel_axis, axes)
     arrays: list[Any] = [as_array("a sample", one) for one in sample] if several else [sample]
     if several and len(kinds := {one.ndim for one in arrays}) > 1:
@@ -92,10 +103,7 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
 
 
 def check_picture(image: Any, channel_axis: int | None, axes: int = 2) -> tuple[NDArray[Any], Mask]:
-    """Check a picture; return its pixels (rows, cols, channels), and the mask (rows, cols) of unknown ones.
-
-    A pixel is unknown if a channel is NaN or masked. With 3 ``axes`` it is a volume (layers, rows, cols, channels).
-    """
+    """Check a picture; return its pixels ([layers,] rows, cols, channels), and where one is NaN or masked."""
     array = as_array("the sample", image)
     pixels = check_sample(array, channel_axis, unknown=True, axes=axes)
     hidden = np.ma.getmaskarray(array)
@@ -112,18 +120,15 @@ def is_several(sample: Any, channel_axis: int | None, axes: int = 2) -> bool:
 
 def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
     """Return a mask as a bool array of ``shape``; raise if it is not one."""
-    found = plain_array(name, mask)
-    if found.dtype != np.bool_:
-        raise TypeError(f"{name} holds {found.dtype} values; give True and False")
-    _check_size(name, found.shape, of, shape)
-    return found
+    array = plain_array(name, mask)
+    if array.dtype != np.bool_:
+        raise TypeError(f"{name} holds {array.dtype} values; give True and False")
+    _check_size(name, array.shape, of, shape)
+    return array
 
 
 def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) -> HardData | NDArray[Any]:
-    """Return known values as an array or as a table: a path, or a DataFrame whose columns have names.
-
-    Codes of unknown values within the values of ``pictures`` are values.
-    """
+    """Return known values as an array or as a table; codes of unknown ones within ``pictures`` are values."""
     if isinstance(known, (str, os.PathLike)) or all(isinstance(one, str) for one in getattr(known, "columns", [0])):
         if pictures is None:
             return read_hard_data(known)
@@ -147,10 +152,7 @@ def check_known(
     source: Any = None,
     place: Placing = place_hard_data,
 ) -> Given:
-    """Check the known values of an output, and return them.
-
-    ``known`` is a masked array, floats with NaN for unknown values, a table or its path.
-    """
+    """Check the known values of an output: a masked array, floats with NaN, a table or its path; return them."""
     known = as_known(known, pictures=pictures)
     variables, dtype = pictures.pixels[0].shape[-1], pictures.pixels[0].dtype
     if isinstance(known, HardData):
@@ -165,10 +167,8 @@ def check_known(
         axes = len(shape) + (channel_axis is not None)
         check_real("known", known)
         if known.ndim != axes:
-            raise ValueError(
-                f"known is {known.ndim}-dimensional; give "
-                f"{AXES[len(shape)] if channel_axis is None else 'the channel axis too'}"
-            )
+            wanted = AXES[len(shape)] if channel_axis is None else "the channel axis too"
+            raise ValueError(f"known is {known.ndim}-dimensional; give {wanted}")
         array = known[..., None] if channel_axis is None else np.moveaxis(known, channel_axis, -1)
     _check_size("known", array.shape, "the output", (*shape, variables))
     there, values = ~np.ma.getmaskarray(array), np.ma.getdata(array)
@@ -211,15 +211,16 @@ def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.in
             f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map"
         )
     used = (place[..., 0] >= 0) & there.all(-1)
-    own = place[used]
-    number = own[:, 2] if columns == 3 else np.zeros(len(own), np.intp)
-    inside = (number >= 0) & (number < len(pictures.pixels))
-    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])[np.where(inside, number, 0).astype(np.intp)]
-    if not (inside & ((own[:, :2] >= 0) & (own[:, :2] < sizes)).all(-1)).all():  # before a cast, which would wrap
+    positions = place[used]
+    image = positions[:, 2] if columns == 3 else np.zeros(len(positions), np.intp)
+    inside = (image >= 0) & (image < len(pictures.pixels))
+    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])[np.where(inside, image, 0).astype(np.intp)]
+    inside &= ((positions[:, :2] >= 0) & (positions[:, :2] < sizes)).all(-1)
+    if not inside.all():  # before a cast, which would wrap
         raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
-    found = np.full(place.shape, -1, np.int32)
-    found[used] = own
-    return found
+    checked = np.full(place.shape, -1, np.int32)
+    checked[used] = positions
+    return checked
 
 
 def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> GuidePair:
@@ -249,11 +250,11 @@ def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> Guide
 
 
 def _guide(name: str, array: Any, axes: int) -> NDArray[Any]:
-    found = pixels_of(name, array, axes)
-    if found.dtype.kind == "f" and np.isinf(found).any():
+    guide = pixels_of(name, array, axes)
+    if guide.dtype.kind == "f" and np.isinf(guide).any():
         raise ValueError(f"{name} has infinite values; give numbers")
-    found = found.astype(np.uint8) if found.dtype == np.bool_ else found
-    return found[..., None] if found.ndim == axes else found
+    guide = guide.astype(np.uint8) if guide.dtype == np.bool_ else guide
+    return guide[..., None] if guide.ndim == axes else guide
 
 
 def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int, ...]) -> None:

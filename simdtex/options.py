@@ -111,8 +111,8 @@ class Numbers:
         """Raise unless the value is such a tuple."""
         if not isinstance(value, tuple) or not value:
             raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
-        for number in value:
-            real(f"one of {name}", number, 0, self.most)
+        for item in value:
+            real(f"one of {name}", item, 0, self.most)
         if not any(value):
             raise ValueError(f"{name} are all 0; give a number above 0")
 
@@ -150,52 +150,22 @@ def is_flag(kind: Kind) -> bool:
 
 @dataclass(frozen=True)
 class Option:
-    """The declaration of an option.
-
-    Parameters
-    ----------
-    default : object
-    kind : Kind
-        Type and range.
-    help : str
-        What the option does, in one sentence that begins with a verb and has no final stop.
-    more : str
-        Further sentences for the docstring and the reference pages.
-    none : str
-        Meaning of the default None.
-    symbol : str
-        Symbol and equation in the paper.
-    paper : object
-        The paper's value, if it differs from the default.
-    jobs : mapping
-        Job -> its default, if that differs. The name of a job is that of its command.
-    shown : tuple of str
-        The commands that have the option.
-    group : str
-        The heading under which commands and the live page list it.
-    unit : str
-    slider : (least, largest, step), optional
-        The slider on the live page. A number without a slider has no control.
-    label : str
-        The name on the live page; by default that of the field.
-    hint : str
-        The ``help`` on the live page, if the page offers less than the command line.
-    """
+    """The declaration of an option."""
 
     default: Any
-    kind: Kind
-    help: str
-    more: str = ""
-    none: str = ""
-    symbol: str = ""
-    paper: Any = UNSET
-    jobs: Mapping[str, Any] = field(default_factory=dict)
-    shown: tuple[str, ...] = ()
-    group: str = ""
+    kind: Kind  # type and range
+    help: str  # what the option does, in one sentence that begins with a verb and has no final stop
+    more: str = ""  # further sentences for the docstring and the reference pages
+    none: str = ""  # meaning of the default None
+    symbol: str = ""  # symbol and equation in the paper
+    paper: Any = UNSET  # the paper's value, if it differs from the default
+    jobs: Mapping[str, Any] = field(default_factory=dict)  # job, named as its command: its default, if that differs
+    shown: tuple[str, ...] = ()  # the commands that have the option
+    group: str = ""  # the heading under which commands and the live page list it
     unit: str = ""
-    slider: tuple[float, float, float] | None = None
-    label: str = ""
-    hint: str = ""
+    slider: tuple[float, float, float] | None = None  # least, largest, step; a number without has no control
+    label: str = ""  # the name on the live page; by default that of the field
+    hint: str = ""  # the help on the live page, if the page offers less than the command line
 
     def default_of(self, job: str) -> Any:
         """Return the default value in a job; ``"simulate 3-D"`` falls back on ``"simulate"``."""
@@ -235,25 +205,25 @@ def option(default: Any, kind: Kind, help: str, **more: Any) -> Any:
 
 def table(options: Any) -> dict[str, Option]:
     """Return the options of a class, or of an instance, by name."""
-    return {one.name: one.metadata["option"] for one in fields(options)}
+    return {field.name: field.metadata["option"] for field in fields(options)}
 
 
 def check(options: Any) -> None:
     """Raise unless every value of an instance is valid."""
-    for name, one in table(options).items():
-        one.check(name, getattr(options, name))
+    for name, option in table(options).items():
+        option.check(name, getattr(options, name))
 
 
-def has_presets(own: Mapping[str, Option]) -> bool:
+def has_presets(declared: Mapping[str, Option]) -> bool:
     """Return whether a paper has other values than the defaults of a table of options."""
-    return any(one.paper is not UNSET for one in own.values())
+    return any(option.paper is not UNSET for option in declared.values())
 
 
 def preset_values(options: Any, preset: str) -> dict[str, Any]:
     """Return the values of a preset of a class of options."""
     one_of("preset", preset, PRESETS)
     declared = table(options).items() if preset == "paper" else ()
-    return {name: one.paper for name, one in declared if one.paper is not UNSET}
+    return {name: option.paper for name, option in declared if option.paper is not UNSET}
 
 
 ARGUMENTS = {"seed": "rng", "random_state": "rng"}
@@ -264,21 +234,18 @@ ARGUMENTS |= {name: name for name in ("rng", "device", "channel_axis", "callback
 def resolve(options: type[T], job: str, given: Mapping[str, Any], function: Callable[..., Any] | None = None) -> T:
     """Return the options of a job: the method's defaults < the job's < the preset's < the user's values.
 
-    ``job`` is the name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``... Lists become tuples. A
-    name that is unknown may be that of a parameter of the public ``function``, misspelt.
-    Raises TypeError if a name is unknown; the message lists the valid ones; ValueError or TypeError if a value is not
-    valid.
+    ``job`` is the name of its command. A name that is unknown may be a parameter of the public ``function``, misspelt.
     """
-    own = table(options)
-    known = ["preset"] * has_presets(own) + [*own]
+    declared = table(options)
+    known = ["preset"] * has_presets(declared) + [*declared]
     for name in given:
         if name not in known:
-            own_names = [*signature(function).parameters] if function else []
-            near = get_close_matches(name, [*known, *own_names, *ARGUMENTS], 1, 0.66)
+            parameters = [*signature(function).parameters] if function else []
+            near = get_close_matches(name, [*known, *parameters, *ARGUMENTS], 1, 0.66)
             meant = f" (did you mean {ARGUMENTS.get(near[0], near[0])!r}?)" if near else ""
             method = options.__module__.split(".")[2]
             raise TypeError(f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join(known)}")
-    values = {name: one.default_of(job) for name, one in own.items()}
+    values = {name: option.default_of(job) for name, option in declared.items()}
     values |= preset_values(options, given.get("preset", "default"))
     values |= {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     values.pop("preset", None)
@@ -287,20 +254,15 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any], function: Call
 
 def documented(options: type[T]) -> type[T]:
     """Append the section Parameters to the docstring of a class of options."""
-    options.__doc__ = f"{(options.__doc__ or '').rstrip()}\n\n{indent(entries(table(options)), '    ')}\n    "
-    return options
-
-
-def entries(declared: Mapping[str, Option]) -> str:
-    """Return the section Parameters of a docstring."""
     lines = ["Parameters", "----------"]
-    for name, one in declared.items():
-        default = (
-            "" if one.default is UNSET else ", optional" if one.default is None else f", default {quoted(one.default)}"
-        )
-        lines.append(f"{name} : {one.kind}{f', in {one.unit}' if one.unit else ''}{default}")
-        lines += wrap(one.described(), 112, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
-    return "\n".join(lines)
+    for name, option in table(options).items():
+        default = ", optional" if option.default is None else f", default {quoted(option.default)}"
+        unit = f", in {option.unit}" if option.unit else ""
+        lines.append(f"{name} : {option.kind}{unit}{default}")
+        lines += wrap(option.described(), 112, initial_indent="    ", subsequent_indent="    ", break_on_hyphens=False)
+    section = indent("\n".join(lines), "    ")
+    options.__doc__ = f"{(options.__doc__ or '').rstrip()}\n\n{section}\n    "
+    return options
 
 
 def quoted(value: Any) -> str:
@@ -425,8 +387,9 @@ class Brief:
 
     def __repr__(self) -> str:
         """Return the fields with the shape and the type of arrays, whose values would fill pages, without functions."""
-        values = {one.name: getattr(self, one.name) for one in fields(self) if one.repr}  # type: ignore[arg-type]
-        told = [f"{name}={_short(one)}" for name, one in values.items() if one is not None and not callable(one)]
+        names = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
+        values = {name: getattr(self, name) for name in names}
+        told = [f"{name}={_short(value)}" for name, value in values.items() if not (value is None or callable(value))]
         return f"{type(self).__name__}({', '.join(told)})"
 
 
@@ -434,5 +397,5 @@ def _short(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {'x'.join(map(str, value.shape))}"
     if isinstance(value, dict):
-        value = {name: _short(one) for name, one in value.items()}
+        value = {name: _short(item) for name, item in value.items()}
     return shown(value)

@@ -37,11 +37,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
 
 
 def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
-    """Return four random 32-bit numbers per site; the counter is (site, turn, site and level and purpose, attempt).
-
-    A site's place has 48 bits: the lower 32 are the first word, the upper 16 are above level and purpose in the
-    third.
-    """
+    """Return four random 32-bit numbers per site, whose place has up to 48 bits."""
     site, attempt = np.broadcast_arrays(np.asarray(site, np.uint64), np.asarray(attempt))
     counter = [
         site & _LOW,
@@ -64,10 +60,7 @@ def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.
 
 
 def as_seed(rng: Any = None) -> int:
-    """Return a seed, 0 <= seed < 2**64, from an argument ``rng`` as in scikit-image.
-
-    None gives a random seed from the system, an integer itself, and a generator an integer drawn from it.
-    """
+    """Return a seed, 0 <= seed < 2**64: ``rng`` itself, one drawn from a generator, or from the system for None."""
     if rng is None:
         return secrets.randbits(64)
     if isinstance(rng, (int, np.integer)) and not isinstance(rng, bool):

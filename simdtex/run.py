@@ -36,9 +36,10 @@ class Progress(Brief):
     solid : bool
         Whether the image is a block, (depth, rows, cols[, channels]).
     details : dict
-        Numbers and texts that tell where the run is, by name: see Notes. Each is an attribute, too: ``progress.sweep``.
+        Numbers and texts that tell where the run is, by name. Each is an attribute, too: ``progress.sweep``. Those of
+        each method are in :ref:`run-output`.
     maps : dict
-        Functions by name that read back a map of the level, (rows, cols): see Notes. Each is an attribute, too:
+        Functions by name that read back a map of the level, (rows, cols). Each is an attribute, too:
         ``progress.temperature()``.
     source : callable or None
         ``source()`` reads back the position in the sample of each site of the level, as `Output.source`: int32,
@@ -48,30 +49,6 @@ class Progress(Brief):
         `simdtex.model.explanation.Explanation` of how that site of the level would relax now, with the random numbers
         of the current step. A call after the callback has returned uses the state of the run at that time. It changes
         nothing. Only ``mrf``.
-
-    Notes
-    -----
-    ``mrf``, after every part of a step, has ``sweep`` and ``step`` of the level, from 1 (the sites of a step relax
-    together); ``phase``, ``"relax"`` while some temperature is above 0, then ``"free"``; ``temperature_left``, the mean
-    temperature of the level, 0 to 1, at the beginning of the sweep; and the map ``temperature``, 0 to 1.
-
-    ``multires``, after every part of a level, has the map ``candidates``, the number of candidates that each pixel of
-    the last complete level was drawn from, integers.
-
-    ``pyramid``, after every channel or, for a solid, after every part of a channel, has ``iteration``, from 1, and
-    ``iterations``. In the picture, channels that are not yet done in this iteration are those of the previous one.
-
-    `simdtex.simulate`, after every part of a step of a realisation, and at its end, has ``realisation``, the number of
-    that whose picture it is, and the numbers of ``finished`` and of all ``realisations``; before its end also the map
-    ``temperature``.
-
-    `simdtex.classify`, after every step, has a picture of the labels so far: 1 is the first class, and 0 a pixel not
-    yet compared.
-
-    `simdtex.synthesize` with a store, after every tile, has the current turn as ``phase``: ``"begin"`` a level;
-    ``"whole"``, all sweeps of a level of one tile; ``"sweep"``; or ``"show"``, write the picture. ``sweep`` is that of
-    the level, from 1; ``tile`` and ``tiles`` are the numbers of finished tiles and of all. The image has every n-th
-    site of the level before the turn, about 1000 on a side. Reading it is slow.
     """
 
     level: int = 0
@@ -141,17 +118,9 @@ class Output:
         its callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``, which also adds ``kernels``, see `simdtex.machine.reference.Log.take`), and
-        ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates``, ``seconds``, and the entries
-        of the method below. If there is a source map, ``use`` shows how evenly the sample is used, as
-        `simdtex.model.source_map.effective_use`: ``effective_share``, above 0, to 1, and ``most_used``, the most used
-        piece of the sample: ``times_fair_share``, its first pixel (``row``, ``col``), and its size (``rows``,
-        ``cols``) in pixels.
-        ``lattice`` of ``mrf`` is None unless the sample repeats. It has the two ``vectors`` of the output's lattice,
-        (row, column) in pixels, the ``deformation`` that fits the sample's lattice to the output, 0 if none, and
-        ``fitting``, the rows and columns of an output that needs less deformation, None if this one needs the least.
-        ``light`` has the value of the option ``light`` and, but for ``fill``, how uneven the light of the sample is:
-        ``smooth`` and ``share``, see `simdtex.model.light.unevenness`.
+        opened with ``profile=True``, which also adds ``kernels``), ``light``, ``use`` if there is a source map, and
+        ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates`` and ``seconds``.
+        :ref:`run-output` describes these and what each method adds.
     fit : (rows, cols, classes) float32 array or None
         `simdtex.classify`: the probability that a texture of each class differs from its samples as much as the picture
         does around each pixel, within its segment.
@@ -160,28 +129,6 @@ class Output:
         the sum is 1.
     made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
         The result with channels last, whatever the axes of the sample; notebooks show it.
-
-    Notes
-    -----
-    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (the fma that
-    a bound made unnecessary; docs/concepts/search.rst), and ``equilibrium``: the ``sweeps``, ``steps`` and
-    ``relaxations`` until all temperatures were 0, without free sweeps. With the option ``array`` the statistics also
-    have ``accounting``, the cost of the run on that processor array: ``array``, ``mapping``; ``layers``,
-    virtual layers; ``shifts``, X-Net shifts of a word that bring every pixel of the finest level all its neighbours,
-    for either mapping; ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site;
-    ``active``, the mean number of active PEs per pass; ``utilisation``, its ratio to all PEs; ``sites``, relaxations;
-    ``flop``, 32-bit operations in the distances; ``moved`` and ``routed``, words that each PE got through the X-Net and
-    the router; ``instructions`` by kind, see `simdtex.maspar.machine`; ``model_seconds``, their time on a MasPar MP-1;
-    and ``launches``, kernels enqueued on the device.
-
-    A level of ``multires`` has the mean number of ``candidates`` of a pixel, and the largest, ``most``; ``nodes``, the
-    pixels of the levels above in the sample's pyramid, and ``compared``, the mean number of nodes that a pixel was
-    compared with until all its candidates were found.
-
-    ``pyramid`` has ``iterations`` in place of ``levels``: one dict per iteration with ``iteration``, ``seconds`` and
-    ``distances``: by name of the subband (and ``pixels``), the mean distance by which values were moved to match the
-    histogram, in standard deviations of the sample's subband, which is the Wasserstein distance of the two histograms;
-    the mean over orientations and channels.
     """
 
     source: NDArray[Any] | None
@@ -253,10 +200,7 @@ class Observer:
 
 
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
-    """Yield ranges (first, end) that cover first..count; the loop's body takes about 0.1 s for each.
-
-    ``least`` is the size of the first range, and the smallest size of the others.
-    """
+    """Yield ranges (first, end) of at least ``least`` that cover first..count; the loop's body takes 0.1 s for each."""
     size = least
     while first < count:
         end, began = min(count, first + size), time.perf_counter()

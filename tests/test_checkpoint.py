@@ -5,7 +5,9 @@ import os
 import subprocess
 import sys
 from collections import namedtuple
+from functools import partial
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -111,6 +113,7 @@ def test_finished_realisations_are_kept(file):
 
 def stopped(file, job=quick, **how):
     """The checkpoint of a run that was stopped."""
+    file.unlink(missing_ok=True)
     checkpoint = Checkpoint(file, every=0)
     with pytest.raises(KeyboardInterrupt):
         run(job, callback=lambda progress: checkpoint.stop(), checkpoint=checkpoint, **how)
@@ -136,47 +139,31 @@ def edited(file, state=None, **changes):
 
 
 def test_another_run_is_refused(file):
+    def synthesize(sample=GREY, shape=(6, 7), **options):
+        return lambda **how: simdtex.synthesize(sample, shape, **(options or SMALL), **how)
+
     stopped(file)
-    again = "give the same, or a new file"
-    refused(file, rf"another seed \(5, not 6\); {again}", rng=6)
+    refused(file, r"another seed \(5, not 6\); give the same, or a new file", rng=6)
     other = GREY.copy()
     other[0, 0] ^= 1
-    refused(file, f"another sample; {again}", lambda **how: simdtex.synthesize(other, (6, 7), **SMALL, **how))
-    refused(file, "another sample", lambda **how: simdtex.synthesize(GREY.astype("f4"), (6, 7), **SMALL, **how))
-    refused(
-        file, r"shape of the output \(6x7, not 6x8\)", lambda **how: simdtex.synthesize(GREY, (6, 8), **SMALL, **how)
-    )
-    refused(
-        file, r"option order \(1, not 3\)", lambda **how: simdtex.synthesize(GREY, (6, 7), order=3, levels=1, **how)
-    )
+    refused(file, "another sample; give the same", synthesize(other))
+    refused(file, "another sample", synthesize(GREY.astype("f4")))
+    refused(file, r"shape of the output \(6x7, not 6x8\)", synthesize(shape=(6, 8)))
+    refused(file, r"option order \(1, not 3\)", synthesize(order=3, levels=1))
     refused(file, r"another call \(synthesize, not fill\)", fill)
-    pyramid = {"method": "pyramid"}
-    refused(
-        file, r"another method \(mrf, not pyramid\)", lambda **how: simdtex.synthesize(GREY, (6, 7), **pyramid, **how)
-    )
-    mask = np.ones(GREY.shape, bool)
-    refused(file, "another mask", lambda **how: simdtex.synthesize(GREY, (6, 7), mask=mask, **SMALL, **how))
+    refused(file, r"another method \(mrf, not pyramid\)", synthesize(method="pyramid"))
+    refused(file, "another mask", synthesize(mask=np.ones(GREY.shape, bool), **SMALL))
     run(quick, checkpoint=file)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"version": "0.0.1"}, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; go on with"),
-        ({"format": 4}, r"is of format 4 and this simdtex reads 10; go on with the code of simdtex .* that wrote it,"),
-    ],
-    ids=["version", "format"],
-)
-def test_another_version_or_format_is_refused(changes, words, file):
-    edited(stopped(file), **{"format": checkpoints.FORMAT} | changes)
-    refused(file, words)
-
-
-def test_another_device_is_noted(whole, file):
+def test_another_version_or_format_is_refused_and_another_device_noted(whole, file):
+    edited(stopped(file), format=checkpoints.FORMAT, version="0.0.1")
+    refused(file, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; go on with")
+    edited(stopped(file), format=4)
+    refused(file, r"is of format 4 and this simdtex reads 10; go on with the code of simdtex .* that wrote it,")
     edited(stopped(file), format=checkpoints.FORMAT, device="Abacus")
     with pytest.warns(UserWarning, match=r"begun on Abacus and goes on on reference \(NumPy\); the bytes are the same"):
-        found = run(quick, checkpoint=file)
-    assert_same_bits(found[0], whole)
+        assert_same_bits(run(quick, checkpoint=file)[0], whole)
 
 
 def test_other_paths_are_refused(tmp_path):
@@ -190,9 +177,11 @@ def test_other_paths_are_refused(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["photo.png"]
 
 
-def test_one_run_to_a_checkpoint(file):
+def test_one_run_to_a_checkpoint(file, monkeypatch):
+    monkeypatch.setattr(checkpoints, "FIRST", 1e6)
     checkpoint = Checkpoint(file)
     run(quick, checkpoint=checkpoint)
+    assert read(file)[1] is None, "a short run writes no state"
     assert file.is_file()  # its owner removes it, once the result is written
     with pytest.raises(ValueError, match="a checkpoint keeps one run; give each call a checkpoint of its own"):
         run(quick, checkpoint=checkpoint)
@@ -206,57 +195,35 @@ def test_one_process_at_a_time(file):
         run(quick, checkpoint=file)
 
 
-@pytest.mark.parametrize(
-    "job",
-    [
-        lambda **how: simdtex.synthesize(GREY, (6, 7), levels=9, **how),
-        lambda **how: simdtex.fill(GREY, hole(), order=300, **how),
-    ],
-    ids=["synthesize", "fill"],
-)
-def test_bad_input_leaves_nothing(job, file):
-    with pytest.raises(ValueError):
-        run(job, checkpoint=file)
-    assert not list(file.parent.iterdir())
+def test_bad_input_leaves_nothing(file):
+    for call in (simdtex.synthesize, lambda image, shape, **how: simdtex.fill(image, hole(), **how)):
+        job = partial(call, GREY, (6, 7), order=1, levels=9)
+        with pytest.raises(ValueError):
+            run(job, checkpoint=file)
+        assert not list(file.parent.iterdir())
 
 
-def cut(path):
-    path.write_bytes(path.read_bytes()[:-7])
-
-
-def flipped(path):
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 4
-    path.write_bytes(bytes(data))
-
-
-def empty(path):
-    path.write_bytes(b"")
-
-
-@pytest.mark.parametrize("damage", [cut, flipped, empty])
-def test_a_damaged_checkpoint_says_so(damage, file):
-    damage(stopped(file))
-    refused(file, "is no checkpoint, or is damaged; give another file, or begin anew")
-
-
-def test_nothing_is_unpickled(file):
+def test_a_damaged_checkpoint_says_so_and_nothing_is_unpickled(file):
+    data = stopped(file).read_bytes()
+    middle = len(data) // 2
+    for damaged in (data[:-7], data[:middle] + bytes([data[middle] ^ 4]) + data[middle + 1 :], b""):
+        file.write_bytes(damaged)
+        refused(file, "is no checkpoint, or is damaged; give another file, or begin anew")
     write_checked(file, lambda out: np.savez(out, about=np.array([print])))
     refused(file, "is no checkpoint, or is damaged")
 
 
-@pytest.mark.parametrize(
-    "error", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=["full", "stopped"]
-)
+FULL = OSError(28, "No space left on device")
+
+
 @pytest.mark.parametrize(("module", "name"), [(os, "replace"), (os, "fsync"), (np, "savez")])
-@pytest.mark.parametrize("at", [2, 3, 5])
+@pytest.mark.parametrize(("at", "error"), [(2, FULL), (3, KeyboardInterrupt()), (5, FULL)])
 def test_a_fault_in_a_write_loses_nothing(module, name, at, error, whole, file, monkeypatch):
-    works, calls, before = getattr(module, name), [0], []
+    works, calls = getattr(module, name), [0]
 
     def faulty(*args, **kwargs):
         calls[0] += 1
         if calls[0] == at:
-            before.append(file.read_bytes() if file.exists() else None)
             if name == "savez":
                 args[0].write(b"half of it")
             raise error
@@ -290,10 +257,7 @@ def test_a_run_whose_checkpoint_cannot_be_written_ends_all_the_same(whole, file,
 
 
 def test_a_path_that_cannot_be_written_is_refused_before_the_work(file, monkeypatch):
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(os, "replace", MagicMock(side_effect=FULL))
     with pytest.raises(ValueError, match=r"could not be written \(No space left on device\)"):
         run(quick, callback=lambda progress: pytest.fail("the work has begun"), checkpoint=file)
 
@@ -308,26 +272,12 @@ def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
         now[0] += tree
 
     monkeypatch.setattr(checkpoint, "_write", write)
-    for wait, seconds, wrote in [
-        (0.99, 0, False),
-        (0.02, 0.2, True),
-        (14.9, 0, False),
-        (0.2, 30, True),
-        (299, 0, False),
-        (2, 0, True),
-        (0.9, 0, False),
-    ]:
+    waits = [(0.99, 0, False), (0.02, 0.2, True), (14.9, 0, False), (0.2, 30, True), (299, 0, False), (2, 0, True)]
+    for wait, seconds, wrote in [*waits, (0.9, 0, False)]:
         now[0] += wait
         assert checkpoint.offer(None, lambda seconds=seconds: seconds) == wrote
     assert writes == [0.2, 30, 0]
     assert (checkpoints.SHARE, checkpoints.FIRST, checkpoints.LOST) == (75, 1, 300)
-
-
-def test_a_short_run_writes_no_state(file, monkeypatch):
-    monkeypatch.setattr(checkpoints, "FIRST", 1e6)
-    checkpoint = Checkpoint(file)
-    run(quick, checkpoint=checkpoint)
-    assert read(file)[1] is None
 
 
 Named = namedtuple("Named", "first second")
@@ -336,20 +286,7 @@ Named = namedtuple("Named", "first second")
 def test_a_tree_comes_back_as_it_was():
     arrays = [np.arange(2).astype(kind) for kind in ("u1", ">u2", "<i8", "f2", "f4", ">f8", "c8", "?")]
     arrays += [np.zeros((0, 3), np.int16), np.array(7.5, np.float32), np.asfortranarray(np.eye(3)), np.float32(0.1)]
-    numbers = [
-        0,
-        -1,
-        2**70,
-        0.1,
-        -0.0,
-        float("inf"),
-        float("-inf"),
-        5e-324,
-        True,
-        None,
-        "text \ud800",
-        np.uint64(2**63),
-    ]
+    numbers = [0, 2**70, 0.1, -0.0, float("inf"), 5e-324, True, None, "text \ud800", np.uint64(2**63)]
     tree = {"a": arrays, "b": (numbers, [[], (), {}]), "c": Named(1, Named(np.arange(2), "x"))}
     told, kept = pack(tree)
     found = unpack(told, kept)
@@ -360,11 +297,9 @@ def test_a_tree_comes_back_as_it_was():
     again = like(Named(0, Named(0, 0)), found["c"])
     assert isinstance(again, Named) and isinstance(again.second, Named) and again.second.second == "x"
 
-
-@pytest.mark.parametrize("thing", [object(), np.array([None]), {1, 2}, 1j])
-def test_what_is_not_plain_is_refused(thing):
-    with pytest.raises(TypeError, match="a checkpoint cannot keep"):
-        pack({"x": [thing]})
+    for thing in (object(), np.array([None]), {1, 2}, 1j):
+        with pytest.raises(TypeError, match="a checkpoint cannot keep"):
+            pack({"x": [thing]})
 
 
 def test_identities_tell_inputs_apart():

@@ -22,7 +22,7 @@ from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid import solid
-from simdtex.options import preset_values, quoted, resolve
+from simdtex.options import preset_values, quoted, resolve, table
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -57,25 +57,20 @@ def commands(text):
     return [line for line in lines if line.startswith("simdtex ")]
 
 
+SMALL = {
+    **{"[:128, :128]": "[:16, :16]", "(64, 64, 64)": "(8, 10, 12)", "(20, 64, 64)": "(8, 14, 16)"},
+    **{"block[:, 20]": "block[:, 2]", "--size 64": "--size 8", "(2, 8, 24, 24)": "(2, 6, 16, 16)"},
+    **{"np.arange(24) >= 12": "np.arange(16) >= 8", "data.camera()": "data.camera()[:64, :64]"},
+    **{"(256, 256)": "(40, 40)", "256x256": "40x40", "512x512": "40x40", "400x300": "40x30"},
+}
+"""Sizes of the pages, and those that take a second."""
+
+
 def small(code):
-    """The same code or command at sizes that take a second."""
-    code = code.replace("[:128, :128]", "[:16, :16]")
-    code = (
-        code.replace("(64, 64, 64)", "(8, 10, 12)")
-        .replace("(20, 64, 64)", "(8, 14, 16)")
-        .replace("block[:, 20]", "block[:, 2]")
-        .replace("--size 64", "--size 8")
-        .replace("(2, 8, 24, 24)", "(2, 6, 16, 16)")
-        .replace("np.arange(24) >= 12", "np.arange(16) >= 8")
-    )
-    code = code.replace("data.camera()", "data.camera()[:64, :64]")
-    code = re.sub(r"((ensemble\.)?channels\(\))", r"(image[:40, :40] for image in \1)", code)
-    return (
-        code.replace("(256, 256)", "(40, 40)")
-        .replace("256x256", "40x40")
-        .replace("512x512", "40x40")
-        .replace("400x300", "40x30")
-    )
+    """The same code or command at small sizes."""
+    for large, less in SMALL.items():
+        code = code.replace(large, less)
+    return re.sub(r"((ensemble\.)?channels\(\))", r"(image[:40, :40] for image in \1)", code)
 
 
 @pytest.fixture
@@ -140,18 +135,17 @@ def test_story_runs(any_device, page, tmp_path, monkeypatch):
         if kind == "python":
             exec(compile(small(text), page_id(page), "exec"), names)
             continue
-        words = shlex.split(small(text))[1:]
-        words += ["--order", "8"] if {"synth", "fill", "extend", "tile", "tileset", "simulate"} & {*words} else []
-        words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
+        words = quick(text)[1:]
         assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
 def quick(line):
     """The words of a command that makes a small thing soon."""
     words = shlex.split(small(line))
-    words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
-    words += ["--order", "8"] if {"fill", "extend", "tile"} & set(words) else []
-    words += ["--band", "3"] if {"--seamless", "tile"} & set(words) else []  # no more fits a small picture
+    named = set(words)
+    if {"fill", "extend", "tile", "tileset"} & named or ({"synth", "simulate"} & named and "--method" not in words):
+        words += ["--order", "8"]
+    words += ["--band", "3"] if {"--seamless", "tile"} & named else []  # no more fits a small picture
     words += ["--order", "4", "--seeds", "1", "--size", "12x12"] if "schedules" in words else []
     words += ["--order", "2", "--size", "9x8"] if "maspar" in words[1:2] else []
     return words
@@ -168,29 +162,20 @@ def check_outputs(words, folder):
         assert list((folder / "stages").glob("level0-sweep*.png"))
 
 
-@pytest.mark.parametrize(
-    ("page", "line"), [(page_id(page), line) for page in PAGES for line in commands(page.read_text("utf-8"))]
-)
-def test_documented_command_parses(page, line):
-    _, command, *words = shlex.split(line)
-    context = cli.load(command).make_context(command, words)
-    method = (
-        METHODS[context.params["method"]] if "method" in context.params else OF_COMMANDS.get(command, METHODS["mrf"])
-    )
-    known = method.Options.__dataclass_fields__
-    with context:
-        valid = {name: value for name, value in given(context.params).items() if name in known}
-    valid |= {"preset": context.params["preset"]} if context.params.get("preset") else {}
-    resolve(method.Options, command, valid)
+def test_documented_commands_parse_and_doctests_hold():
+    for page in PAGES:
+        assert doctest.testfile(str(page), module_relative=False, encoding="utf-8").failed == 0, page
+        for line in commands(page.read_text("utf-8")):
+            _, command, *words = shlex.split(line)
+            context = cli.load(command).make_context(command, words)
+            params = context.params
+            method = METHODS[params["method"]] if "method" in params else OF_COMMANDS.get(command, mrf)
+            with context:
+                options = {name: value for name, value in given(params).items() if name in table(method.Options)}
+            options |= {"preset": params["preset"]} if params.get("preset") else {}
+            resolve(method.Options, command, options)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_id)
-def test_doctests_of_page(page):
-    result = doctest.testfile(str(page), module_relative=False, encoding="utf-8")
-    assert result.failed == 0
-
-
-@pytest.mark.slow
 @pytest.mark.slow
 def test_the_example_of_the_page_for_geoscientists_runs(any_device):
     """The build of the documentation runs the others, which the gallery shows."""
@@ -198,30 +183,22 @@ def test_the_example_of_the_page_for_geoscientists_runs(any_device):
     assert 0 < made["p10"] < made["p50"] < made["p90"]
 
 
-SCRIPTS = [
-    *sorted((ROOT / "benchmarks").glob("*.py")),
-    *(ROOT / "docs" / f"{n}.py" for n in ("blender_window", "pictures", "screenshots")),
-]
-
-
-@pytest.mark.parametrize("script", SCRIPTS, ids=page_id)
-def test_what_a_script_needs_is_there(script, monkeypatch):
+@pytest.mark.slow
+def test_what_a_script_needs_is_there(monkeypatch):
     """Its figures are made by hand, so that nothing else would tell."""
-    monkeypatch.setattr(sys, "path", [str(script.parent), *sys.path])
-    found = runpy.run_path(str(script), run_name="imported")
-    assert callable(found.get("main")) or "__main__" not in script.read_text(encoding="utf-8")
+    others = (ROOT / "docs" / f"{name}.py" for name in ("blender_window", "pictures", "screenshots"))
+    for script in [*sorted((ROOT / "benchmarks").glob("*.py")), *others]:
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "path", [str(script.parent), *sys.path])
+            names = runpy.run_path(str(script), run_name="imported")
+        assert callable(names.get("main")) or "__main__" not in script.read_text(encoding="utf-8"), script
 
 
 FIRST = (ROOT / "docs" / "index.rst").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        pytest.param(line, marks=[pytest.mark.slow] * (line not in commands(README) or "--ising" in line))
-        for line in dict.fromkeys(commands(README) + commands(FIRST))
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("line", dict.fromkeys(commands(README) + commands(FIRST)))
 def test_command_of_the_first_pages_runs(any_device, material, line, monkeypatch):
     """In this process, which is quicker than one for each."""
     monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
@@ -231,37 +208,28 @@ def test_command_of_the_first_pages_runs(any_device, material, line, monkeypatch
     assert simdtex.__file__.startswith(str(ROOT))
 
 
-def test_links_of_readme_exist():
-    links = re.findall(r"\]\(([^)]+)\)", README)
-    inside = [link for link in links if "://" not in link and not link.startswith("#")]
-    assert inside
-    for link in inside:
-        assert (ROOT / link.partition("#")[0]).exists(), link
-
-
-def test_the_readme_is_short():
+def test_the_readme_is_short_and_what_it_names_exists():
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link and not link.startswith("#")]
+    assert links and [link for link in links if not (ROOT / link.partition("#")[0]).exists()] == []
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    named = re.findall(r"\bmake (demo|test|docs|[a-z]+$)", README, re.MULTILINE)
+    assert {"demo", "test", "docs"} <= set(named) <= set(targets)
     assert len(README.splitlines()) < 150
 
 
-@pytest.mark.parametrize("command", sorted(set(cli.main.commands) - {"bench", "demo", "live", "resume"}))
-def test_the_first_page_shows_every_command(command):
+def test_the_first_page_shows_every_command():
     """But those that take minutes, need a run that was stopped, or never end."""
-    assert f"simdtex {command}" in "\n".join(commands(FIRST))
+    shown = "\n".join(commands(FIRST))
+    every = set(cli.main.commands) - {"bench", "demo", "live", "resume"}
+    assert [command for command in every if f"simdtex {command}" not in shown] == []
 
 
-def test_make_targets_of_readme_exist():
-    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-    named = re.findall(r"\bmake (demo|test|docs|[a-z]+$)", README, re.MULTILINE)
-    assert {"demo", "test", "docs"} <= set(named)
-    assert set(named) <= set(targets)
-
-
-@pytest.mark.parametrize("page", PAGES, ids=page_id)
-def test_files_named_on_page_exist(page):
-    text = page.read_text(encoding="utf-8")
-    listed = re.findall(r"^   :caption: (.+)$", text, re.MULTILINE)  # what the page has its reader write
-    for name in re.findall(r"``((?:simdtex|kernels|tests|examples|benchmarks)/[\w/.]+)``", text):
-        assert (ROOT / name).exists() or name in listed, name
+def test_files_named_on_pages_exist():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        listed = re.findall(r"^   :caption: (.+)$", text, re.MULTILINE)  # what the page has its reader write
+        named = re.findall(r"``((?:simdtex|kernels|tests|examples|benchmarks)/[\w/.]+)``", text)
+        assert [name for name in named if not (ROOT / name).exists() and name not in listed] == [], page
 
 
 def test_every_kernel_and_operation_is_in_the_table():
@@ -272,56 +240,40 @@ def test_every_kernel_and_operation_is_in_the_table():
         assert re.search(rf"{named}[^*]*``tests/", table), "its tests are in its row"
 
 
-@pytest.mark.parametrize("name", sorted(set(cli.main.commands) - {"bench", "devices"}))
-def test_every_option_of_the_command_line_is_documented(name):
-    text = re.search(rf"^\.\. command-options:: {name}\n((?:\n|   .*\n)*)", REFERENCE, re.MULTILINE)
-    assert f"simdtex {name}\n---" in REFERENCE
-    written = EXTENSION["command_options"](name, [line[3:] for line in text[1].splitlines()])
-    shown = [part.split()[0] for line in written if line.startswith(".. option") for part in line[11:].split(", ")]
-    params = [p for p in cli.load(name).params if isinstance(p, click.Option)]
-    assert shown == [flag for p in params for flag in (*p.opts, *p.secondary_opts)]
-    assert not [line for line in written if len(line.split("[")[-1]) > 1 and "  [" in line], "defaults are in words"
-
-
-def test_a_page_adds_to_no_option_that_is_not_there():
+def test_every_option_of_the_command_line_is_documented():
+    for name in set(cli.main.commands) - {"bench", "devices"}:
+        text = re.search(rf"^\.\. command-options:: {name}\n((?:\n|   .*\n)*)", REFERENCE, re.MULTILINE)
+        assert f"simdtex {name}\n---" in REFERENCE
+        written = EXTENSION["command_options"](name, [line[3:] for line in text[1].splitlines()])
+        shown = [part.split()[0] for line in written if line.startswith(".. option") for part in line[11:].split(", ")]
+        params = [p for p in cli.load(name).params if isinstance(p, click.Option)]
+        assert shown == [flag for p in params for flag in (*p.opts, *p.secondary_opts)]
+        unsaid = [line for line in written if len(line.split("[")[-1]) > 1 and "  [" in line]
+        assert unsaid == [], "defaults are in words"
     with pytest.raises(AssertionError, match="simdtex fill has no option --nothing"):
         EXTENSION["command_options"]("fill", ["--nothing", "   More on it."])
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_papers_values_are_listed(method):
-    rows = "\n".join(EXTENSION["paper_values"](method))
-    for name, value in preset_values(METHODS[method].Options, "paper").items():
-        assert re.search(rf"^   \* - ``{name}``\n.*\n     - ``{re.escape(quoted(value))}``$", rows, re.MULTILINE)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_every_option_of_a_method_has_its_page(method):
+def test_every_option_of_a_method_has_its_page_with_the_papers_value():
     page = (ROOT / "docs" / "reference" / "options.rst").read_text(encoding="utf-8")
-    assert set(METHODS[method].Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
+    for method, module in METHODS.items():
+        assert set(table(module.Options)) <= set(re.findall(r"``(\w+)``", page))
+        rows = "\n".join(EXTENSION["paper_values"](method))
+        for name, value in preset_values(module.Options, "paper").items():
+            assert re.search(rf"^   \* - ``{name}``\n.*\n     - ``{re.escape(quoted(value))}``$", rows, re.MULTILINE)
 
 
 WISHES = (ROOT / "docs" / "wishes.rst").read_text(encoding="utf-8")
 ASKED = ("synth", "fill", "extend", "simulate")
 
 
-@pytest.mark.parametrize("command", ASKED)
-def test_every_option_of_a_command_answers_a_wish(command):
-    options = {max(p.opts, key=len) for p in cli.load(command).params if isinstance(p, click.Option)}
-    assert options - set(re.findall(r"``(--[\w-]+)", WISHES)) == set()
-
-
-def test_no_wish_names_an_option_that_is_not_there():
+def test_every_option_answers_a_wish_and_no_wish_names_another():
     params = [p for command in ASKED for p in cli.load(command).params if isinstance(p, click.Option)]
-    known = {name for p in params for name in (*p.opts, *p.secondary_opts)}
-    assert set(re.findall(r"``(--[\w-]+)", WISHES)) <= known
-
-
-def test_options_for_research_lead_to_a_page():
+    wished = set(re.findall(r"``(--[\w-]+)", WISHES))
+    assert {max(p.opts, key=len) for p in params} <= wished
+    assert wished <= {name for p in params for name in (*p.opts, *p.secondary_opts)}
     lines = re.findall(r"^\* .*(?:\n  .*)*", WISHES.partition(".. _wishes-research:")[2], re.MULTILINE)
-    assert lines
-    for line in lines:
-        assert "``--" in line and ":doc:" in line
+    assert lines and all("``--" in line and ":doc:" in line for line in lines), "options for research lead to a page"
 
 
 def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
@@ -342,5 +294,4 @@ def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():
 
 def test_public_names_are_in_the_reference():
     page = (ROOT / "docs" / "reference" / "index.rst").read_text(encoding="utf-8")
-    for name in simdtex.__all__:
-        assert f"`simdtex.{name}`" in page, name
+    assert [name for name in simdtex.__all__ if f"`simdtex.{name}`" not in page] == []

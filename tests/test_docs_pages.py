@@ -14,6 +14,8 @@ import pytest
 
 import simdtex
 
+pytestmark = pytest.mark.slow
+
 # -- The page for contributors: its listings are written into a copy of the repository, and what it says happens there.
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,7 +55,6 @@ def python(root, *words, device):
     environment = os.environ | {
         "PYTHONPATH": str(root),
         "SIMDTEX_DEVICE": str(device.index),
-        "SIMDTEX_REQUIRE_OPENCL": "1",
     }
     environment.pop("SIMDTEX_REQUIRE_OPENCL", None)  # the tests of the house need no device
     for name in [name for name in environment if name.startswith("PYTEST_")]:
@@ -67,27 +68,19 @@ def pytest_in(root, *words, device):
     return python(root, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words, device=device)
 
 
-def test_every_listing_has_its_place():
-    assert set(LISTINGS) == {*FILES, TABLE, "what look.py prints"}
-
-
-@pytest.mark.slow
 def test_the_operation_passes_its_test_and_those_of_the_house(copy, any_device):
+    assert set(LISTINGS) == {*FILES, TABLE, "what look.py prints"}
+    assert "docs/contributing.rst" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     done = pytest_in(copy, "tests/methods/mrf/test_median.py", device=any_device)
     assert done.returncode == 0, done.stdout
     assert "OpenCL devices that ran tests" in done.stdout
     words = re.search(r'tests/test_house.py tests/test_docs.py -k "(.+)"', PAGE).group(1)
     done = pytest_in(copy, "tests/test_house.py", "tests/test_docs.py", "-k", words, device=any_device)
     assert done.returncode == 0, done.stdout
-
-
-@pytest.mark.slow
-def test_it_does_what_the_page_shows(copy, any_device):
     done = python(copy, "look.py", device=any_device)
     assert done.stdout == LISTINGS["what look.py prints"], done.stderr
 
 
-@pytest.mark.slow
 def test_its_test_can_fail(copy, any_device):
     """As the page says: the devices fail, the reference does not."""
     kernel = copy / "kernels" / "mrf" / "median.cl"
@@ -104,22 +97,15 @@ def test_its_test_can_fail(copy, any_device):
     assert set(failed) == {"test_a_device_has_the_references_bits", "test_the_shape_of_a_launch_changes_no_bit"}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".py")])
-def test_its_python_is_formatted_and_clean(copy, name):
+def test_its_python_is_formatted_and_clean(copy):
     ruff = shutil.which("ruff", path=str(Path(sys.executable).parent))
     if ruff is None:
         pytest.skip("ruff is of the extra dev")
     for words in (("check",), ("format", "--check")):
-        done = subprocess.run([ruff, *words, name], cwd=copy, capture_output=True, text=True, check=False)
+        names = [name for name in FILES if name.endswith(".py")]
+        done = subprocess.run([ruff, *words, *names], cwd=copy, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
 
-
-def test_the_root_points_there():
-    assert "docs/contributing.rst" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-
-
-# -- The checks of the built documentation, of its prose, and of the session that it plays.
 
 # -- The check of the built documentation finds what it is for; in a browser, too, where there is one.
 BUILT = ROOT / "docs" / "_build" / "html"
@@ -145,38 +131,28 @@ def faults(folder):
     return [*check.broken(found), *check.elsewhere(folder, found)]
 
 
-def test_sound_pages_have_no_faults(folder):
+FAULTS = [
+    ("two.html#there", "two.html#nowhere", "has no place 'nowhere'"),
+    ("two.html#there", "three.html", "there is no three.html"),
+    ('src="picture.png"', 'src="other.png"', "there is no other.png"),
+    ('src="picture.png"', 'src="//example.org/p.png"', "loads //example.org/p.png"),
+    ("</head>", '<script src="http://example.org/m.js"></script></head>', "loads http://example.org/m.js"),
+    ("</head>", '<link rel="stylesheet" href="https://example.org/s.css"></head>', "loads https://example.org/s"),
+    ("</h1>", '</h1><img srcset="big.png 2x" src="picture.png">', "there is no big.png"),
+]
+
+
+def test_faults_of_pages_are_told_and_sound_pages_have_none(folder):
     assert faults(folder) == []
-
-
-@pytest.mark.parametrize(
-    ("good", "bad", "told"),
-    [
-        ("two.html#there", "two.html#nowhere", "has no place 'nowhere'"),
-        ("two.html#there", "three.html", "there is no three.html"),
-        ('src="picture.png"', 'src="other.png"', "there is no other.png"),
-        ('src="picture.png"', 'src="https://example.org/p.png"', "loads https://example.org/p.png"),
-        ('src="picture.png"', 'src="//example.org/p.png"', "loads //example.org/p.png"),
-        ("</head>", '<script src="http://example.org/m.js"></script></head>', "loads http://example.org/m.js"),
-        ("</head>", '<link rel="stylesheet" href="https://example.org/s.css"></head>', "loads https://example.org/s"),
-        ("</h1>", '</h1><img srcset="big.png 2x" src="picture.png">', "there is no big.png"),
-    ],
-)
-def test_a_fault_is_told(folder, good, bad, told):
-    page = folder / "one.html"
-    page.write_text(GOOD.replace(good, bad), encoding="utf-8")
-    assert any(told in fault for fault in faults(folder))
-
-
-def test_a_style_sheet_that_loads_from_elsewhere_is_told(folder):
-    (folder / "style.css").write_text("@font-face { src: url(https://example.org/f.woff2) }", encoding="utf-8")
-    assert faults(folder) == ["style.css loads https://example.org/f.woff2"]
-
-
-def test_a_link_may_lead_to_a_file_that_is_no_page(folder):
     page = folder / "one.html"
     page.write_text(GOOD.replace("two.html#there", "picture.png"), encoding="utf-8")
-    assert faults(folder) == []
+    assert faults(folder) == [], "a link may lead to a file that is no page"
+    for good, bad, told in FAULTS:
+        page.write_text(GOOD.replace(good, bad), encoding="utf-8")
+        assert any(told in fault for fault in faults(folder)), bad
+    page.write_text(GOOD, encoding="utf-8")
+    (folder / "style.css").write_text("@font-face { src: url(https://example.org/f.woff2) }", encoding="utf-8")
+    assert faults(folder) == ["style.css loads https://example.org/f.woff2"]
 
 
 def test_pictures_of_the_pages_are_small_and_have_a_command():
@@ -194,25 +170,18 @@ def browser():
         pytest.skip(check.missing())
 
 
-@pytest.mark.slow
-def test_a_page_that_is_too_wide_for_a_phone_is_told(folder, browser):
+def test_what_is_too_wide_in_a_browser_is_told(folder, browser):
     assert check.sideways(folder) == []
     page = folder / "one.html"
     page.write_text(GOOD.replace("<h1", '<div style="width: 600px">wide</div><h1'), encoding="utf-8")
     (told,) = check.sideways(folder)
     assert "one.html is wider than 390 px" in told
-
-
-@pytest.mark.slow
-def test_code_that_runs_out_of_its_box_is_told(folder, browser):
     code = '<article><pre style="overflow: auto">{}</pre></article><h1'.format("x" * 300)
-    for style, faults in (("white-space: pre-wrap; overflow-wrap: anywhere", 0), ("", 1)):
-        page = GOOD.replace("<h1", f"<style>pre {{ {style} }}</style>{code}")
-        (folder / "one.html").write_text(page, encoding="utf-8")
-        assert sum("runs out of its box" in told for told in check.opened(folder, words=())) == faults
+    for style, count in (("white-space: pre-wrap; overflow-wrap: anywhere", 0), ("", 1)):
+        page.write_text(GOOD.replace("<h1", f"<style>pre {{ {style} }}</style>{code}"), encoding="utf-8")
+        assert sum("runs out of its box" in told for told in check.opened(folder, words=())) == count
 
 
-@pytest.mark.slow
 def test_built_pages_are_sound_in_a_browser(browser):
     if not (BUILT / "index.html").is_file():
         pytest.skip("the documentation is not built (make docs)")
@@ -245,11 +214,6 @@ def test_faults_are_found_in_prose_alone(name, tmp_path):
     assert lines[line - 1].strip().removesuffix("](begun.png) the") in ("begun", "It has begun, and")
 
 
-def test_a_clean_page_has_no_fault(tmp_path):
-    (tmp_path / "page.rst").write_text("Title\n=====\n\nThe schedule chooses sites.\n", encoding="utf-8")
-    assert list(prose.faults(tmp_path / "page.rst", prose.checks())) == []
-
-
 # -- The session that the documentation plays is one of this version.
 import recorded  # noqa: E402
 
@@ -259,7 +223,6 @@ def recording():
     return recorded.unpack(recorded.FILE.read_text(encoding="ascii"))
 
 
-@pytest.mark.slow
 def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
     found, data = recording
     shape = (recorded.SIDE, recorded.SIDE)

@@ -14,12 +14,11 @@ from fuzz.lines import LINES, RUNS, Maker, Try
 from simdtex.commands import COMMANDS as KNOWN
 from simdtex.io import image
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuzzer runs on Linux")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuzzer runs on Linux")]
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_short_run_finds_nothing(kind):
     command = [sys.executable, "-m", "fuzz", "--kinds", kind, "--tries", "25", "--seed", "3", "--workers", "1"]
@@ -59,9 +58,8 @@ def test_valid_files_are_valid(tmp_path):
     assert read > 40
 
 
-@pytest.mark.parametrize(
-    ("code", "said", "faults"),
-    [
+def test_what_a_command_says_wrong():
+    for code, said, faults in [
         (2, "simdtex: the sample is empty; give another\n", []),
         (2, "Usage: simdtex synth\nTry 'simdtex synth --help'\n\nError: Missing option '--size'.\n", []),
         (2, "oh\n", ["sentence"]),
@@ -70,10 +68,8 @@ def test_valid_files_are_valid(tmp_path):
         (0, "RuntimeWarning: overflow\n", ["warning"]),
         (2, "simdtex: .tmpab12cd34 is damaged\n", ["hidden name"]),
         (1, "Traceback (most recent call last):\nKeyError: 1\n", ["traceback"]),
-    ],
-)
-def test_what_a_command_says_wrong(code, said, faults):
-    assert [what for what, _ in worker.said_wrong(Try([*RUNS["synth"], "-q"]), code, said)] == faults
+    ]:
+        assert [what for what, _ in worker.said_wrong(Try([*RUNS["synth"], "-q"]), code, said)] == faults
 
 
 def test_a_fault_is_counted_and_told_once_with_its_command(monkeypatch, capsys):

@@ -18,8 +18,6 @@ from simdtex.jobs.simulation.ensemble import ENSEMBLE, checked
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import DataWarning
 
-# -- What users give beside a sample: the forms that are taken, and a sentence for each that is not.
-
 SHAPE = (6, 7)
 GREY, COLOUR = texture((9, 10)), texture((9, 10), 3)
 FLOAT = texture((9, 10), dtype=np.float64)
@@ -36,55 +34,29 @@ def at(array, place, value):
     return found
 
 
-def check(sample=GREY, shape=SHAPE, **rest):
-    return check_inputs(sample, shape, **rest)
+def check(sample=GREY, **rest):
+    return check_inputs(sample, SHAPE, **rest)
 
 
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"mask": MASK},
-        {"known": SOME},
-        {"guide": (GREY, GREY[:6, :7])},
-        {"sample": [GREY, GREY]},
-        {"sample": at(FLOAT, (2, 3), np.nan)},
-    ],
-    ids=["mask", "known", "guide", "several", "NaN"],
-)
-def test_with_more_it_is_not_plain(more):
-    assert not check(**more).plain
+def test_with_more_it_is_not_plain():
+    more = ({"mask": MASK}, {"known": SOME}, {"guide": (GREY, GREY[:6, :7])}, {"sample": [GREY, GREY]})
+    assert check().plain and not any(check(**one).plain for one in (*more, {"sample": at(FLOAT, (2, 3), np.nan)}))
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2, -1, -2, -3])
-def test_channels_come_last(axis):
-    given = np.moveaxis(COLOUR, -1, axis)
-    known = np.moveaxis(np.repeat(SOME[..., None], 3, -1), -1, axis)
-    found = check(given, channel_axis=axis, known=known)
-    assert_same_bits(found.pictures.pixels[0], COLOUR)
-    assert found.given.values.shape == (*SHAPE, 3)
-    assert np.array_equal(found.given.known, np.repeat(THERE[..., None], 3, -1))
+def test_channels_come_last():
+    for axis in (0, 1, 2, -2):
+        known = np.moveaxis(np.repeat(SOME[..., None], 3, -1), -1, axis)
+        found = check(np.moveaxis(COLOUR, -1, axis), channel_axis=axis, known=known)
+        assert_same_bits(found.pictures.pixels[0], COLOUR)
+        assert np.array_equal(found.given.known, np.repeat(THERE[..., None], 3, -1))
 
 
-ARRAYS = {
-    "a list of samples": ([GREY, GREY[:5]], None, True),
-    "a tuple of samples": ((GREY, GREY[:, :4]), None, True),
-    "a list of one": ([GREY], None, True),
-    "samples in colour": ([COLOUR, COLOUR[:4]], -1, True),
-    "an array": (GREY, None, False),
-    "a stack of them": (np.stack([GREY, GREY]), None, False),
-    "lists of numbers": (GREY.tolist(), None, False),
-    "a list of rows": (list(GREY), None, False),
-    "a list of planes": (list(np.moveaxis(COLOUR, -1, 0)), 0, False),
-    "nothing": ([], None, False),
-    "None": (None, None, False),
-    "arrays and lists": ([GREY, GREY.tolist()], None, False),
-}
-
-
-@pytest.mark.parametrize("case", ARRAYS)
-def test_a_list_of_samples_is_told_from_a_sample_written_as_lists(case):
-    sample, axis, several = ARRAYS[case]
-    assert is_several(sample, axis) is several
+def test_a_list_of_samples_is_told_from_a_sample_written_as_lists():
+    for sample, axis in (([GREY, GREY[:5]], None), ((GREY,), None), ([COLOUR, COLOUR[:4]], -1)):
+        assert is_several(sample, axis)
+    for sample in (GREY, np.stack([GREY, GREY]), GREY.tolist(), list(GREY), [], None, [GREY, GREY.tolist()]):
+        assert not is_several(sample, None)
+    assert not is_several(list(np.moveaxis(COLOUR, -1, 0)), 0)
 
 
 def test_nested_lists_are_one_sample():
@@ -106,6 +78,9 @@ def test_unknown_pixels_are_completed_and_said_to_be_unknown():
     (pixels,), (known,) = found.pixels, found.known
     assert np.isfinite(pixels).all() and known.sum() == 88 and not known[2:4, 3].any()
     assert np.isin(pixels[2:4, 3], FLOAT).all()
+    hidden = np.ma.masked_where(np.arange(90).reshape(9, 10) % 7 == 0, GREY)
+    (expected,), (found,) = (check_samples(one, None).known for one in (hidden, KINDS["dask"](hidden)))
+    assert np.array_equal(found, expected) and not found.all()
 
 
 KNOWN = {
@@ -121,13 +96,14 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("case", KNOWN)
-def test_forms_of_what_is_known(case):
-    known = np.array(KNOWN[case], float) if case == "lists" else KNOWN[case]
-    found = check(known=known).given
-    assert found.values.dtype == np.uint8 and found.place is None
-    assert np.array_equal(found.known[..., 0], THERE)
-    assert_same_bits(found.values[..., 0], np.where(THERE, SOME, 0).astype(np.uint8))
+def test_forms_of_what_is_known():
+    for case, known in KNOWN.items():
+        found = check(known=np.array(known, float) if case == "lists" else known).given
+        assert found.values.dtype == np.uint8 and found.place is None and np.array_equal(found.known[..., 0], THERE)
+        assert_same_bits(found.values[..., 0], np.where(THERE, SOME, 0).astype(np.uint8))
+    for dtype in (np.bool_, np.int8, np.uint16, np.float32):
+        found = check(texture((9, 10), dtype=dtype), known=at(np.full(SHAPE, np.nan), (2, 3), 1)).given
+        assert found.values.dtype == dtype and found.values[2, 3, 0] == 1
 
 
 def test_a_table_of_known_values_or_its_path(tmp_path):
@@ -139,13 +115,6 @@ def test_a_table_of_known_values_or_its_path(tmp_path):
     wells = HardData(np.array([[2.0, 1.0]]), np.array([[1.0, np.nan, 3.0]]), ("a", "b", "c"))
     both = check(COLOUR, channel_axis=-1, known=wells)
     assert both.given.known[1, 2].tolist() == [True, False, True] and both.given.known.sum() == 2
-
-
-@pytest.mark.parametrize("dtype", [np.bool_, np.int8, np.uint16, np.int64, np.float32, np.float64])
-def test_what_is_known_takes_the_samples_type(dtype):
-    known = at(np.full(SHAPE, np.nan), (2, 3), 1)
-    found = check(texture((9, 10), dtype=dtype), known=known).given
-    assert found.values.dtype == dtype and found.values[2, 3, 0] == 1
 
 
 def test_numbers_of_64_bits_are_kept_exactly():
@@ -163,17 +132,13 @@ def test_some_variables_of_a_site_may_be_known():
     assert found.partly
 
 
-@pytest.mark.parametrize("dtype", [np.int8, np.int32, np.uint64, np.int64])
-def test_a_source_map_is_of_whole_numbers(dtype):
-    place = np.zeros((*SHAPE, 2), dtype)
-    place[1, 2] = 8, 9
-    found = check(known=SOME, known_source=place).given.place
-    assert found.dtype == np.int32
-    assert found[1, 2].tolist() == [8, 9] and found[5, 6].tolist() == [0, 0]
-    assert (found[~THERE] == -1).all()
-
-
-def test_a_source_map_of_several_samples():
+def test_a_source_map_is_of_whole_numbers():
+    for dtype in (np.int8, np.uint64):
+        place = np.zeros((*SHAPE, 2), dtype)
+        place[1, 2] = 8, 9
+        found = check(known=SOME, known_source=place).given.place
+        assert found.dtype == np.int32 and (found[~THERE] == -1).all()
+        assert found[1, 2].tolist() == [8, 9] and found[5, 6].tolist() == [0, 0]
     place = np.full((*SHAPE, 3), -1)
     place[1, 2] = 4, 3, 1
     found = check([GREY, GREY[:5, :4]], known=SOME, known_source=place).given.place
@@ -197,13 +162,6 @@ def test_forms_of_guides():
     assert one.shape[-1] == 3
 
 
-def test_the_mask_of_a_dask_array_is_kept():
-    dask = pytest.importorskip("dask.array")
-    hidden = np.ma.masked_where(np.arange(90).reshape(9, 10) % 7 == 0, GREY)
-    (expected,), (found,) = (check_samples(one, None).known for one in (hidden, dask.from_array(hidden, asarray=False)))
-    assert np.array_equal(found, expected) and not found.all()
-
-
 INF = at(SOME, (2, 2), np.inf)
 TWO = {"sample": [GREY, GREY[:5, :4]]}
 THREE = np.full((*SHAPE, 3), -1)
@@ -220,6 +178,7 @@ BAD = {
     "empty": ({"sample": GREY[:0]}, ValueError, "the sample is empty"),
     "infinite": ({"sample": at(FLOAT, (2, 3), -np.inf)}, ValueError, "infinite, the first at row 2, column 3"),
     "NaN": ({"sample": FLOAT * np.nan}, ValueError, "a sample has no known pixel; leave it out"),
+    "grey and colour": ({"sample": [GREY, COLOUR], "channel_axis": -1}, ValueError, "the samples have 2 and 3 axes"),
     "two types": ({"sample": [GREY, FLOAT]}, ValueError,
                   "sample 1 has 1 channel of float64 and sample 0 1 channel of uint8; convert them to one type"),
     # masks
@@ -227,23 +186,19 @@ BAD = {
     "a mask of another size": ({"mask": MASK.T}, ValueError, "mask is 10x9 and the picture 9x10 .*; give one size"),
     "a mask of nothing": ({"mask": MASK & False}, ValueError, "the mask leaves nothing of the sample"),
     "a mask for two": (TWO | {"mask": [MASK]}, ValueError, "2 samples and 1 masks; give one mask for each"),
-    "masks turned round": (TWO | {"mask": [MASK[:5, :4], MASK]}, ValueError, "mask is 5x4 and the picture 9x10"),
     # known values
     "data of another number": ({"known": HardData(np.ones((1, 2)), np.ones((1, 2)), ("a", "b"))}, ValueError,
                                "a datum has 2 values, a, b, and a pixel of the sample 1; .* choose columns"),
     "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* convert it to integers or real floats"),
-    "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
     "known in colour": ({"known": np.dstack([SOME] * 3)}, ValueError, r"known is 3-dimensional; give \(rows, cols\)"),
     "known grey": ({"sample": COLOUR, "channel_axis": -1, "known": SOME}, ValueError,
                    "known is 2-dimensional; give the channel axis too"),
-    "known of another size": ({"known": SOME.T}, ValueError, "known is 7x6x1 and the output 6x7x1"),
     "known of other channels": ({"sample": COLOUR, "channel_axis": -1, "known": np.dstack([SOME] * 2)}, ValueError,
                                 "known is 6x7x2 and the output 6x7x3 .*; give one size"),
     "known infinite": ({"known": INF}, ValueError, "known has infinite values; give numbers, or NaN"),
     "nothing known": ({"known": SOME * np.nan}, ValueError, "known has no value; leave it out"),
     "all known": ({"known": np.ones(SHAPE)}, ValueError, "known leaves nothing to do; give NaN or a masked array"),
     "no fraction": ({"known": at(SOME, (0, 0), 2.5)}, ValueError, "known holds 2.5, which the sample's type uint8"),
-    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give such values"),
     "beyond 32 bits": ({"sample": FLOAT.astype(np.float32), "known": at(SOME, (0, 0), 1e300)}, ValueError,
                        "known holds 1e[+]300, which the sample's type float32"),
     # where known values are from
@@ -257,8 +212,6 @@ BAD = {
     "a third of two": (TWO | {"known": SOME, "known_source": at(THREE, (1, 2), (0, 0, 2))}, ValueError, "points out"),
     # guides
     "no pair": ({"guide": GREY}, TypeError, "guide is no pair; give .guide of the sample, guide of the output"),
-    "guides in words": ({"guide": (GREY.astype(str), GREY)}, TypeError, "the guide of the sample holds"),
-    "ragged guides": ({"guide": ([[1, 2], [3]], GREY)}, ValueError, "the guide of the sample is ragged"),
     "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output has the shape .0, 10."),
     "an infinite guide": ({"guide": (FLOAT + np.inf, SOME)}, ValueError, "guide of the sample has infinite values"),
     "a guide with NaN": ({"guide": (at(FLOAT, (1, 1), np.nan), SOME)}, ValueError, "guide of the sample has NaN; give"),
@@ -270,12 +223,11 @@ BAD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_refused_with_a_remedy(case):
-    change, error, words = BAD[case]
-    with pytest.raises(error, match=words) as caught:
-        check(**change)
-    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300
+def test_bad_input_is_refused_with_a_remedy():
+    for change, error, words in BAD.values():
+        with pytest.raises(error, match=words) as said:
+            check(**change)
+        assert "\n" not in str(said.value) and len(str(said.value)) < 300
 
 
 def test_a_code_within_the_values_of_the_sample_is_a_datum(tmp_path):
@@ -313,7 +265,6 @@ PLACES = np.zeros((4, 4, 2), np.int32)
 ON = {"device": "reference", "rng": 1}
 REFUSED = {
     "solid": lambda _: simdtex.synthesize_solid(masked(PLAIN), (4, 4, 4), **ON),
-    "solid start": lambda _: simdtex.synthesize_solid(PLAIN, (4, 4, 4), start=masked(np.ones((4, 4, 4))), **ON),
     "multires": lambda _: simdtex.synthesize(masked(PLAIN), (9, 9), method="multires", **ON),
     "pyramid": lambda _: simdtex.synthesize(masked(PLAIN), (9, 9), method="pyramid", **ON),
     "start": lambda _: simdtex.synthesize(PLAIN, (9, 9), method="pyramid", start=masked(np.ones((9, 9))), **ON),
@@ -327,10 +278,7 @@ REFUSED = {
     ),
     "mask": lambda _: simdtex.synthesize(PLAIN, (9, 9), mask=masked(PLAIN > 0), **ON),
     "guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(masked(PLAIN), PLAIN), **ON),
-    "output's guide": lambda _: simdtex.synthesize(PLAIN, (20, 20), guide=(PLAIN, masked(PLAIN)), **ON),
     "quality": lambda _: simdtex.quality.coverage(masked(PLAIN), PLAIN),
-    "output": lambda _: simdtex.quality.seam(masked(PLAIN)),
-    "image of an ensemble": lambda _: checked(masked(PLAIN)),
     "ensemble": lambda _: checked(masked(np.ones((2, 3, 3))), "ensemble", ENSEMBLE),
     "map": lambda _: apply_source_map(PLACES, masked(PLAIN)),
     "source map": lambda folder: save_source_map(folder / "a.npz", masked(PLACES)),
@@ -340,11 +288,11 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_mask_that_would_be_lost_is_refused(tmp_path, case):
-    with pytest.raises(ValueError, match=r"masked|known everywhere") as said:
-        REFUSED[case](tmp_path)
-    assert any(remedy in str(said.value) for remedy in ("fill them first", 'method="mrf"'))
+def test_a_mask_that_would_be_lost_is_refused(tmp_path):
+    for case, call in REFUSED.items():
+        with pytest.raises(ValueError, match=r"masked|known everywhere") as said:
+            call(tmp_path)
+        assert any(remedy in str(said.value) for remedy in ("fill them first", 'method="mrf"')), case
     assert list(tmp_path.iterdir()) == []
 
 
@@ -354,11 +302,7 @@ def test_masked_arrays_without_a_masked_value_are_arrays(tmp_path):
     assert np.array_equal(image.read(tmp_path / "a.png").pixels, PLAIN)
     made = [simdtex.synthesize(one, (9, 9), method="multires", **ON) for one in (PLAIN, whole)]
     assert np.array_equal(*made)
-
-
-def test_where_a_mask_means_unknown_it_is_taken():
-    simdtex.synthesize(masked(PLAIN), (9, 9), order=1, **ON)
-    simdtex.fill(masked(PLAIN), order=1, **ON)
+    simdtex.fill(masked(PLAIN), order=1, **ON)  # where a mask means unknown it is taken
 
 
 # -- What goes into public functions and what comes out: arrays of other libraries, and generators.
@@ -371,12 +315,25 @@ HOLE[4:6, 4:7] = True
 OPTIONS = {"order": 1, "device": "reference", "rng": 1}
 
 
-class Tensor:
-    """A tensor as torch has it: its own type, ``ndim``, ``__array__`` and ``__dlpack__``."""
+class Exchanged:
+    """An array that can be exchanged by ``__dlpack__`` alone."""
 
     def __init__(self, values):
-        self.values = values
-        self.ndim, self.shape, self.dtype = values.ndim, values.shape, f"torch.{values.dtype}"
+        self.values, self.ndim = values, values.ndim
+
+    def __dlpack__(self, **how):
+        return self.values.__dlpack__(**how)
+
+    def __dlpack_device__(self):
+        return self.values.__dlpack_device__()
+
+
+class Tensor(Exchanged):
+    """A tensor as torch has it: its own type, ``ndim``, ``__array__`` and ``__dlpack__``; it may refuse to be read."""
+
+    def __init__(self, values, error=None):
+        super().__init__(values)
+        self.shape, self.dtype, self.error = values.shape, f"torch.{values.dtype}", error
 
     def __len__(self):
         return len(self.values)
@@ -385,48 +342,19 @@ class Tensor:
         return type(self)(self.values[index])
 
     def __array__(self, dtype=None, copy=None):
+        if self.error:
+            raise self.error
         return self.values if dtype is None else self.values.astype(dtype)
 
-    def __dlpack__(self, **given):
-        return self.values.__dlpack__(**given)
 
-    def __dlpack_device__(self):
-        return self.values.__dlpack_device__()
-
-
-class Exchanged:
-    """An array that can be exchanged by ``__dlpack__`` alone."""
-
-    def __init__(self, values):
-        self.values, self.ndim = values, values.ndim
-
-    def __dlpack__(self, **given):
-        return self.values.__dlpack__(**given)
-
-    def __dlpack_device__(self):
-        return self.values.__dlpack_device__()
-
-
-class OnGpu(Tensor):
-    """A tensor that refuses as torch's of a GPU do."""
-
-    def __array__(self, dtype=None, copy=None):
-        raise TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu() first.")
-
-
-class Tracked(Tensor):
-    """A tensor that refuses as torch's do that have a gradient."""
-
-    def __array__(self, dtype=None, copy=None):
-        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
-
-
+ON_GPU = TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu() first.")
+TRACKED = RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
 KINDS = {
     "tensor": Tensor,
     "dlpack": Exchanged,
     "Pillow": PIL.Image.fromarray,
     "xarray": xarray.DataArray,
-    "dask": lambda values: dask.array.from_array(values, chunks=5),
+    "dask": lambda values: dask.array.from_array(values, chunks=5, asarray=False),
     "pandas": pandas.DataFrame,
     "memoryview": memoryview,
     "Fortran order": np.asfortranarray,
@@ -434,7 +362,6 @@ KINDS = {
 
 JOBS = {
     "synthesize": lambda of: simdtex.synthesize(of(PHOTO), (6, 7), **OPTIONS),
-    "several": lambda of: simdtex.synthesize([of(PHOTO), of(PHOTO[:9])], (6, 7), **OPTIONS),
     "mask": lambda of: simdtex.synthesize(PHOTO, (6, 7), mask=of(~HOLE), **OPTIONS),
     "guide": lambda of: simdtex.synthesize(PHOTO, (12, 14), guide=(of(PHOTO), of(PHOTO)), labels=False, **OPTIONS),
     "fill": lambda of: simdtex.fill(of(PHOTO), of(HOLE), **OPTIONS),
@@ -446,91 +373,67 @@ JOBS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("kind", "job"), [(kind, job) for kind in KINDS for job in JOBS if job == "several" or kind in ("tensor", "xarray")]
-)
-def test_arrays_of_other_libraries_are_taken_and_numpy_comes_out(kind, job):
-    made = JOBS[job](KINDS[kind])
-    assert type(made) is np.ndarray
-    assert_same_bits(made, JOBS[job](np.asarray))
-
-
-@pytest.mark.parametrize("kind", [Tensor, Exchanged, PIL.Image.fromarray, xarray.DataArray, KINDS["dask"]])
-def test_colours_are_taken(kind):
-    given = OPTIONS | {"channel_axis": -1}
-    assert_same_bits(simdtex.synthesize(kind(RGB), (6, 7), **given), simdtex.synthesize(RGB, (6, 7), **given))
-    several = simdtex.synthesize([kind(RGB), kind(RGB[:9])], (6, 7), **given)
-    assert_same_bits(several, simdtex.synthesize([RGB, RGB[:9]], (6, 7), **given))
-
-
-def test_known_values_with_nan_are_taken():
+def test_arrays_of_other_libraries_are_taken_and_numpy_comes_out():
+    for job in JOBS.values():
+        made = job(Tensor)
+        assert type(made) is np.ndarray
+        assert_same_bits(made, job(np.asarray))
     known = np.where(np.pad(HOLE[:6, :7], 0), 9.0, np.nan)
-    made = simdtex.synthesize(PHOTO.astype(float), (6, 7), known=known, **OPTIONS)
-    for of in (Tensor, xarray.DataArray, KINDS["dask"], pandas.DataFrame):
-        assert_same_bits(simdtex.synthesize(PHOTO.astype(float), (6, 7), known=of(known), **OPTIONS), made)
+    for kind, of in KINDS.items():
+        found = check([of(PHOTO), of(PHOTO[:9])]).pictures.pixels
+        assert_same_bits([pixels[..., 0] for pixels in found], [PHOTO, PHOTO[:9]])
+        if kind not in ("pandas", "memoryview", "Fortran order"):
+            assert_same_bits(check([of(RGB), of(RGB[:9])], channel_axis=-1).pictures.pixels, [RGB, RGB[:9]])
+        if kind in ("tensor", "xarray", "dask", "pandas"):
+            assert_same_bits(check(PHOTO, known=of(known)).given.values, check(PHOTO, known=known).given.values)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (OnGpu(PHOTO), r"the sample is no array that NumPy can take: can.t convert cuda:0 .*Use Tensor\.cpu\(\)"),
-        (Tracked(PHOTO), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
-        (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
+def test_what_is_no_array_is_refused_in_one_sentence():
+    palette = PIL.Image.fromarray(RGB).quantize(4)
+    for what, words in (
+        (Tensor(PHOTO, ON_GPU), r"the sample is no array that NumPy can take: can.t convert .*Use Tensor\.cpu\(\)"),
+        (Tensor(PHOTO, TRACKED), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
+        (palette, r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
         (pandas.DataFrame(PHOTO).astype("Int64"), "holds object values; convert it"),
         (xarray.DataArray(PHOTO).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
-    ],
-    ids=["GPU", "gradient", "palette", "nullable", "dataset"],
-)
-def test_what_is_no_array_is_refused_in_one_sentence(given, words):
-    with pytest.raises((TypeError, ValueError), match=words) as said:
-        simdtex.synthesize(given, (6, 7), **OPTIONS)
-    assert "\n" not in str(said.value)
+    ):
+        with pytest.raises((TypeError, ValueError), match=words) as said:
+            check(what)
+        assert "\n" not in str(said.value)
 
 
 READERS = {
-    "synthesize": lambda one: simdtex.synthesize(one, (6, 7), **OPTIONS),
-    "several": lambda one: simdtex.synthesize([one, one], (6, 7), **OPTIONS),
-    "mask": lambda one: simdtex.synthesize(PHOTO, (6, 7), mask=one, **OPTIONS),
-    "guide": lambda one: simdtex.synthesize(PHOTO, (6, 7), guide=(PHOTO, one), **OPTIONS),
-    "tiles": lambda one: simdtex.synthesize(one, (6, 7), store=simdtex.TileStore("no.zarr"), **OPTIONS),
-    "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
-    "fill": lambda one: simdtex.fill(one, HOLE, **OPTIONS),
+    "samples": lambda one: check([one, one]),
+    "mask": lambda one: check(mask=one),
+    "guide": lambda one: check(guide=(GREY, one)),
     "hole": lambda one: simdtex.fill(PHOTO, one, **OPTIONS),
-    "extend": lambda one: simdtex.extend(one, right=3, **OPTIONS),
-    "simulate": lambda one: simdtex.simulate(one, 1, **OPTIONS),
-    "estimate": lambda one: simdtex.estimate(one, known=np.ma.masked_array(PHOTO, HOLE), device="reference"),
     "classify": lambda one: simdtex.classify(one, {"a": PHOTO, "b": PHOTO}, **OPTIONS),
     "class": lambda one: simdtex.classify(PHOTO, {"a": one, "b": PHOTO}, **OPTIONS),
+    "solid": lambda one: simdtex.synthesize_solid(one, (4, 4, 4), device="reference"),
     "mix": lambda one: simdtex.mix([one, PHOTO], (32, 32), device="reference"),
     "live": simdtex.Live,
     "source map": lambda one: apply_source_map(np.zeros((2, 2, 2), int), one),
 }
 
 
-@pytest.mark.parametrize("name", READERS)
-def test_a_path_is_to_be_read_first(name):
+def test_a_path_is_to_be_read_first():
     words = r" is the path a\.png: read it first, by simdtex\.io\.image\.read\(path\)\.pix"
-    for path in ("a.png", Path("a.png")):
+    for read in READERS.values():
         with pytest.raises(TypeError, match=words):
-            READERS[name](path)
+            read("a.png")
+    with pytest.raises(TypeError, match=words):
+        check(Path("a.png"))
 
 
-def test_a_generator_gives_the_seed():
-    given = OPTIONS | {"full_output": True}
-    seeds = []
-    for _ in range(2):
-        rng = np.random.default_rng(7)
-        runs = [simdtex.synthesize(PHOTO, (6, 7), **(given | {"rng": rng})) for _ in range(2)]
-        seeds.append([output.statistics["seed"] for _, output in runs])
-        again = simdtex.synthesize(PHOTO, (6, 7), **(OPTIONS | {"rng": seeds[-1][0]}))
-        assert_same_bits(again, runs[0][0])
-    assert seeds[0] == seeds[1] and seeds[0][0] != seeds[0][1], "each call draws one"
-
-
-@pytest.mark.parametrize("rng", [np.random.RandomState(1), np.random.SeedSequence(1), "1", True, 1.0], ids=str)
-def test_what_is_no_seed_is_refused(rng):
-    with pytest.raises(TypeError, match=r"rng must be None, an integer or a numpy\.random\.Generator, not "):
-        simdtex.synthesize(PHOTO, (6, 7), order=1, device="reference", rng=rng)
+def test_a_generator_gives_the_seed_and_what_is_no_seed_is_refused():
+    rng = np.random.default_rng(7)
+    runs = [simdtex.synthesize(PHOTO, (6, 7), **(OPTIONS | {"full_output": True, "rng": rng})) for _ in range(2)]
+    seeds = [output.statistics["seed"] for _, output in runs]
+    assert seeds[0] != seeds[1], "each call draws one"
+    assert_same_bits(simdtex.synthesize(PHOTO, (6, 7), **(OPTIONS | {"rng": seeds[1]})), runs[1][0])
+    for rng in (np.random.RandomState(1), np.random.SeedSequence(1), "1", True, 1.0):
+        with pytest.raises(TypeError, match=r"rng must be None, an integer or a numpy\.random\.Generator, not "):
+            simdtex.synthesize(PHOTO, (6, 7), **(OPTIONS | {"rng": rng}))
 
 
 def test_what_is_given_is_not_changed():

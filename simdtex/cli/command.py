@@ -50,11 +50,7 @@ OPTION_WORDS = {
 
 
 class Command(click.Command):
-    """Command with ``examples`` of its use, and the names of its ``usual`` options.
-
-    The usual options are all that ``--help`` lists; ``--help-all`` lists all options, in groups by purpose. Without
-    usual options ``--help`` lists all.
-    """
+    """Command with ``examples``, and the names of its ``usual`` options, which ``--help`` lists; others, --help-all."""
 
     def __init__(self, *args: Any, examples: Examples = (), usual: str = "", **given: Any) -> None:
         super().__init__(*args, **given)
@@ -215,10 +211,7 @@ def give_up(context: click.Context, number: int, before: dict[Path, Any]) -> NoR
 
 @contextmanager
 def catch_signals(context: click.Context) -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP stop a run after its present step if it has a checkpoint, else raise `Ended`.
-
-    A second signal stops it at once. The checkpoint is the context's `obj`.
-    """
+    """Let a signal stop a run after its step if the context's `obj` is its checkpoint; else, twice, raise `Ended`."""
     caught: list[int] = []
     raised = 0.0
 
@@ -251,12 +244,10 @@ def catch_signals(context: click.Context) -> Iterator[None]:
 
 
 def postponed(frame: FrameType | None, number: int = signal.SIGINT) -> bool:
-    """Return whether an exception would do harm in a frame, and if so have the signal come again a little later.
-
-    An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
-    but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
-    traceback when it is collected.
-    """
+    """Return whether an exception would do harm in a frame, and if so have the signal come again a little later."""
+    # An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
+    # but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
+    # traceback when it is collected.
     while frame:
         name, path = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
         if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
@@ -325,12 +316,8 @@ def _sentence(error: Exception) -> str:
 # The files of a command
 
 
-class Place(click.Path):
-    """A path with its role.
-
-    ``"read"`` a file, ``"enter"`` a file or a folder that is read, ``"write"`` a file, make a ``"folder"``, or write
-    ``"either"`` of these two.
-    """
+class PathType(click.Path):
+    """A path with its role: a file to ``"read"`` or ``"write"``, a ``"folder"``, ``"either"``, or to ``"enter"``."""
 
     def __init__(self, role: str) -> None:
         super().__init__(path_type=Path)
@@ -372,7 +359,7 @@ def files(text: str) -> list[Path]:
     return [Path(text)] if os.path.exists(text) else [Path(part.strip()) for part in text.split(",")]
 
 
-READ, ENTER, WRITE, FOLDER, EITHER = (Place(role) for role in ("read", "enter", "write", "folder", "either"))
+READ, ENTER, WRITE, FOLDER, EITHER = (PathType(role) for role in ("read", "enter", "write", "folder", "either"))
 READING = ("read", "enter")
 READ_PAIR, WRITE_PAIR, READ_NAMED = Pair("read"), Pair("write"), Pair("read", named=True)
 
@@ -432,7 +419,7 @@ def _named(context: click.Context) -> Iterator[Named]:
         for one in (value or ()) if several else [value]:
             if one is None:
                 continue
-            if isinstance(kind, Place):
+            if isinstance(kind, PathType):
                 yield Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
                 left, right = one

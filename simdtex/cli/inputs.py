@@ -26,23 +26,16 @@ SHEET = 4096
 
 
 class Reading(NamedTuple):
-    """How files are read.
+    """How files are read."""
 
-    ``deep``: as cells in ascending order of y, rasters too, and a file of several layers as a volume; ``palette``:
-    colours of a palette as their indices, which are categories; ``channels``: the last axis of an array of three axes
-    as channels; ``ascending``: the order of rows, as in `simdtex.io.image.read`; ``variables``: the names of those
-    of a grid to take; ``missing``: further numbers that mean an unknown value; ``valid``: the range of possible
-    values; ``columns`` and ``categories`` of tables, as in `simdtex.read_hard_data`.
-    """
-
-    deep: bool = False
-    palette: bool = False
-    channels: bool = False
-    ascending: bool | None = None
-    variables: tuple[str, ...] = ()
-    missing: tuple[float, ...] = ()
-    valid: tuple[float, float] | None = None
-    columns: dict[str, list[str]] | None = None
+    deep: bool = False  # as cells in ascending order of y, rasters too, and a file of several layers as a volume
+    palette: bool = False  # colours of a palette as their indices, which are categories
+    channels: bool = False  # the last axis of an array of three axes as channels
+    ascending: bool | None = None  # the order of rows, as in `simdtex.io.image.read`
+    variables: tuple[str, ...] = ()  # the names of those of a grid to take
+    missing: tuple[float, ...] = ()  # further numbers that mean an unknown value
+    valid: tuple[float, float] | None = None  # the range of possible values
+    columns: dict[str, list[str]] | None = None  # of tables, as in `simdtex.read_hard_data`
     categories: dict[str, float] | None = None
 
 
@@ -51,22 +44,18 @@ PLAIN = Reading()
 
 
 class Material(NamedTuple):
-    """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
-
-    ``grid`` is the first if it is a grid; ``deep`` whether they are volumes; ``metadata`` what the file of the first
-    says of its pixels.
-    """
+    """Pictures of one type, which all have the axes of the first."""
 
     paths: tuple[Path, ...]
     pixels: list[NDArray[Any]]
     channel_axis: int | None
-    grid: CartesianGrid | None = None
-    deep: bool = False
-    metadata: Metadata | None = None
+    grid: CartesianGrid | None = None  # the first, if it is one
+    deep: bool = False  # whether they are volumes
+    metadata: Metadata | None = None  # what the file of the first says of its pixels
 
     @property
     def ascending(self) -> bool | None:
-        """How files beside these are read, see `Reading`: an ``.npy`` beside a grid begins with the smallest y."""
+        """How files beside these are read: an ``.npy`` beside a grid begins with the smallest y."""
         return False if self.metadata and self.metadata.ascending else None
 
     @property
@@ -145,17 +134,6 @@ def without_alpha(one: Read, count: int) -> np.ma.MaskedArray[Any, Any]:
     return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
 
 
-def note_lossy(path: Path, pixels: NDArray[Any], metadata: Metadata | None = None) -> None:
-    """Say so if the format of an output changes pixels that are to stay as they are, or loses the georeference."""
-    from simdtex.io.image import LOSSY, suitable_suffix
-
-    if path.suffix.lower() in LOSSY:
-        suffix = suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
-        note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
-    if metadata and metadata.geo and path.suffix.lower() not in (".tif", ".tiff"):
-        note(f"{path} holds no georeference; end its name in .tif to keep it")
-
-
 def read_picture(path: Path, how: Reading = PLAIN) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
@@ -190,10 +168,7 @@ class Read(NamedTuple):
 
 
 def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
-    """Read a picture (rows, cols[, channels]), or a grid as one, whose variables are channels.
-
-    With ``how.deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
-    """
+    """Read a picture (rows, cols[, channels]), or a grid or a volume ([layers,] rows, cols, variables)."""
     from simdtex.io import grids
     from simdtex.io.image import Metadata
 
@@ -240,14 +215,22 @@ def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
         raise ValueError(f"{option} names {counts}; give one for each sample")
 
 
-def check_output(path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False) -> None:
-    """Raise unless a picture can be written like ``pixels``, which are labels if there are few of them."""
+def check_output(
+    path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False, kept: bool = False
+) -> None:
+    """Raise unless a picture can be written like ``pixels``; say so if its format loses what is to be ``kept``."""
     from simdtex.io import image
     from simdtex.model.pictures import few
 
-    lossy = path.suffix.lower() in image.LOSSY
+    suffix = path.suffix.lower()
+    lossy = suffix in image.LOSSY
     labels = lossy and bool(categorical or few([planes(np.ma.getdata(pixels))]))
     image.check_writable(path, pixels.dtype, channels(pixels), metadata=metadata, labels=labels)
+    if kept and lossy:
+        better = image.suitable_suffix(pixels.dtype, channels(pixels), plain=bool(metadata and metadata.plain))
+        note(f"{path}: JPEG changes all pixels a little; end its name in {better} to keep the known pixels exactly")
+    if kept and metadata and metadata.geo and suffix not in (".tif", ".tiff"):
+        note(f"{path} holds no georeference; end its name in .tif to keep it")
 
 
 def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
@@ -268,16 +251,12 @@ def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, fi
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
-    """Return the sides of ``--size``, rows and columns or, with 3 ``axes``, layers, rows and columns.
-
-    By default those of the first picture of `like`, or twice the sample's.
-    """
+    """Return the ([layers,] rows, columns) of ``--size``; by default of the first of `like`, or twice the sample's."""
     from simdtex.io.image import parse_sides
 
     if size is not None:
-        return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT", pixels.shape[axes - 1 :: -1])[
-            ::-1
-        ]
+        form = "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT"
+        return parse_sides(size, form, pixels.shape[axes - 1 :: -1])[::-1]
     doubled = tuple(2 * side for side in pixels.shape[:axes])
     return next((picture.shape[:axes] for picture in like if hasattr(picture, "shape")), doubled)  # a table has none
 
@@ -306,10 +285,7 @@ def read_masks(paths: Sequence[Path], samples: Material, how: Reading = PLAIN) -
 
 
 def in_place(pixels: NDArray[Any], grid: CartesianGrid) -> Any:
-    """Return values of a grid, ([layers,] rows, cols, variables), as an array of xarray with its coordinates.
-
-    A single variable has no axis.
-    """
+    """Return values of a grid, ([layers,] rows, cols, variables), as an array of xarray with its coordinates."""
     import xarray
 
     dims, several = [*"zyx"[4 - pixels.ndim :]], pixels.shape[-1] > 1
@@ -331,10 +307,7 @@ def read_table(
     like: Path | None = None,
     valid: tuple[float, float] | None = None,
 ) -> HardData | None:
-    """Read a table of data, and say of a picture where y = 0 is: at the ``origin``, or as in the grid ``like``.
-
-    None if a file is no table, by its content if that is a grid or a point set, else by its name.
-    """
+    """Read a table of data, and say where y = 0 is; None if a file is no table, by its content, else by its name."""
     from simdtex.io import grids
     from simdtex.io.hard_data import SUFFIXES, read_hard_data
 
@@ -357,12 +330,7 @@ def read_known(
     origin: Sequence[float] | None = None,
     like: Path | None = None,
 ) -> tuple[Any, Any]:
-    """Read the known values of an output, and the georeference of a raster or a grid; None for what there is not.
-
-    They are a table, recognised by its name, a point set, a grid, a picture or, of a volume, a volume. A picture is
-    unknown where it is transparent, if it has alpha and the samples have none. If values are ``categorical`` and the
-    samples have one channel, a palette is categories.
-    """
+    """Read the known values of an output, and the georeference of a raster or a grid; None for what there is not."""
     if path is None:
         return None, None
     variables = tuple((how.columns or {}).get("value", ()))
@@ -406,11 +374,10 @@ def _check_flat(samples: Material) -> None:
 def read_guides(
     pair: tuple[list[Path], Path] | None, samples: Material, how: Reading = PLAIN, labels: bool | None = None
 ) -> tuple[Any, bool | None]:
-    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and ``labels``: whether it is of labels; None without a pair.
+    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and whether it is of labels; None without a pair.
 
-    Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them, in
-    palettes up to 64; they become whole numbers. Where the guide of the output is transparent or NaN, the output is
-    free: it has NaN there.
+    Colours of 8 bits are labels, which become whole numbers, if ``labels`` says so or the samples' guides have few.
+    Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
     """
     from simdtex.io.image import coloured
     from simdtex.methods.mrf.plan import LABELS
@@ -522,9 +489,7 @@ def arranged(
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture or all maps of a folder, ``--also``, ``--source-map`` and ``--preview``.
 
-    These options are taken out. Raises ValueError if one cannot be written. ``kept``: whether pixels of a file are to
-    stay as they are, and its ``metadata`` holds for the output; a format that loses them is noted. ``foreign``: why
-    pixels are not from the sample, so that other maps have none for them.
+    ``kept``: whether pixels of a file are to stay as they are. ``foreign``: why pixels are not from the sample.
     """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
@@ -539,17 +504,20 @@ def arranged(
         output.read(samples)
         writers: list[Callable[[Any, Any], object]] = [partial(output.write, metadata)]
     else:
-        check_output(output, pixels, metadata, options.get("categorical"))
-        if kept:
-            note_lossy(output, pixels, metadata)
+        check_output(output, pixels, metadata, options.get("categorical"), kept)
         writers = [lambda made, run: image.write(output, made, metadata)]
     writers += [partial(one.write, metadata) for one in others]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     if options.pop("preview", False):
+        from simdtex.figures.sheet import fitted, rgb
+
+        def write_copies(made: NDArray[Any], _: Any) -> None:
+            picture = rgb(image.coloured(made, (metadata and metadata.palette) or None))
+            image.write(path, fitted(np.tile(picture, (3, 3, 1)), SHEET))
+
         path = preview_of(output.output if isinstance(output, Folder) else output)
-        palette = metadata and metadata.palette
-        writers.append(lambda made, run: _write_copies(path, image.coloured(made, palette or None)))
+        writers.append(write_copies)
     return writers
 
 
@@ -565,22 +533,10 @@ def check_source_map(path: Path, samples: Material, everywhere: bool) -> None:
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
-def _write_copies(path: Path, made: NDArray[Any]) -> None:
-    """Write 3x3 copies of a picture, edge to edge, of at most `SHEET` pixels a side."""
-    from simdtex.figures.sheet import fitted, rgb
-    from simdtex.io import image
-
-    image.write(path, fitted(np.tile(rgb(made), (3, 3, 1)), SHEET))
-
-
 def read_lead(
     pictures: Sequence[Path], output: Path, options: dict[str, Any], how: Reading
 ) -> tuple[Folder | Path, Material]:
-    """Return the output, and the pictures that decide its arrangement.
-
-    The output is of a folder of maps, if this is the only one of `pictures`, or a map in it is and `output` is a
-    folder. The roles of ``--map`` are taken out of the options.
-    """
+    """Return the output, of a folder of maps if a picture is one or in one, and the pictures that arrange it."""
     from simdtex.model.source_map import READABLE, ROLES, find_maps
 
     picture = pictures[0] if len(pictures) == 1 else Path("-")

@@ -39,22 +39,15 @@ EVERY = 2.0
 
 
 class Task(NamedTuple):
-    """What a command does once its input is read and checked.
+    """What a command does once its input is read and checked."""
 
-    ``make`` is a public function with its own arguments, which returns what it made and a `simdtex.run.Output`.
-    ``summary`` says what is made of what, and ``names`` are the files that are written, in words. ``outputs`` are
-    functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the same.
-    ``limits`` are black and white in the pictures of stages, ``more(made, output)`` prints further lines after the
-    summary, and ``report(folder, made, output)`` writes the page of ``--report``.
-    """
-
-    make: Callable[..., Any]
-    summary: str
-    names: str
-    outputs: list[Callable[[Any, Any], object]]
-    limits: tuple[float, float] = (0.0, 1.0)
-    more: Callable[[Any, Any], None] | None = None
-    report: Callable[[Path, Any, Any], object] | None = None
+    make: Callable[..., Any]  # a public function with its own arguments; returns what it made and a `simdtex.Output`
+    summary: str  # what is made of what
+    names: str  # the files that are written, in words
+    outputs: list[Callable[[Any, Any], object]]  # each writes one file or folder; if one fails, the others are written
+    limits: tuple[float, float] = (0.0, 1.0)  # black and white in the pictures of stages
+    more: Callable[[Any, Any], None] | None = None  # prints further lines after the summary
+    report: Callable[[Path, Any, Any], object] | None = None  # writes the page of --report into a folder
 
 
 def job(
@@ -62,10 +55,7 @@ def job(
 ) -> Callable[[Callable[..., Task | None]], click.Command]:
     """Return a decorator that makes a command of a function that plans it: from the command's options to its `Task`.
 
-    The command has the options of its ``methods``, classes of options, with the defaults of the job ``of``, by default
-    that of its name; ``--seed`` and ``--checkpoint`` if it is ``seeded``; and ``--dry-run``, ``--device`` and
-    ``--quiet``, beside those of the function, of which ``--stages``, ``--report`` and ``--profile`` are followed here.
-    ``usual`` are the names of the options that ``--help`` lists.
+    Its options are those of the function, of its ``methods``, with the defaults of the job ``of``, and shared ones.
     """
 
     def decorate(plan: Callable[..., Task | None]) -> click.Command:
@@ -154,12 +144,9 @@ class Forecast:
         self.smooth, self.all = [0.0, 0.0], [0.0, 0.0]  # seconds, and the share that was done in them
 
     def seconds(self, fraction: float) -> float | None:
-        """Return the expected seconds from the beginning to the end; None before `OBSERVED` seconds.
-
-        The time before the first callback, and between two that are far apart, is that of compiling kernels.
-        """
+        """Return the expected seconds from the beginning to the end; None before `OBSERVED` seconds."""
         now = time.perf_counter() - self.began
-        if self.last is not None:
+        if self.last is not None:  # before the first callback, and between distant ones, kernels are compiled
             took, done = now - self.last[0], fraction - self.last[1]
             for sums in (self.all, self.smooth) if took <= SMOOTH else (self.all,):
                 sums[0], sums[1] = sums[0] + took, sums[1] + done
@@ -251,10 +238,7 @@ def notes(output: Any) -> None:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Show a progress bar on a terminal; elsewhere print a line every two seconds, for each per cent at most.
-
-    Yields the callback that shows a progress. Once, it says how long a long run is expected to last.
-    """
+    """Yield the callback that moves a progress bar on a terminal, or prints lines, and says how long a run may last."""
     if quiet:
         yield lambda progress: None
         return

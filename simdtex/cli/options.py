@@ -26,18 +26,13 @@ from simdtex.cli.command import (
     WRITE_PAIR,
 )
 from simdtex.model import light
-from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Other, Whole, has_presets, is_flag, table
-from simdtex.options import Option as Declared
+from simdtex.options import PRESET, UNSET, Choice, Number, Numbers, Option, Other, Whole, has_presets, is_flag, table
 
 Command = Callable[..., Any]
 
 
-class Option(click.Option):
-    """An option in a ``group`` of the help.
-
-    The shell completes ``words``, which are the metavar if they are few. ``methods`` are the helps of those methods, of
-    several, that have the option; of one of them, ``method``.
-    """
+class CommandOption(click.Option):
+    """An option in a ``group`` of the help, whose ``words`` the shell completes, with a help for each method."""
 
     def __init__(
         self,
@@ -92,7 +87,7 @@ CATEGORIES = Parsed(lambda text: {name: float(value) for name, value in pairs(te
 DIRECTIONS = {"both": True, "x": "x", "y": "y"}
 DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
 
-option = functools.partial(click.option, cls=Option)
+option = functools.partial(click.option, cls=CommandOption)
 
 
 def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -109,7 +104,7 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
 def job_options(job: str, *methods: Any) -> Callable[[Command], Command]:
     """Return a decorator that adds to a command all options that it shows of its methods, classes of options."""
     tables = {method.__module__.split(".")[2]: table(method) for method in methods}
-    found: dict[str, dict[str, Declared]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
+    found: dict[str, dict[str, Option]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
     for method, options in tables.items():
         for name, one in options.items():
             if job in one.shown:
@@ -124,7 +119,7 @@ def paper_options(method: Any, *names: str) -> Callable[[Command], Command]:
     return together(*(_option("", name, {"": replace(declared[name], default=paper[name])}) for name in names))
 
 
-def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[Command], Command]:
+def _option(job: str, name: str, methods: Mapping[str, Option]) -> Callable[[Command], Command]:
     """Return the command line's option of a name; `methods` are its declarations, by method if there are several."""
     first = next(iter(methods.values()))
     kind, flag = first.kind, f"--{name.replace('_', '-')}"
@@ -140,7 +135,7 @@ def _option(job: str, name: str, methods: Mapping[str, Declared]) -> Callable[[C
     return option(*flags, type=type_, words=words, **how)
 
 
-def _help(job: str, one: Declared) -> str:
+def _help(job: str, one: Option) -> str:
     """Return the help of an option, with its default in the job."""
     default = one.default_of(job)
     if default is None:
@@ -200,62 +195,51 @@ PREVIEW = option(
     help="Write 3x3 copies of the output, edge to edge, beside it: OUT-3x3.png.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress and no summary.")
-SAMPLE_MASK = option(
+data_option = functools.partial(option, group=DATA, method="mrf")
+SAMPLE_MASK = data_option(
     "--sample-mask",
     multiple=True,
     type=READ,
     metavar="FILE",
-    group=DATA,
-    method="mrf",
     help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
 )
 KNOWN_OPTIONS = together(
-    option(
+    data_option(
         "--known",
         type=READ,
         metavar="FILE",
-        group=DATA,
-        method="mrf",
         help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
         "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
     ),
-    option(
+    data_option(
         "--columns",
         type=COLUMNS,
         metavar="x=NAME,...",
-        group=DATA,
-        method="mrf",
         help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
         "number; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others are "
         "values]",
     ),
-    option(
+    data_option(
         "--categories",
         type=CATEGORIES,
         metavar="NAME=NUMBER,...",
-        group=DATA,
-        method="mrf",
         help="Take these numbers for the texts in the table of --known, as sand=1,shale=0.",
     ),
-    option(
+    data_option(
         "--missing",
         multiple=True,
         type=float,
         metavar="VALUE",
-        group=DATA,
-        method="mrf",
         help="Take this number in tables and grids as unknown, too; may be repeated.  [codes such as -999, outside of "
         "the values of the sample]",
     ),
 )
 """Known values of the output, and how their file is read, see `simdtex.cli.inputs.take_reading`."""
 
-GUIDE = option(
+GUIDE = data_option(
     "--guide",
     type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    group=DATA,
-    method="mrf",
     help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of labels or "
     "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )

@@ -171,12 +171,6 @@ def _prepare_caches() -> None:
         _compile_anew("", "an earlier process that used OpenCL crashed", again)
 
 
-def report_crashes() -> None:
-    """Let a crash of this process leave a report; called when PoCL, with its devices, has set its own handlers."""
-    if _report and not faulthandler.is_enabled():
-        faulthandler.enable(os.open(_report, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666))
-
-
 def _compile_anew(report: str, why: str, remedy: str = "") -> None:
     """Warn that all kernels are compiled anew, and add to the reports, so that later processes do not read them."""
     global _reported
@@ -197,11 +191,9 @@ def intel_library() -> Path | None:
 
 @contextmanager
 def _icd_folder() -> Iterator[None]:
-    """Point the loader to a temporary folder that lists all runtimes and the Intel runtime from the package index.
-
-    The .icd file in Intel's wheel names a path that does not exist, and the loader reads a single folder. A folder
-    that the user has set is not changed, and on Windows runtimes are found in the registry.
-    """
+    """Point the loader to a temporary folder that lists all runtimes and the Intel runtime from the package index."""
+    # The .icd file in Intel's wheel names a path that does not exist, and the loader reads a single folder, which the
+    # user may have set. On Windows runtimes are found in the registry.
     library = intel_library() if sys.platform == "linux" else None
     if library is None or any(os.environ.get(name) for name in _ICD_VARIABLES):
         yield
@@ -445,10 +437,7 @@ def devices(probe: bool = True) -> list[DeviceInfo]:
 
 
 def probe(info: DeviceInfo) -> DeviceInfo:
-    """Build and run a tiny program on a device, and return its line with `usable` and `reason`.
-
-    It runs in this process, unless a process crashed at this point before.
-    """
+    """Return the line of a device after a tiny program on it, in this process unless one has crashed in that before."""
     if info.handle is None:
         return info
     reason = failures([info.index])[0] if apart else failure(info.handle)
@@ -456,31 +445,7 @@ def probe(info: DeviceInfo) -> DeviceInfo:
 
 
 def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
-    """Return a usable device.
-
-    Devices are probed in order of preference, in this process, and only until one is usable; devices that `text` does
-    not match are never probed.
-
-    Parameters
-    ----------
-    text : str, int, DeviceInfo or None
-        Part of a device's name, platform or version (case does not matter), an index of the listing, or "reference" for
-        the NumPy twin. None means the value of the environment variable SIMDTEX_DEVICE or, if that is unset or empty,
-        the first usable device of the listing. If several devices match, the result is the one whose whole name,
-        as printed, is the text, else the only usable one, or the only one by its platform. A usable `DeviceInfo` is
-        returned unchanged.
-
-    Returns
-    -------
-    DeviceInfo
-
-    Raises
-    ------
-    DeviceError
-        Nothing matches, several usable devices match, or no device is usable.
-    TypeError
-        `text` is of another type.
-    """
+    """Return a usable device, by a part of its name, its index or its line; None takes SIMDTEX_DEVICE, or the first."""
     if isinstance(text, DeviceInfo):
         text = text if text.reason != _NOT_PROBED else probe(text)
         if text.usable:
@@ -503,7 +468,12 @@ def choose(
     listing: Sequence[DeviceInfo],
     check: Callable[[DeviceInfo], DeviceInfo] = lambda info: info,
 ) -> DeviceInfo:
-    """Return a device of a listing, best first, by the rules of `find`; ``check`` probes a line and returns it."""
+    """Return a device of a listing, best first; ``check`` probes a line, only until one is usable, and returns it.
+
+    The text is a part of a device's name, platform or version (case does not matter), or an index. If several devices
+    match, the result is the one whose whole name, as printed, is the text, else the only usable one, or the only one by
+    its platform. None takes the first usable one.
+    """
     if text is None:
         found = []
         for info in listing:
@@ -564,7 +534,8 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
                 found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
         except Exception as error:  # a broken platform must not stop the others
             found.append(DeviceInfo(0, title, "", "other", reason=one_line(error)))
-    report_crashes()
+    if _report and not faulthandler.is_enabled():  # a crash leaves a report; PoCL has set its own handlers by now
+        faulthandler.enable(os.open(_report, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666))
     found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
     found.sort(key=_preference)
     return tuple(replace(info, index=index) for index, info in enumerate(found))

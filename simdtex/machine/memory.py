@@ -33,11 +33,7 @@ def shared(machine: Machine) -> bool:
 
 
 def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER) -> None:
-    """Raise DeviceError if a run does not fit the memory that is available.
-
-    ``device`` and ``host`` are the most bytes of the run in arrays of the machine, and in other arrays on
-    the host; ``remedy`` is the end of the error message.
-    """
+    """Raise DeviceError if bytes in arrays of the machine, and in others on the host, do not fit; name the remedy."""
     required["device", id(machine)] = max(device, required.get(("device", id(machine)), 0))
     if device > machine.memory:
         raise DeviceError(
@@ -48,10 +44,7 @@ def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER)
 
 
 def require_host(wanted: int, remedy: str = SMALLER, of: int = 0) -> None:
-    """Raise DeviceError if ``wanted`` bytes exceed the available memory of the host.
-
-    They are for the machine with the `id` ``of``, or for none.
-    """
+    """Raise DeviceError if bytes, for the machine with the `id` ``of``, exceed the available memory of the host."""
     required["host", of] = max(wanted, required.get(("host", of), 0))
     there = available()
     if wanted > there:

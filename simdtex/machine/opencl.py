@@ -7,7 +7,7 @@ import re
 import time
 import weakref
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from math import prod
 from pathlib import Path
@@ -104,18 +104,15 @@ class Pool:
         """Bytes of the buffers that arrays have."""
         return self._made - sum(size * len(free) for size, free in self._free.items())
 
-    def take(self, size: int) -> Use:
+    def take(self, size: int) -> BufferUse:
         """Return the use of a buffer of at least ``size`` bytes, a quarter more at most."""
         unit = 1 << max(6, size.bit_length() - 3)
         size = max(1, -(-size // unit)) * unit
         if self._largest > 0:
             size = min(size, self._largest)
         free = self._free.setdefault(size, [])
-        try:
+        with suppress(IndexError):
             before = free.pop()
-        except IndexError:
-            pass
-        else:
             self._used.discard(before)
             return self._use(before.buffer, free)
         try:
@@ -129,8 +126,8 @@ class Pool:
         self._made += size
         return self._use(buffer, free)
 
-    def _use(self, buffer: Any, free: list[Taken]) -> Use:
-        use = Use()
+    def _use(self, buffer: Any, free: list[Taken]) -> BufferUse:
+        use = BufferUse()
         taken = Taken(use, free.append)
         taken.buffer = use.buffer = buffer
         self._used.add(taken)
@@ -143,14 +140,14 @@ class Pool:
         return buffer
 
 
-class Use:
+class BufferUse:
     """The use of a buffer of a `Pool`, which ends with the last array that has it."""
 
     __slots__ = ("__weakref__", "buffer")
     buffer: Any
 
 
-class Taken(weakref.ref[Use]):
+class Taken(weakref.ref[BufferUse]):
     """A buffer in use, which is appended to the free ones at the end: by C alone, where no signal can raise."""
 
     __slots__ = ("buffer",)
@@ -385,10 +382,7 @@ class OpenCL:
             )
 
     def chunk(self, candidates: int, neighbours: int, channels: int, table: int = 0) -> int:
-        """Return the number of sites that fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
-
-        ``table`` is the number of bytes that each site has in a table, in addition to its neighbourhood.
-        """
+        """Return the number of sites, each with ``table`` bytes, that fit the scratch memory and 4e9 multiply-adds."""
         fit = self.scratch // (table + 8 * neighbours * (1 + channels))
         return max(1, min(fit, int(4e9) // (2 * candidates * neighbours * channels)))
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.driver import Device, Seed, check_shape, run
-from simdtex.inputs import check_inputs
+from simdtex.driver import Device, Seed, run
+from simdtex.inputs import check_inputs, check_shape
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
 from simdtex.maspar.algorithm import Level, Problem, Program, by_lane

@@ -5,7 +5,6 @@ import shlex
 
 import click
 import numpy as np
-import pytest
 from click.shell_completion import BashComplete
 from click.testing import CliRunner
 
@@ -40,21 +39,23 @@ def test_there_are_not_too_many_options():
     assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 120, "each is needed"
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_help_lists_the_usual_options_and_says_where_the_others_are(name):
-    """In 80 columns, at most fourteen options; the rest with --help-all."""
-    command = load(name)
-    said = CliRunner(env={"COLUMNS": "80"}).invoke(main, [name, "--help"], prog_name="simdtex").output
-    listed = re.findall(r"^  (-[a-z], )?(--[a-z-]+)", said, re.MULTILINE)
-    assert max(map(len, said.splitlines())) <= 80 or any(len(words) > 70 for words, _ in command.examples)
-    every = len(re.findall(r"^  (-[a-z], )?(--[a-z-]+)", help_of(name), re.MULTILINE))
-    own = [one for one in command.params if isinstance(one, click.Option)]
-    if not command.usual:
-        assert len(listed) == len(own) + 1 or len(own) > 14  # schedules
-        return
-    assert 10 <= len(listed) <= 14
-    assert f"`simdtex {name} --help-all` lists the other {len(own) - len(listed)} options too." in said
-    assert every >= len(own) + 1, "an option of several methods is listed for each"
+def test_helps_fit_a_line_and_list_the_usual_options():
+    """In 80 columns, at most fourteen options; the rest with --help-all. Commands begin with examples."""
+    for name in COMMANDS:
+        command, every = load(name), help_of(name, 80)
+        said = CliRunner(env={"COLUMNS": "80"}).invoke(main, [name, "--help"], prog_name="simdtex").output
+        assert max(map(len, said.splitlines())) <= 80 or any(len(words) > 70 for words, _ in command.examples)
+        assert command.examples or name == "devices"
+        assert all(f"  # {what}\n  simdtex {words}\n" in every for words, what in command.examples)
+        assert not command.examples or every.index("  simdtex ") < every.index(" --help")
+        listed, options = (re.findall(r"^  (-[a-z], )?(--[a-z-]+)", text, re.MULTILINE) for text in (said, every))
+        own = [one for one in command.params if isinstance(one, click.Option)]
+        if command.usual:
+            assert 10 <= len(listed) <= 14
+            assert f"`simdtex {name} --help-all` lists the other {len(own) - len(listed)} options too." in said
+            assert len(options) >= len(own) + 1, "an option of several methods is listed for each"
+        else:
+            assert len(listed) == len(own) + 1 or len(own) > 14  # schedules
 
 
 def test_a_group_names_its_method():
@@ -74,14 +75,11 @@ def test_the_help_of_an_option_begins_with_what_it_does():
             assert said[0].isupper() and said.partition(" ")[0].lower() in VERBS, f"{command} {one.opts[0]}: {said}"
 
 
-@pytest.mark.parametrize("words", LINES, ids=lambda words: words[:40])
-def test_examples_are_understood(words):
-    name, *rest = shlex.split(words)
-    with load(name).make_context(name, rest) as context:
-        assert context.params
-
-
-def test_the_first_example_runs(tmp_path, monkeypatch):
+def test_examples_are_understood_and_the_first_runs(tmp_path, monkeypatch):
+    for words in LINES:
+        name, *rest = shlex.split(words)
+        with load(name).make_context(name, rest) as context:
+            assert context.params
     monkeypatch.chdir(tmp_path)
     image.write("gravel.png", np.random.default_rng(1).integers(0, 256, (10, 11), dtype=np.uint8))
     done = run(*shlex.split(load("synth").examples[0][0]), "--order", 2, "--device", "reference")
@@ -89,79 +87,47 @@ def test_the_first_example_runs(tmp_path, monkeypatch):
     assert image.read("more.png").pixels.shape == (20, 22)
 
 
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in ("devices",)])
-def test_a_command_begins_with_examples_that_fit_a_line(name):
-    said = help_of(name, 80)
-    for words, what in load(name).examples:
-        assert f"  # {what}\n  simdtex {words}\n" in said
-    assert load(name).examples and said.index("  simdtex ") < said.index(" --help")
-
-
 def test_the_list_of_commands_is_in_groups():
     said = help_of("--help")
     for name, sentence in COMMANDS.items():
         assert re.search(rf"^  {name} +{re.escape(sentence[:30])}", said, re.MULTILINE)
-        assert "..." not in sentence or "SAMPLE..." in sentence
+        assert main.commands[name].get_short_help_str(200) == load(name).get_short_help_str(200)
     assert said.index("Textures:") < said.index("Studies:") < said.index("This machine:")
 
 
-def test_versions(monkeypatch):
-    monkeypatch.setenv("SIMDTEX_DEVICE", "reference")
-    own, libraries, device = run("--version").output.splitlines()
-    assert re.fullmatch(r"simdtex \S+", own)
-    assert re.fullmatch(r"Python \S+, NumPy \S+, pyopencl \S+", libraries)
-    assert device == "reference"
-
-
-def test_versions_with_a_device(monkeypatch, any_device):
+def test_versions(monkeypatch, any_device):
     monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
-    assert run("--version").output.splitlines()[-1] == f"{any_device}, {any_device.version}, driver {any_device.driver}"
-
-
-def test_versions_without_a_device(monkeypatch):
+    own, libraries, device = run("--version").output.splitlines()
+    assert re.fullmatch(r"simdtex \S+", own) and re.fullmatch(r"Python \S+, NumPy \S+, pyopencl \S+", libraries)
+    assert device == f"{any_device}, {any_device.version}, driver {any_device.driver}"
     monkeypatch.setenv("SIMDTEX_DEVICE", "nonsense")
     done = run("--version")
     assert done.exit_code == 0 and "No device matches" in done.output.splitlines()[-1]
 
 
-def test_near_misses_are_named():
+def test_near_misses_and_words_of_other_programs_name_ours():
     assert "Did you mean 'synth'?" in run("snth").output
     assert "--coherence" in run("synth", "a.png", "-o", "b.png", "--coherense", 1).output
-
-
-def test_words_of_other_programs_name_ours():
     for ours, theirs in COMMAND_WORDS.items():
-        for word in theirs:
-            assert ours in COMMANDS and f"No such command '{word}': use `simdtex {ours}`." in run(word, "a.png").output
+        assert f"No such command '{theirs[-1]}': use `simdtex {ours}`." in run(theirs[-1], "a.png").output
     own = {flag for _, one in OPTIONS for flag in one.opts}
-    for ours, theirs in OPTION_WORDS.items():
-        assert theirs and (ours in own or ours.removeprefix("simdtex ") in COMMANDS)
-    found = {
-        (command, word): run(command, "a.png", "-o", "b.png", word).output.splitlines()[-1].partition(": use ")[2]
-        for command, word in [("synth", "--scale"), ("synth", "--seamless"), ("tile", "--scale"), ("fill", "--hole")]
-    }
-    assert list(found.values()) == ["--size.", "simdtex tile.", "", "--mask or simdtex fill."]
+    assert all(ours in own or ours.removeprefix("simdtex ") in COMMANDS for ours in (*OPTION_WORDS, *COMMAND_WORDS))
+    found = {("synth", "--scale"): "--size.", ("synth", "--seamless"): "simdtex tile.", ("tile", "--scale"): ""}
+    for (command, word), ours in {**found, ("fill", "--hole"): "--mask or simdtex fill."}.items():
+        said = run(command, "a.png", "-o", "b.png", word).output.splitlines()[-1]
+        assert said.partition(": use ")[2] == ours
 
 
-@pytest.mark.parametrize(
-    "words, last, found",
-    [
+def test_completion():
+    shell = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE")
+    for words, last, found in [
         ([], "sy", ["synth"]),
-        (["synth"], "--balan", ["--balance"]),
         (["fill", "a.png"], "--mas", ["--mask"]),
-        (["synth", "--relaxation"], "g", ["gibbs"]),
         (["synth", "--method"], "", ["mrf", "multires", "pyramid"]),
         (["synth", "--schedule"], "ra", ["random-subset", "raster", "random-scan"]),
         (["synth", "--edges"], "", ["auto", "reflect", "whole", "mend", "keep", "wrap"]),
         (["extend", "--seamless"], "b", ["both"]),
         (["synth", "--order"], "1", []),
-    ],
-)
-def test_completion(words, last, found):
-    told = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE").get_completions(words, last)
-    assert [one.value for one in told] == found
-
-
-def test_completion_of_files():
-    files = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE").get_completions(["synth"], "gr")
-    assert [one.type for one in files] == ["file"]
+    ]:
+        assert [one.value for one in shell.get_completions(words, last)] == found
+    assert [one.type for one in shell.get_completions(["synth"], "gr")] == ["file"]

@@ -1,7 +1,7 @@
 """No command overwrites what it reads: every command, every option that is a path, every way to name a file twice."""
 
 import os
-from pathlib import Path
+import re
 
 import click
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 from commands import refused, run
 
 from simdtex import commands as cli
-from simdtex.cli.command import Pair, Place
+from simdtex.cli.command import Pair, PathType, check_places
 from simdtex.io import image
 
 COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
@@ -31,34 +31,24 @@ def parameters(*roles):
         (name, option)
         for name, command in COMMANDS.items()
         for option in command.params
-        if isinstance(option.type, (Place, Pair)) and (option.type.role in roles or isinstance(option.type, Pair))
+        if isinstance(option.type, (PathType, Pair)) and (option.type.role in roles or isinstance(option.type, Pair))
     ]
 
 
 def test_every_path_has_a_role():
     """An option that is new fails here, until it has a role or is known to name no file."""
-    found = 0
-    for name, command in COMMANDS.items():
-        for option in command.params:
-            kind = option.type
-            assert not isinstance(kind, click.File), (name, option.name)
-            if isinstance(kind, (Place, Pair)):
-                found += 1
-                assert kind.role in READ + WRITE
-                continue
-            assert not isinstance(kind, click.Path), f"{name} {option.name}: give it a role of simdtex.cli.command"
-            if isinstance(kind, click.types.StringParamType):
-                assert option.name in TEXTS, f"{name} {option.name}: give it a role, or name it in this test"
-    assert found > 40
-
-
-def test_what_writes_is_known_to_write():
-    """The roles of options that are called the same are the same, and outputs are outputs."""
-    for name, option in parameters(*READ, *WRITE):
-        if isinstance(option.type, Place) and option.name in ("output", "outputs", "stages", "report", "source_map"):
-            assert option.type.role in WRITE, (name, option.name)
-        if option.name in ("sample", "samples", "picture", "training_image") and isinstance(option, click.Argument):
-            assert option.type.role in READ
+    for name, option in ((name, option) for name, command in COMMANDS.items() for option in command.params):
+        kind, where = option.type, f"{name} {option.name}: give it a role of simdtex.cli.command"
+        if isinstance(kind, (PathType, Pair)):
+            assert kind.role in READ + WRITE
+            if isinstance(kind, PathType) and option.name in ("output", "outputs", "stages", "report", "source_map"):
+                assert kind.role in WRITE, where
+            if option.name in ("sample", "samples", "picture", "training_image") and isinstance(option, click.Argument):
+                assert kind.role in READ, where
+            continue
+        assert not isinstance(kind, (click.File, click.Path)), where
+        assert not isinstance(kind, click.types.StringParamType) or option.name in TEXTS, f"{where}, or name it here"
+    assert len(parameters(*READ, *WRITE)) > 40
 
 
 def words(option, text):
@@ -106,62 +96,6 @@ PAIRS = [
 ]
 
 
-def named(pair):
-    name, out, given = pair
-    return f"{name} {out.name} {given.name}"
-
-
-@pytest.mark.parametrize("pair", PAIRS, ids=named)
-def test_an_output_is_no_input(folder, pair):
-    name, out, given = pair
-    file = folder / "in" / "given.png"
-    (folder / "link.png").symlink_to(file)
-    (folder / "again.png").symlink_to("link.png")
-    os.link(file, folder / "hard.png")
-    (folder / "way").symlink_to("in")
-    rest = required(COMMANDS[name], out, given)
-    ways = [
-        ("in/given.png", "in/given.png"),
-        ("again.png", "in/given.png"),
-        ("in/given.png", "hard.png"),
-        ("in/given.png", "./in/../in/given.png"),
-        ("in/given.png", file),
-        ("in/given.png", "link.png"),
-        ("way/given.png", "in/given.png"),
-    ]
-    for one, other in ways if name == "synth" else ways[1:3]:
-        args = [*reading(given, one), *rest, *writing(out, other)]
-        refused("is an input and would be overwritten; give the output another name", name, *args)
-
-
-def test_both_sides_of_a_pair(folder):
-    for text in ("map.png=map.png", "map.png=./map.png", "map.png,other.png=other.png", "x, other.png=other.png"):
-        for name in ("synth", "fill", "extend"):
-            args = ["sample.png", "-o", "out.png", "--also", text]
-            refused("is an input and would be overwritten", name, *args)
-    for text in ("other.png=out.png", "out.png=other.png", "other.png,out.png=map.png"):
-        (folder / "out.png").touch()
-        for name in ("synth", "simulate"):
-            args = ["sample.png", "-o", "out.png", "--guide", text]
-            refused("is an input and would be overwritten", name, *args)
-
-
-@pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1].type.role in ("folder", "either")], ids=named)
-def test_no_folder_that_is_made_anew_holds_an_input(folder, pair):
-    name, out, given = pair
-    (folder / "in" / "level0.png").symlink_to(folder / "sample.png")
-    (folder / "way").symlink_to("in")
-    rest = required(COMMANDS[name], out, given)
-    for one, other in [
-        ("in/given.png", "in"),
-        ("in/level0.png", "in"),
-        ("in/given.png", "way"),
-        ("way/given.png", "in/."),
-    ]:
-        args = [*reading(given, one), *rest, *writing(out, other)]
-        refused("is an input and is in", name, *args)
-
-
 OUTPUTS = [
     (name, one, other)
     for name, one in parameters(*WRITE)
@@ -170,16 +104,52 @@ OUTPUTS = [
 ]
 
 
-@pytest.mark.parametrize("pair", OUTPUTS, ids=named)
-def test_no_output_is_another(folder, pair):
-    name, one, other = pair
-    rest = required(COMMANDS[name], one, other)
-    for a, b in (("new", "new"), ("new", "./in/../new"), ("in", "in")):
-        refused("would be written twice", name, *rest, *writing(one, a), *writing(other, b))
-    for outer, inner in ((one, other), (other, one)):
-        if outer.type.role != "write":
-            args = [*rest, *writing(outer, "new"), *writing(inner, "new/x.npz")]
-            refused("would be written into new, the folder of another output", name, *args)
+def collides(sentence, name, *args):
+    """The command ends with this sentence before it does anything."""
+    context = COMMANDS[name].make_context(name, [str(word) for word in args])
+    with context, pytest.raises(ValueError, match=re.escape(sentence)):
+        check_places(context)
+
+
+def test_an_output_is_no_input(folder):
+    file = folder / "in" / "given.png"
+    (folder / "link.png").symlink_to(file)
+    (folder / "again.png").symlink_to("link.png")
+    os.link(file, folder / "hard.png")
+    (folder / "way").symlink_to("in")
+    sentence = "is an input and would be overwritten; give the output another name"
+    for one, other in [("in/given.png", file), ("in/given.png", "./in/../in/given.png"), ("way/given.png", "link.png")]:
+        refused(sentence, "synth", one, "-o", other)
+    for name, out, given in PAIRS:
+        rest = required(COMMANDS[name], out, given)
+        for one, other in ("again.png", "in/given.png"), ("in/given.png", "hard.png"):
+            collides(sentence, name, *reading(given, one), *rest, *writing(out, other))
+    for text in ("map.png=./map.png", "map.png,other.png=other.png", "x, other.png=other.png"):
+        collides(sentence, "fill", "sample.png", "-o", "out.png", "--also", text)
+    (folder / "out.png").touch()
+    for text in ("other.png=out.png", "out.png=other.png", "other.png,out.png=map.png"):
+        collides(sentence, "simulate", "sample.png", "-o", "out.png", "--guide", text)
+
+
+def test_no_folder_that_is_made_anew_holds_an_input(folder):
+    (folder / "in" / "level0.png").symlink_to(folder / "sample.png")
+    (folder / "way").symlink_to("in")
+    ways = [("in/given.png", "in"), ("in/level0.png", "in"), ("in/given.png", "way"), ("way/given.png", "in/.")]
+    for name, out, given in PAIRS:
+        rest = required(COMMANDS[name], out, given)
+        for one, other in ways if out.type.role in ("folder", "either") else ():
+            collides("is an input and is in", name, *reading(given, one), *rest, *writing(out, other))
+
+
+def test_no_output_is_another_or_in_its_folder(folder):
+    for name, one, other in OUTPUTS:
+        rest = required(COMMANDS[name], one, other)
+        for a, b in (("new", "new"), ("new", "./in/../new"), ("in", "in")):
+            collides("would be written twice", name, *rest, *writing(one, a), *writing(other, b))
+        for outer, inner in ((one, other), (other, one)):
+            if outer.type.role != "write":
+                args = [*rest, *writing(outer, "new"), *writing(inner, "new/x.npz")]
+                collides("would be written into new, the folder of another output", name, *args)
 
 
 def test_names_that_differ_are_let_be(folder):
@@ -192,38 +162,33 @@ def test_names_that_differ_are_let_be(folder):
     assert (folder / "sample.png").read_bytes() == before and (folder / "Sample.png").exists()
 
 
-@pytest.mark.parametrize("pair", parameters(*READ), ids=lambda pair: f"{pair[0]} {pair[1].name}")
-def test_a_missing_input_is_named(folder, pair):
-    name, given = pair
-    command = COMMANDS[name]
-    rest = [*required(command, given), "--device", "reference"]
-    if name in PICTURES:
-        rest = ["out.png" if word == "fresh.npz" else word for word in rest]
-    missing = "none.npz" if given.type.role == "enter" else "none.png"
-    if name == "fill" and given.name != "mask":
-        rest += ["--mask", "map.png"]
-    if name == "extend":
-        rest += ["--left", "3"]
-    if given.name == "roles":
-        rest = [{"sample.png": "in", "out.png": "out"}.get(word, word) for word in rest]
-    refused("does not exist: check the path", name, *reading(given, missing), *rest)
-    if isinstance(given.type, Place) and given.type.role == "read":
-        refused("is a folder", name, *words(given, "in"), *rest)
-    empty = run(name, *words(given, ""), *rest)
-    assert empty.exit_code == 2 and ("'' must be" if isinstance(given.type, Pair) else "empty") in empty.output
+def test_a_missing_input_and_an_empty_path_are_named(folder):
+    for name, given in parameters(*READ):
+        rest = [*required(COMMANDS[name], given), "--device", "reference"]
+        if name in PICTURES:
+            rest = ["out.png" if word == "fresh.npz" else word for word in rest]
+        if name == "fill" and given.name != "mask":
+            rest += ["--mask", "map.png"]
+        if name == "extend":
+            rest += ["--left", "3"]
+        if given.name == "roles":
+            rest = [{"sample.png": "in", "out.png": "out"}.get(word, word) for word in rest]
+        missing = "none.npz" if given.type.role == "enter" else "none.png"
+        refused("does not exist: check the path", name, *reading(given, missing), *rest)
+        if isinstance(given.type, PathType) and given.type.role == "read":
+            refused("is a folder", name, *words(given, "in"), *rest)
+    for args, said in ((("",), "the path is empty"), (("a.png", "--also", ""), "'' must be MAP=OUT")):
+        done = run("synth", *args, "-o", "o.png")
+        assert done.exit_code == 2 and said in done.output
 
 
-@pytest.mark.parametrize("name", [name for name, c in COMMANDS.items() if any(p.name == "size" for p in c.params)])
-def test_an_empty_size_is_no_default(folder, name):
-    args = [*required(COMMANDS[name]), "--size", ""]
-    if name in PICTURES:
-        args = ["out.png" if word == "fresh.npz" else word for word in args]
-    if name in ("demo", "schedules"):
-        args += ["-o", "report"]
-    if name == "estimate":
-        args += ["--known", "sample.png"]
-    refused("size '' is not ", name, *args)
-    assert not Path("report").exists()
+def test_an_empty_size_is_no_default(folder):
+    for name in (name for name, command in COMMANDS.items() if any(one.name == "size" for one in command.params)):
+        args = [*required(COMMANDS[name]), "--size", ""]
+        if name in PICTURES:
+            args = ["out.png" if word == "fresh.npz" else word for word in args]
+        args += {"estimate": ["--known", "sample.png"], "demo": ["-o", "o"], "schedules": ["-o", "o"]}.get(name, [])
+        refused("size '' is not ", name, *args)
 
 
 def test_a_file_name_in_a_pair_may_contain_an_equals_sign(tmp_path, monkeypatch):

@@ -13,7 +13,6 @@ import pytest
 
 from simdtex.general import render
 from simdtex.machine import devices
-from simdtex.machine import devices as device
 from simdtex.machine.devices import DeviceError, DeviceInfo
 
 
@@ -33,84 +32,54 @@ LISTING = [
 
 @pytest.fixture(autouse=True)
 def no_variable(monkeypatch):
-    monkeypatch.delenv(device.VARIABLE, raising=False)
+    monkeypatch.delenv(devices.VARIABLE, raising=False)
 
 
-@pytest.mark.parametrize(
-    ("text", "index"),
-    [
-        (None, 1),  # the first usable
-        ("slow", 1),
-        ("SLOW 10", 1),
-        ("pocl", 2),  # by the version; of two matches the only usable one
-        ("portable", 2),
-        ("pthread-epyc", 2),
-        ("2", 2),
-        (" 2 ", 2),
-        ("10", 1),  # no such index, so part of a name
-        ("4", 4),
-        ("refer", 4),
-    ],
-)
-def test_choose(text, index):
-    assert device.choose(text, LISTING) is LISTING[index]
+CHOSEN = {
+    **{None: 1, "slow": 1, "SLOW 10": 1},  # None: the first usable
+    **{"pocl": 2, "portable": 2, "pthread-epyc": 2},  # by the version; of two matches the only usable one
+    **{"2": 2, " 2 ": 2, "10": 1, "4": 4, "refer": 4},  # there is no index 10, so it is a part of a name
+}
+REFUSED = {
+    "nonesuch": '"nonesuch"; choose one of: 1 = Slow 10 (Acme OpenCL), 2 = ',
+    "99": 'No device matches "99"; choose one of: 1 = ',
+    "": "choose one of",
+    "turbo": "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of: 1 = Slow 10",
+    "0": "it does not build); choose one of: 1 = Slow 10",
+    "e": "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 =",
+}
 
 
-def test_choose_prefers_the_whole_name_then_the_platform():
+def test_choose():
+    assert {text: devices.choose(text, LISTING).index for text in CHOSEN} == CHOSEN
     listing = [fake(0, "Ultra"), fake(1, "Ultra Max"), fake(2, "cpu-Intel(R) Xeon", "PoCL"), fake(3, "Xeon", "Intel")]
     for text, index in (("ultra", 0), ("ultra max (acme opencl)", 1), (str(listing[2]), 2), ("intel", 3)):
-        assert device.choose(text, listing) is listing[index]
+        assert devices.choose(text, listing) is listing[index], "the whole name, then the platform"
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("nonesuch", '"nonesuch"; choose one of: 1 = Slow 10 (Acme OpenCL), 2 = '),
-        ("99", 'No device matches "99"; choose one of: 1 = '),
-        ("-1", "choose one of"),
-        ("", "choose one of"),
-        ("turbo", "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of: 1 = Slow 10"),
-        ("0", "it does not build); choose one of: 1 = Slow 10"),
-        ("e", "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 ="),
-    ],
-)
-def test_a_failed_choice_lists_the_devices(text, words):
-    with pytest.raises(DeviceError) as caught:
-        device.choose(text, LISTING)
-    assert words in str(caught.value)
-    assert str(caught.value).endswith(".")
-    assert "\n" not in str(caught.value)
-    assert isinstance(caught.value, ValueError)
+def test_a_failed_choice_lists_the_devices():
+    for text, words in REFUSED.items():
+        with pytest.raises(DeviceError) as said:
+            devices.choose(text, LISTING)
+        assert words in str(said.value) and str(said.value).endswith(".") and "\n" not in str(said.value)
+    with pytest.raises(ValueError) as said:
+        devices.choose(None, [LISTING[0], LISTING[4]])
+    remedies = ("pip install simdtex[cpu]", "apt install pocl-opencl-icd", "driver of your GPU", 'device="reference"')
+    assert all(words in str(said.value) for words in ("Turbo 4090: it does not build", *remedies))
 
 
 def test_a_device_that_is_refused_is_not_offered():
     """The listing is not probed, and only the devices that match are."""
     listing = [replace(info, usable=False, reason="not probed") for info in LISTING[:3]]
     with pytest.raises(DeviceError, match=r"choose one of: 1 = [^=]*, 2 = [^=]*$"):
-        device.choose("turbo", listing, lambda info: replace(info, reason="it does not build"))
+        devices.choose("turbo", listing, lambda info: replace(info, reason="it does not build"))
 
 
 def test_choose_probes_no_further_than_needed():
-    probed = []
-
-    def check(info):
-        probed.append(info.index)
-        return info
-
-    device.choose(None, LISTING, check)
-    assert probed == [0, 1]
-    probed.clear()
-    device.choose("slow", LISTING, check)
-    assert probed == [1]
-
-
-def test_nothing_usable_says_what_to_install():
-    with pytest.raises(DeviceError) as caught:
-        device.choose(None, [LISTING[0], LISTING[4]])
-    message = str(caught.value)
-    assert "Turbo 4090: it does not build" in message
-    remedies = ("pip install simdtex[cpu]", "apt install pocl-opencl-icd", "driver of your GPU", 'device="reference"')
-    assert all(words in message for words in remedies)
+    for text, expected in ((None, [0, 1]), ("slow", [1])):
+        probed = []
+        devices.choose(text, LISTING, lambda info, probed=probed: probed.append(info.index) or info)
+        assert probed == expected
 
 
 def test_simulators_and_single_threads_come_last():
@@ -123,7 +92,7 @@ def test_simulators_and_single_threads_come_last():
         fake(0, "pthread-epyc", "Portable Computing Language"),
         fake(0, "Turbo", kind="gpu"),
     ]
-    names = [info.name for info in sorted(infos, key=device._preference)]
+    names = [info.name for info in sorted(infos, key=devices._preference)]
     assert names == ["Turbo", "pthread-epyc", "basic-epyc", "board", "Oclgrind Simulator", "llvmpipe (LLVM 15)", ""]
 
 
@@ -138,52 +107,44 @@ def test_a_gpu_with_its_own_memory_and_more_units_comes_first(platforms):
     one = [handle("cores", 2, 256, True), handle("on the board", 4, 96, True), handle("half", 4, 40, False)]
     two = [handle("whole", 4, 80, False), handle("other cores", 2, 300, True)]
     platforms(*(SimpleNamespace(name=name, get_devices=lambda of=of: of) for name, of in (("A", one), ("B", two))))
-    listing = device.devices(probe=False)
+    listing = devices.devices(probe=False)
     names = ["whole", "half", "on the board", "cores", "other cores", "reference"]
     assert [info.name for info in listing] == names
     assert [info.integrated for info in listing] == [False, False, True, False, False, False]
     assert listing[0].largest == 2**28
 
 
-# find
-
-
 def test_find_reads_the_variable_only_when_nothing_is_asked(monkeypatch):
-    monkeypatch.setattr(device, "devices", lambda probe: list(LISTING))
-    monkeypatch.setattr(device, "probe", lambda info: info)
-    assert device.find().index == 1
-    monkeypatch.setenv(device.VARIABLE, "portable")
-    assert device.find().index == 2
-    assert device.find("slow").index == 1
-    assert device.find(2).index == 2
-    monkeypatch.setenv(device.VARIABLE, "")
-    assert device.find().index == 1
-    monkeypatch.setenv(device.VARIABLE, "Reference")
-    assert device.find().kind == "reference"
-    monkeypatch.setenv(device.VARIABLE, "nonesuch")
+    monkeypatch.setattr(devices, "devices", lambda probe: list(LISTING))
+    monkeypatch.setattr(devices, "probe", lambda info: info)
+    assert devices.find().index == 1
+    monkeypatch.setenv(devices.VARIABLE, "portable")
+    assert devices.find().index == 2
+    assert devices.find("slow").index == 1
+    assert devices.find(2).index == 2
+    monkeypatch.setenv(devices.VARIABLE, "")
+    assert devices.find().index == 1
+    monkeypatch.setenv(devices.VARIABLE, "Reference")
+    assert devices.find().kind == "reference"
+    monkeypatch.setenv(devices.VARIABLE, "nonesuch")
     with pytest.raises(DeviceError, match="nonesuch"):
-        device.find()
+        devices.find()
 
 
-def test_find_reference_asks_no_runtime(monkeypatch):
-    monkeypatch.setattr(device, "devices", lambda probe: pytest.fail("a runtime was asked"))
-    found = device.find("reference")
-    assert found.usable
-    assert found.handle is None
-
-
-def test_find_takes_a_line_of_the_listing():
-    assert device.find(LISTING[1]) is LISTING[1]
+def test_find_takes_a_line_of_the_listing_and_asks_no_runtime_for_the_reference(monkeypatch):
+    assert devices.find(LISTING[1]) is LISTING[1]
     with pytest.raises(DeviceError, match="it does not build"):
-        device.find(LISTING[0])
+        devices.find(LISTING[0])
+    monkeypatch.setattr(devices, "devices", lambda probe: pytest.fail("a runtime was asked"))
+    found = devices.find("reference")
+    assert found.usable and found.handle is None
 
 
 def test_ensure_accepts_a_simulator_only_by_name(monkeypatch):
-    simulator = fake(0, "Oclgrind")
-    monkeypatch.setattr(device, "find", lambda: simulator)
-    assert device.main() == 1
-    monkeypatch.setenv(device.VARIABLE, "oclgrind")
-    assert device.main() == 0
+    monkeypatch.setattr(devices, "find", lambda: fake(0, "Oclgrind"))
+    assert devices.main() == 1
+    monkeypatch.setenv(devices.VARIABLE, "oclgrind")
+    assert devices.main() == 0
 
 
 class Broken:
@@ -201,9 +162,9 @@ class NoDevices(SimpleNamespace):
 @pytest.fixture
 def platforms(monkeypatch):
     """Set the platforms of the loader."""
-    device._enumerate.cache_clear()
+    devices._enumerate.cache_clear()
     yield lambda *found: monkeypatch.setattr(devices, "platforms", lambda: list(found))
-    device._enumerate.cache_clear()
+    devices._enumerate.cache_clear()
 
 
 def test_a_reason_keeps_the_error_of_a_long_message():
@@ -214,76 +175,59 @@ def test_a_reason_keeps_the_error_of_a_long_message():
 
 
 def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
-    working = any_device.handle.platform
     hollow = SimpleNamespace(name=" Hollow\0", get_devices=list)
-    platforms(Broken(), NoDevices(name="Sick"), hollow, working)
-    listing = device.devices(probe=False)
-    broken = [info for info in listing if not info.name]
-    assert [info.platform for info in broken] == ["Hollow", "Sick", "platform 0"]
-    assert broken[0].reason == "the platform reports no device"
-    assert broken[1].reason == "CL_OUT_OF_HOST_MEMORY"
-    assert broken[2].reason == "broken name - error: unknown target CPU"
-    assert [info.index for info in listing] == list(range(len(listing)))
-    assert listing[-1].kind == "reference"
-    assert device.find().usable
-    assert device.find().kind != "reference"
-
-
-def test_a_device_without_properties_is_passed_over(any_device, platforms):
     sick = SimpleNamespace(name="AAA", get_devices=lambda: [Broken()])
-    platforms(sick, any_device.handle.platform)
-    line = next(info for info in device.devices(probe=False) if info.platform == "AAA")
-    assert (line.name, line.usable, line.reason) == ("", False, "broken type - error: unknown target CPU")
-    assert not device.probe(line).usable
-    assert device.find().name == any_device.name
+    platforms(Broken(), NoDevices(name="Sick"), hollow, sick, any_device.handle.platform)
+    listing = devices.devices(probe=False)
+    reasons = {info.platform: info.reason for info in listing if not info.name}
+    assert reasons == {
+        "AAA": "broken type - error: unknown target CPU",
+        "Hollow": "the platform reports no device",
+        "Sick": "CL_OUT_OF_HOST_MEMORY",
+        "platform 0": "broken name - error: unknown target CPU",
+    }
+    assert [info.index for info in listing] == list(range(len(listing))) and listing[-1].kind == "reference"
+    assert not any(devices.probe(info).usable for info in listing if not info.name)
+    assert devices.find().name == any_device.name
 
 
-def test_a_device_that_cannot_build_has_a_reason(any_device, monkeypatch):
-    monkeypatch.setattr(devices, "_SOURCE", "__kernel void probe(nonsense)")
-    devices.failure.cache_clear()
+WRONG = {
+    "fma rounds twice": ("fma(x, x, -(1.0f + 0x1p-11f))", "0.0f"),
+    "a product and a sum are contracted to an fma": ("x * x - (1.0f + 0x1p-11f)", "fma(x, x, -(1.0f + 0x1p-11f))"),
+    "denormal numbers become 0": ("y * y", "0.0f"),
+    "mul_hi of 64-bit integers is wrong": ("mul_hi(b[i], b[i])", "(ulong)mul_hi((uint)b[i], (uint)b[i])"),
+}
+
+
+def test_a_device_that_cannot_build_or_has_wrong_bits_is_not_usable(any_device, monkeypatch):
+    right, info = devices._SOURCE, any_device
     try:
-        line = device.probe(any_device)
-        assert not line.usable
-        assert "rror" in line.reason and "\n" not in line.reason
+        for reason, (words, wrong) in WRONG.items():
+            assert words in right
+            monkeypatch.setattr(devices, "_SOURCE", right.replace(words, wrong))
+            devices.failure.cache_clear()
+            assert devices.probe(info).reason == f"a tiny program gave wrong bits: {reason}"
+        monkeypatch.setattr(devices, "_SOURCE", "__kernel void probe(nonsense)")
+        devices.failure.cache_clear()
+        line = devices.probe(info)
+        assert not line.usable and "rror" in line.reason and "\n" not in line.reason
     finally:
         devices.failure.cache_clear()
 
 
-@pytest.mark.parametrize(
-    ("right", "wrong", "reason"),
-    [
-        ("fma(x, x, -(1.0f + 0x1p-11f))", "0.0f", "fma rounds twice"),
-        ("x * x - (1.0f + 0x1p-11f)", "fma(x, x, -(1.0f + 0x1p-11f))", "a product and a sum are contracted to an fma"),
-        ("y * y", "0.0f", "denormal numbers become 0"),
-        ("mul_hi(b[i], b[i])", "(ulong)mul_hi((uint)b[i], (uint)b[i])", "mul_hi of 64-bit integers is wrong"),
-    ],
-)
-def test_a_device_with_wrong_bits_is_not_usable(any_device, monkeypatch, right, wrong, reason):
-    assert right in devices._SOURCE
-    monkeypatch.setattr(devices, "_SOURCE", devices._SOURCE.replace(right, wrong))
-    devices.failure.cache_clear()
-    try:
-        assert device.probe(any_device).reason == f"a tiny program gave wrong bits: {reason}"
-    finally:
-        devices.failure.cache_clear()
-
-
-@pytest.mark.parametrize(
-    ("code", "reason"),
-    [
+def test_a_runtime_that_crashes_or_hangs_is_a_reason(monkeypatch):
+    run = subprocess.run
+    monkeypatch.setattr(devices, "_SECONDS", 1.0)
+    for code, reason in (
         ("print('noise\\nsimdtex-probe:', flush=True)", ""),
         ("print('simdtex-probe:it does not build')", "it does not build"),
-        ("import os; os.abort()", "crashed on a tiny program (SIGABRT)"),
-        ("raise SystemExit(7)", "crashed on a tiny program (exit code 7)"),
-        ("import time; time.sleep(60)", "did not finish within 2 seconds"),
-    ],
-)
-def test_a_runtime_that_crashes_or_hangs_is_a_reason(monkeypatch, code, reason):
-    run = subprocess.run
-    monkeypatch.setattr(devices, "_SECONDS", 2.0)
-    monkeypatch.setattr(devices.subprocess, "run", lambda words, **how: run([words[0], "-c", code], **how))
-    (answer,) = devices.failures([0])
-    assert answer.endswith(reason) if reason else answer == ""
+        ("import os; os.abort()", "the runtime crashed on a tiny program (SIGABRT)"),
+        ("raise SystemExit(7)", "the runtime crashed on a tiny program (exit code 7)"),
+        ("import time; time.sleep(60)", "a tiny program did not finish within 1 seconds"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(devices.subprocess, "run", lambda words, code=code, **how: run([words[0], "-c", code], **how))
+            assert devices.failures([0]) == [reason]
 
 
 def run_with_icds(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
@@ -297,12 +241,12 @@ def run_with_icds(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
 
 
 SAY = """
-from simdtex.machine import devices as device
+from simdtex.machine import devices
 try:
-    print(device.find().kind)
-except device.DeviceError as error:
+    print(devices.find().kind)
+except devices.DeviceError as error:
     print(error)
-print(device.find("reference").kind)
+print(devices.find("reference").kind)
 """
 
 
@@ -323,9 +267,6 @@ def test_an_icd_that_names_no_library(tmp_path):
         assert run_with_icds(tmp_path, "-m", "simdtex.machine.devices", "--ensure").returncode == 0
 
 
-# The Intel CPU runtime of the package index
-
-
 @pytest.fixture
 def intel(monkeypatch, tmp_path):
     """Pretend that the runtime is installed in this environment."""
@@ -339,7 +280,7 @@ def intel(monkeypatch, tmp_path):
     return library
 
 
-def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
+def test_the_intel_runtime_is_added_to_the_icd_files(intel, monkeypatch, tmp_path):
     conda = tmp_path / "etc" / "OpenCL" / "vendors"
     conda.mkdir(parents=True)
     (conda / "named.icd").write_text("libnamed.so.1\n")
@@ -354,21 +295,16 @@ def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
         assert not any("wrong" in line for line in lines)
     assert "OCL_ICD_VENDORS" not in os.environ
     assert not folder.exists()
-
-
-def test_a_folder_that_the_user_has_set_is_used(intel, monkeypatch):
     monkeypatch.setenv("OCL_ICD_VENDORS", "/my/own")
     with devices._icd_folder():
-        assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
+        assert os.environ["OCL_ICD_VENDORS"] == "/my/own", "a folder that the user has set is used"
 
 
 def test_every_usable_device_is_in_the_isolated_listing(cl_device):
-    line = device.devices()[cl_device.index]
+    line = devices.devices()[cl_device.index]
     assert replace(line, handle=None) == replace(cl_device, handle=None)
-    assert line.compute_units > 0
-    assert line.memory > 0
-    assert line.version.startswith("OpenCL ")
-    assert device.find(cl_device.index) == cl_device
+    assert line.compute_units > 0 and line.memory > 0 and line.version.startswith("OpenCL ")
+    assert devices.find(cl_device.index) == cl_device
 
 
 def test_render(capsys):

@@ -41,7 +41,7 @@ RUNS = {
 }
 
 
-@pytest.mark.parametrize("name", slow_but(("mode", "luby"), RUNS))
+@pytest.mark.parametrize("name", slow_but(("default",), RUNS))
 def test_a_run_launches_what_the_page_says(cl_device, name):
     options, expected = RUNS[name]
     options = {"order": 8, "levels": 2, "finish": 0.0} | options

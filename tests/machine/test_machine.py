@@ -19,13 +19,12 @@ import psutil
 import pyopencl as cl
 import pytest
 from cases import ising, opencl, texture
-from click.testing import CliRunner
+from commands import refused, run
 from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
 import simdtex.run
-from simdtex.commands import main
 from simdtex.figures.tables import print_profile, seconds_text
 from simdtex.io.image import write
 from simdtex.machine import devices, memory
@@ -54,30 +53,22 @@ def limits(monkeypatch, tmp_path):
         process = SimpleNamespace(memory_info=lambda: SimpleNamespace(rss=used, vms=used))
         monkeypatch.setattr(psutil, "Process", lambda: process)
         for path, text in zip(files, texts, strict=False):
-            if text is not None:
-                path.write_text(text)
+            path.write_text(text)
 
     return set_to
 
 
-@pytest.mark.parametrize(
-    ("texts", "expected"),
-    [
+def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_group(limits):
+    for texts, expected in (
         ((), 5000),
         (("max\n",), 5000),
         (("4000\n",), 3000),
-        ((None, "4500\n"), 3500),
-        ((None, "9223372036854771712\n"), 5000),
+        (("max\n", "4500\n"), 3500),
+        (("max\n", "9223372036854771712\n"), 5000),
         (("900\n",), 0),
-    ],
-)
-def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_group(limits, texts, expected):
-    limits(5000, 1000, *texts)
-    assert memory.available() == expected
-
-
-def test_the_available_memory_of_this_computer():
-    assert 2**20 < memory.available() <= psutil.virtual_memory().total
+    ):
+        limits(5000, 1000, *texts)
+        assert memory.available() == expected
 
 
 class Gpu(Reference):
@@ -92,88 +83,55 @@ class Cpu(Reference):
     kind = "cpu"
 
 
-@pytest.mark.parametrize(
-    ("machine", "wanted"), [(Reference(), 30 + memory.TEMPORARY), (Cpu(), 30 + memory.TEMPORARY), (Gpu(), 10)]
-)
-def test_arrays_of_a_cpu_count_for_the_host(machine, wanted, monkeypatch):
-    monkeypatch.setattr(memory, "available", lambda: wanted)
-    memory.require(machine, 20, 10)
-    monkeypatch.setattr(memory, "available", lambda: wanted - 1)
-    with pytest.raises(
-        simdtex.DeviceError, match=r"of this computer's memory and \d+ MiB is available; give a smaller"
-    ):
+def test_the_limits_of_memory_are_exact_and_named(monkeypatch):
+    host = 30 + memory.TEMPORARY
+    for machine, wanted in ((Reference(), host), (Cpu(), host), (Gpu(), 10)):  # arrays of a CPU count for the host
+        monkeypatch.setattr(memory, "available", lambda wanted=wanted: wanted)
         memory.require(machine, 20, 10)
-
-
-def test_the_limits_are_exact_and_named(monkeypatch):
+        monkeypatch.setattr(memory, "available", lambda wanted=wanted: wanted - 1)
+        with pytest.raises(DeviceError, match=r"of this computer's memory and \d+ MiB is available; give a smaller"):
+            memory.require(machine, 20, 10)
     monkeypatch.setattr(memory, "available", lambda: 3 * MEBIBYTE)
     memory.require_host(3 * MEBIBYTE)
-    with pytest.raises(simdtex.DeviceError) as caught:
+    with pytest.raises(DeviceError) as said:
         memory.require_host(3 * MEBIBYTE + 1, "do less")
-    assert str(caught.value) == "this needs about 3 MiB of this computer's memory and 3 MiB is available; do less"
+    assert str(said.value) == "this needs about 3 MiB of this computer's memory and 3 MiB is available; do less"
     machine = Gpu()
     machine.memory = 2 * MEBIBYTE
     memory.require(machine, 2 * MEBIBYTE)
-    with pytest.raises(simdtex.DeviceError) as caught:
+    with pytest.raises(DeviceError) as said:
         memory.require(machine, 2 * MEBIBYTE + 1)
     sentence = "this needs about 2 MiB and reference (NumPy) has 2; give a smaller size or another --device"
-    assert str(caught.value) == sentence
+    assert str(said.value) == sentence
 
 
+ON = {"device": "reference", "rng": 1}
 JOBS = {
-    "mrf": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), device="reference", rng=1),
-    "multires": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="multires", device="reference", rng=1),
-    "pyramid": lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="pyramid", device="reference", rng=1),
-    "solid": lambda: simdtex.synthesize_solid(SAMPLE, (400, 400, 400), device="reference", rng=1),
-    "mix": lambda: simdtex.mix([SAMPLE, SAMPLE], (9000, 9000), device="reference", rng=1),
-    "extend": lambda: simdtex.extend(SAMPLE, right=9000, bottom=9000, order=1, device="reference", rng=1),
-    "simulate": lambda: simdtex.simulate(SAMPLE, 10**6, shape=(99, 99), device="reference", rng=1),
-    "classify": lambda: simdtex.classify(np.zeros((6000, 6000), np.uint8), {"a": SAMPLE}, device="reference", rng=1),
-    "ising": lambda: ising(Reference(), (64, 64), [2.0], "coloring", sweeps=2**27),
+    9952: lambda: simdtex.synthesize(SAMPLE, (9000, 9000), **ON),
+    5485: lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="multires", **ON),
+    15745: lambda: simdtex.synthesize(SAMPLE, (9000, 9000), method="pyramid", **ON),
+    14712: lambda: simdtex.synthesize_solid(SAMPLE, (400, 400, 400), **ON),
+    7907: lambda: simdtex.extend(SAMPLE, right=9000, bottom=9000, order=1, **ON),
+    18755: lambda: simdtex.simulate(SAMPLE, 10**6, shape=(99, 99), **ON),
+    6133: lambda: simdtex.classify(np.zeros((6000, 6000), np.uint8), {"a": SAMPLE}, **ON),
+    81986: lambda: ising(Reference(), (64, 64), [2.0], "coloring", sweeps=2**27),
 }
+"""Runs by the MiB that are asked for, from the bytes for each pixel that benchmarks/memory.py measures."""
 
 
-ASKED = {
-    "mrf": 9952,
-    "multires": 5485,
-    "pyramid": 15745,
-    "solid": 14712,
-    "mix": 15745,
-    "extend": 7907,
-    "simulate": 18755,
-    "classify": 6133,
-    "ising": 81986,
-}
-"""MiB that are asked for, by the bytes for each pixel that benchmarks/memory.py measures."""
-
-
-@pytest.mark.parametrize("job", JOBS)
-def test_a_run_that_does_not_fit_is_refused_before_it_begins(job, monkeypatch):
+def test_a_run_that_does_not_fit_is_refused_before_it_begins(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 2**30)
-    with pytest.raises(simdtex.DeviceError, match=rf"needs about {ASKED[job]} MiB .* and 1024 MiB is available"):
-        JOBS[job]()
-
-
-def test_tiles_are_offered_where_there_are_tiles(monkeypatch):
-    hole = np.zeros(SAMPLE.shape, bool)
-    hole[7, 7] = True
-    monkeypatch.setattr(memory, "available", lambda: memory.TEMPORARY)
-    for job, tiles in (
-        (lambda: simdtex.synthesize(SAMPLE, (9, 9), order=1, device="reference", rng=1), True),
-        (lambda: simdtex.fill(SAMPLE, hole, order=1, device="reference", rng=1), False),
-        (lambda: simdtex.extend(SAMPLE, right=9, order=1, device="reference", rng=1), False),
-        (lambda: simdtex.simulate(SAMPLE, 1, order=1, device="reference", rng=1), False),
-    ):
-        with pytest.raises(simdtex.DeviceError, match="is available; give a smaller size") as said:
+    for asked, job in JOBS.items():
+        words = rf"needs about {asked} MiB .* and 1024 MiB is available; give a smaller size"
+        with pytest.raises(DeviceError, match=words) as said:
             job()
-        assert ("--tiles" in str(said.value)) == tiles
+        assert ("--tiles" in str(said.value)) == (asked == 9952), "they are offered where there are tiles"
 
 
-@pytest.mark.parametrize("shape, values", [((20000, 20000), 8), ((40000, 40000), 4)])
-def test_a_limit_of_counting_says_what_is_counted(shape, values):
-    method = "pyramid" if values == 8 else "multires"
-    with pytest.raises(ValueError, match=f"columns is beyond 2..31 values, {values} for each pixel; give"):
-        simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
+def test_a_limit_of_counting_says_what_is_counted():
+    for method, shape, values in (("pyramid", (20000, 20000), 8), ("multires", (40000, 40000), 4)):
+        with pytest.raises(ValueError, match=f"columns is beyond 2..31 values, {values} for each pixel; give"):
+            simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
 
 
 @functools.cache
@@ -194,14 +152,6 @@ def test_no_run_takes_more_than_was_asked_for(name, channels, dtype, any_device)
     small, side = (24, 80) if kind == "solid" else (128, 1024)
     grown, asked, _ = benchmark().run(kind, small, side, channels, dtype, str(any_device.index), options)
     assert 0.3 * (asked - memory.TEMPORARY) < grown <= asked, "and not far less, but for what is asked for at any size"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["multires", "pyramid"])
-def test_no_run_of_the_reference_takes_more_than_was_asked_for(name):
-    kind, options = benchmark().CASES[name]
-    grown, asked, _ = benchmark().run(kind, 64, 256, 3, "uint8", "reference", options)
-    assert 0 < grown <= asked
 
 
 # -- Progress, and the pace of launches.
@@ -230,14 +180,11 @@ def test_ranges_grow_to_a_tenth_of_a_second_and_shrink_again(clock):
         clock[0] += (end - first) * (1e-4 if first < 10_000 else 1e-3)
     assert sizes[:6] == [10, 40, 160, 640, 1000, 1000], "at most four times the last"
     assert sizes[-2] == 100
-
-
-def test_a_first_range_that_takes_long_is_not_undercut(clock):
     sizes = []
     for first, end in paced(60, 20):
         sizes.append(end - first)
         clock[0] += 10
-    assert sizes == [20, 20, 20]
+    assert sizes == [20, 20, 20], "a first range that takes long is not undercut"
 
 
 def test_progress_has_its_details_and_maps_as_attributes():
@@ -261,53 +208,38 @@ class Event:
         self.waited = True
 
 
-def kernel(name):
-    return SimpleNamespace(function_name=name)
-
-
-def test_a_log_reports_kernels_and_shares():
+def test_a_log_reports_kernels_and_shares_and_does_not_pile_up():
+    fast, slow = SimpleNamespace(function_name="fast"), SimpleNamespace(function_name="slow")
     log = Log(True)
-    log.add(Event(100, 200), kernel("fast"))
-    log.add(Event(250, 550), kernel("slow"))
-    log.add(Event(550, 650), kernel("fast"))
+    for begin, end, kernel in ((100, 200, fast), (250, 550, slow), (550, 650, fast)):
+        log.add(Event(begin, end), kernel)
     log.settle()
-    slow, fast = log.take()["kernels"]
-    assert slow == {"name": "slow", "calls": 1, "seconds": pytest.approx(300e-9), "share": 0.6}
-    assert fast == {"name": "fast", "calls": 2, "seconds": pytest.approx(200e-9), "share": 0.4}
+    assert log.take()["kernels"] == [
+        {"name": "slow", "calls": 1, "seconds": pytest.approx(300e-9), "share": 0.6},
+        {"name": "fast", "calls": 2, "seconds": pytest.approx(200e-9), "share": 0.4},
+    ]
     assert log.take() == {"kernels": []}, "begun anew"
     assert log.seconds == pytest.approx(500e-9)
-
-
-def test_without_profiling_nothing_is_kept():
-    log = Log(False)
-    log.add(Event(0, 1), kernel("a"))
-    assert (log.launches, log.seconds, log.take(), log._pending) == (1, None, None, [])
-
-
-def test_events_do_not_pile_up():
-    log = Log(True)
     events = [Event(2 * i, 2 * i + 1) for i in range(3 * PENDING)]
     for event in events:
-        log.add(event, kernel("a"))
+        log.add(event, fast)
         assert len(log._pending) < PENDING
     assert any(event.waited for event in events)
     log.settle()
     assert log.take()["kernels"][0]["calls"] == len(events)
-
-
-def test_the_kernels_of_a_run_take_its_seconds_on_the_device(any_device):
-    machine = OpenCL(any_device, profile=True)
-    run = simdtex.synthesize(texture((12, 12)), (10, 10), rng=1, order=2, device=machine, full_output=True)[1]
-    total = sum(entry["seconds"] for entry in run.statistics["kernels"])
-    assert total == pytest.approx(run.statistics["device_seconds"])
+    log = Log(False)
+    log.add(Event(0, 1), fast)
+    assert (log.launches, log.seconds, log.take(), log._pending) == (1, None, None, [])
 
 
 def test_statistics_have_kernels_only_where_they_are_measured(any_device):
-    sample = texture((16, 16))
-    for machine in (opencl(any_device), Reference()):
-        run = simdtex.synthesize(sample, (8, 8), order=1, rng=1, device=machine, full_output=True)[1]
-        assert "kernels" not in run.statistics
-        assert machine.profile() is None
+    for machine in (OpenCL(any_device, profile=True), opencl(any_device), Reference()):
+        output = simdtex.synthesize(texture((12, 12)), (8, 8), order=1, rng=1, device=machine, full_output=True)[1]
+        timed = machine.seconds is not None
+        assert ("kernels" in output.statistics) == timed and (timed or machine.profile() is None)
+        if timed:
+            total = sum(entry["seconds"] for entry in output.statistics["kernels"])
+            assert total == pytest.approx(output.statistics["device_seconds"])
 
 
 def test_the_table_and_the_sentence(capsys):
@@ -319,34 +251,13 @@ def test_the_table_and_the_sentence(capsys):
     assert [seconds_text(s) for s in (1.234, 0.01234, 1.234e-6, 123.4)] == ["1.23 s", "12.3 ms", "1.23 us", "123 s"]
 
 
-@pytest.mark.parametrize(
-    ("command", "kernels"),
-    [
-        (("synth", "--order", "1"), "start"),
-        (("synth", "--method", "multires"), "candidates"),
-        (("solid", "--iterations", "1"), "solid_turn"),
-        (("mix", "--iterations", "1"), "sort_scatter"),
-    ],
-)
-def test_profile_prints_a_table(any_device, tmp_path, command, kernels):
-    sample, out = tmp_path / "in.png", tmp_path / ("out.npy" if command[0] == "solid" else "out.png")
-    write(sample, texture((16, 16)))
-    device = ("--device", str(any_device.index), "-q")
-    done = CliRunner().invoke(main, [*command, str(sample), "-o", str(out), "--size", "12", *device, "--profile"])
-    assert done.exit_code == 0, done.output
-    assert kernels in done.output
-    assert "wall time" in done.output
-
-
-def test_the_reference_has_no_profile(tmp_path):
-    sample = tmp_path / "in.png"
-    write(sample, texture((16, 16)))
-    words = ["synth", str(sample), "-o", str(tmp_path / "out.png"), "--device", "reference", "--profile"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 2
-    assert done.output.count("\n") == 1
-    assert "--profile times the kernels of an OpenCL device" in done.output
-    assert not (tmp_path / "out.png").exists()
+def test_profile_prints_a_table_and_the_reference_has_none(any_device, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write("in.png", texture((16, 16)))
+    words = ["synth", "in.png", "-o", "out.png", "--size", "9", "--order", "1", "-q", "--profile", "--device"]
+    refused("--profile times the kernels of an OpenCL device", *words, "reference")
+    done = run(*words, any_device.index)
+    assert done.exit_code == 0 and "start" in done.output and "wall time" in done.output, done.output
 
 
 # -- Machines: memory, caches, threads, forked processes and arguments of `open_machine`.
@@ -416,6 +327,7 @@ def test_a_work_group_is_no_larger_than_a_kernel_allows(any_device):
     assert groups == [((24, 3), (8, 1)), ((20, 3), (4, 1))]
 
 
+CACHES = pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
 OPEN = """
 import sys
 import numpy as np
@@ -425,16 +337,13 @@ print(simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=sys
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
-@pytest.mark.parametrize(
-    "environment",
-    [{"HOME": "FILE", "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}],
-)
-def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environment):
-    (tmp_path / "FILE").touch()
-    environment = {key: value.replace("FILE", str(tmp_path / "FILE")) for key, value in environment.items()}
-    assert python(OPEN, str(cl_device.index), TMPDIR=str(tmp_path), **environment) == ["(4,", "4)"]
-    assert os.listdir(tmp_path) == ["FILE"], "the temporary cache is removed"
+@CACHES
+def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    for environment in ({"HOME": str(file), "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}):
+        assert python(OPEN, str(cl_device.index), TMPDIR=str(tmp_path), **environment) == ["(4,", "4)"]
+        assert os.listdir(tmp_path) == ["file"], "the temporary cache is removed"
 
 
 def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp_path):
@@ -446,7 +355,7 @@ def test_a_short_write_means_that_the_disk_of_the_cache_is_full(monkeypatch, tmp
     assert os.environ["XDG_CACHE_HOME"] != str(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["pocl", "pocl/kcache", "pyopencl", "pytools", "own"])
+@pytest.mark.parametrize("name", ["pocl", "pytools", "own"])
 def test_each_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path, name):
     """The folder refuses temporary files, also if root runs the test."""
     (tmp_path / name).mkdir(parents=True)
@@ -465,7 +374,7 @@ def test_each_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path, na
     assert "POCL_CACHE_DIR" not in os.environ
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
+@CACHES
 @pytest.mark.parametrize(("frame", "words"), [("built", "perhaps a cache is damaged"), ("sync", "run a.py again")])
 def test_a_crash_is_laid_to_a_cache_only_if_a_compilation_was_under_way(monkeypatch, tmp_path, frame, words):
     report = tmp_path / "simdtex" / "crashes.txt"
@@ -479,7 +388,7 @@ def test_a_crash_is_laid_to_a_cache_only_if_a_compilation_was_under_way(monkeypa
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
+@CACHES
 @pytest.mark.parametrize("damaged", ["info", "*.so", "*.bc", "binary", "*.sqlite"])
 def test_a_damaged_cache_is_passed_over(cl_device, tmp_path, damaged):
     """The first process may crash; the next one warns of the folder, and has the device."""
@@ -581,7 +490,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import simdtex
 
-machine = simdtex.open_machine(sys.argv[1], profile=sys.argv[2] == "True")
+machine = simdtex.open_machine(sys.argv[1], profile=True)
 sample = np.random.default_rng(0).integers(0, 256, (20, 18), dtype=np.uint8)
 METHODS = [{"order": 2, "levels": 2}, {"method": "multires"}, {"method": "pyramid", "iterations": 1}]
 
@@ -591,14 +500,13 @@ def run(i):
 alone = [run(i) for i in range(6)]
 sys.setswitchinterval(1e-5)  # threads are switched often
 with ThreadPoolExecutor(6) as pool:
-    together = list(pool.map(run, [*range(6)] * 3))
+    together = list(pool.map(run, [*range(6)] * 2))
 print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), len(set(alone)))
 """
 
 
-@pytest.mark.parametrize("profile", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, profile):
-    assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
+def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device):
+    assert python(THREADS, str(cl_device.index)) == ["0", "6"]
 
 
 FORK = """
@@ -636,20 +544,11 @@ def test_a_forked_process_raises_instead_of_hanging(cl_device):
     assert python(FORK, str(cl_device.index)) == [*"111111", "True"]
 
 
-class Other:
-    """Neither a text nor a machine."""
-
-    def __repr__(self):
-        return "another object"
-
-
-@pytest.mark.parametrize("wrong", [1.0, b"0", [], (), {}, True, Other()], ids=repr)
-def test_another_type_of_device_is_a_type_error(wrong):
+def test_another_type_of_device_is_a_type_error():
     sentence = r"^device must be a text, an index, a DeviceInfo, an open machine or None, but it is a \w+\.$"
-    with pytest.raises(TypeError, match=sentence):
-        simdtex.open_machine(wrong)
-    with pytest.raises(TypeError, match=sentence):
-        simdtex.synthesize(np.eye(8), (4, 4), order=1, device=wrong)
+    for wrong in (1.0, b"0", [], True, object()):
+        with pytest.raises(TypeError, match=sentence):
+            simdtex.open_machine(wrong)
 
 
 def test_the_compilers_warnings_are_not_printed(cl_device, capfd):

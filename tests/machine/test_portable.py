@@ -8,7 +8,7 @@ from portable import Build
 
 from simdtex.machine.opencl import kernel_folder
 
-pytestmark = pytest.mark.skipif(not portable.CLANG, reason=portable.NO_CLANG)
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not portable.CLANG, reason=portable.NO_CLANG)]
 
 MOST_SCRATCH = {"mrf/relax": 640, "mrf/lcpdf": 2304}
 """Bytes of scratch that kernels of a file may take on a gfx1100, of others 640: more than the largest in the table."""
@@ -33,7 +33,7 @@ def tabled() -> list[Build]:
 FILES = {file: list(found) for file, found in groupby(sorted(tabled()), lambda build: build.file)}
 
 
-@pytest.mark.parametrize("vector", [1, pytest.param(16, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("vector", [1, 16])
 @pytest.mark.parametrize("file", FILES)
 def test_no_result_is_left_to_the_device(file, vector):
     """OpenCL allows a division 2.5 ulp and a square root 3, and some compilers contract in spite of the pragma."""
@@ -69,7 +69,6 @@ def test_what_is_left_to_a_device_is_found(monkeypatch):
     assert found == [5, 6, 7, 8, 9, 10]
 
 
-@pytest.mark.slow
 def test_the_table_has_what_default_runs_build_and_a_limit_on_scratch(any_device):
     known = portable.recorded()
     assert portable.builds() == list(known), "make portable writes the table"

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.driver import Device, Kept, Seed, SingleRun, check_shape, check_sides, run, with_channels_last
+from simdtex.driver import Device, Kept, Seed, SingleRun, run
+from simdtex.inputs import check_shape, check_sides, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.methods.pyramid import solid
 from simdtex.methods.pyramid.mixtures import Mixture
@@ -159,10 +160,8 @@ def _check_samples(samples: Sequence[ArrayLike], channel_axis: int | None) -> li
         raise ValueError("there is no sample; give one or more")
     channels = max(p.shape[-1] for p in pictures)
     for number, p in enumerate(pictures):
-        if p.dtype != pictures[0].dtype:
-            raise TypeError(
-                f"sample {number} is of {p.dtype} and the first of {pictures[0].dtype}; convert them to one type"
-            )
+        if p.dtype != (first := pictures[0].dtype):
+            raise TypeError(f"sample {number} is of {p.dtype} and the first of {first}; convert them to one type")
         if p.shape[-1] not in (1, channels):
             raise ValueError(
                 f"sample {number} has {p.shape[-1]} channels and another {channels}; give all the same, or grey ones"

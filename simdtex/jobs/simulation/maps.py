@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import digest
-from simdtex.driver import check_sides
-from simdtex.inputs import Inputs, Placing, as_known, check_mask, check_samples
+from simdtex.inputs import Inputs, Placing, as_known, check_mask, check_samples, check_sides
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.io.image import AXES, as_array
 from simdtex.io.places import Location, ascending, located

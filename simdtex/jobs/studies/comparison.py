@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex import schedules as known
-from simdtex.driver import check_shape
+from simdtex.inputs import check_shape
 from simdtex.io.image import check_sample
 from simdtex.jobs.studies.quality import COPIED_PATCH, as_planes, measure
 from simdtex.jobs.synthesis.job import synthesize

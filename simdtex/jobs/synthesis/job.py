@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_channels_last
-from simdtex.inputs import check_inputs, check_samples
+from simdtex.driver import Device, Kept, Seed, drive, run
+from simdtex.inputs import check_inputs, check_samples, check_shape, with_channels_last
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.tiles.job import TileStore
 from simdtex.machine import Machine, open_machine

@@ -15,8 +15,8 @@ from scipy import ndimage
 
 from simdtex import random
 from simdtex.checkpoint import Checkpointing
-from simdtex.driver import Device, Kept, Seed, check_shape, drive, run, with_channels_last
-from simdtex.inputs import check_samples
+from simdtex.driver import Device, Kept, Seed, drive, run
+from simdtex.inputs import check_samples, check_shape, with_channels_last
 from simdtex.jobs.tilesets.corners import CYCLE, TORUS, corners_of, torus
 from simdtex.machine import Machine
 from simdtex.maspar import observers
