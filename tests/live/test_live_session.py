@@ -23,9 +23,9 @@ from simdtex.io.image import read_bytes
 from simdtex.jobs.classification import algorithm
 from simdtex.live import frames, results
 from simdtex.live import session as sessions
-from simdtex.live.frames import Layer, Window, parse_window, render
+from simdtex.live.frames import Layer, View, parse_view, render
 from simdtex.live.job import LABELS, LIGHT, TABLES, Picture, controls, paint
-from simdtex.live.results import BARS, FILM_FRAMES, SET_COLOURS, Results
+from simdtex.live.results import BARS, FILM_FRAMES, SET_COLOURS, PageResults
 from simdtex.live.session import FILMED, Levels
 from simdtex.methods import mrf
 from simdtex.model.display import read_labels
@@ -504,7 +504,7 @@ def test_a_file_that_is_no_picture_is_refused(opened, monkeypatch):
 
 
 def test_an_unforeseen_error_is_told_without_its_words(opened, monkeypatch, caplog):
-    monkeypatch.setattr(sessions, "Job", lambda *_: 1 / 0)
+    monkeypatch.setattr(sessions, "PageJob", lambda *_: 1 / 0)
     assert opened.error(**asked()) == "this is an error in simdtex itself; the terminal says more"
     assert "ZeroDivisionError" in caplog.text
 
@@ -513,7 +513,7 @@ def test_few_results_are_kept(monkeypatch):
     monkeypatch.setattr(results, "Result", lambda _, job, *__: SimpleNamespace(arrays=[np.zeros(job, np.uint8)]))
     monkeypatch.setattr(results, "MAX_RESULTS", 3)
     monkeypatch.setattr(results, "MAX_BYTES", 100)
-    kept = Results()
+    kept = PageResults()
     for size, left in ((10, [1]), (10, [1, 2]), (10, [1, 2, 3]), (10, [2, 3, 4]), (95, [5]), (1000, [6])):
         kept.add(size, None, None, 0.0)
         assert list(kept) == left
@@ -695,7 +695,7 @@ def test_labels_lie_over_a_picture(channels, dtype):
     own = pixels.reshape(4, 6, -1)
     own = (own[..., :3] if own.shape[2] > 2 else own[..., :1]).astype(int) * np.ones(3, int)
     for shares in ([0.5, 0.5, 0.5], [0, 0.25, 1]):
-        found = render(frames.overlay(pixels, labels, colours, shares), Window(width=6, height=4))
+        found = render(frames.overlay(pixels, labels, colours, shares), View(width=6, height=4))
         shown = np.frombuffer(found.pixels, np.uint8).reshape(4, 6, 4)[..., :3]
         share = np.array(shares)[labels][..., None]
         np.testing.assert_array_equal(shown, np.floor(own * (1 - share) + colours[labels] * share))
@@ -707,7 +707,7 @@ def test_labels_lie_over_a_picture(channels, dtype):
 )
 def test_a_window_of_a_layer(left, top, width, height, step, tiled):
     values = np.random.default_rng(0).integers(0, 256, (20, 24, 3), np.uint8)
-    found = render(Layer((20, 24), values, np.asarray), Window("picture", left, top, width, height, step, tiled))
+    found = render(Layer((20, 24), values, np.asarray), View("picture", left, top, width, height, step, tiled))
     shown = np.frombuffer(found.pixels, np.uint8).reshape(found.height, found.width, 4)
     padded = np.pad(values.astype(float), ((200, 200), (200, 200), (0, 0)), "wrap" if tiled else "edge")
     for row in range(found.height):
@@ -722,14 +722,14 @@ def test_a_window_of_a_layer(left, top, width, height, step, tiled):
 
 def test_a_coarse_level_stands_for_the_whole():
     values = np.arange(9, dtype=np.uint8).reshape(3, 3)
-    found = render(Layer((6, 6), values, np.asarray), Window(width=6, height=6))
+    found = render(Layer((6, 6), values, np.asarray), View(width=6, height=6))
     shown = np.frombuffer(found.pixels, np.uint8).reshape(6, 6, 4)[..., 0]
     np.testing.assert_array_equal(shown, values.repeat(2, 0).repeat(2, 1))
 
 
 def test_parts_of_a_large_window_are_the_same(monkeypatch):
     values = np.random.default_rng(0).integers(0, 256, (40, 40), np.uint8)
-    layer, window = Layer((40, 40), values, np.asarray), Window(width=14, height=14, step=3)
+    layer, window = Layer((40, 40), values, np.asarray), View(width=14, height=14, step=3)
     whole = render(layer, window)
     monkeypatch.setattr(frames, "CHUNK", 3 * 3 * 14 * 2)
     assert render(layer, window) == whole
@@ -737,7 +737,7 @@ def test_parts_of_a_large_window_are_the_same(monkeypatch):
 
 @pytest.mark.slow
 def test_a_coarse_window_of_a_tiled_layer_takes_little_memory():
-    window = parse_window({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
+    window = parse_view({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
     layer = Layer((512, 2**14), np.zeros((512, 2**14, 3), np.uint8), np.asarray)
     tracemalloc.start()
     found = render(layer, window)
