@@ -108,9 +108,6 @@ class Page:
     def choose(self, label, text):
         Select(self.labelled(label)).select_by_visible_text(text)
 
-    def open(self, selector):
-        self.script("document.querySelector(arguments[0]).open = true", selector)
-
     def download(self, name):
         """Download a file of the result: its bytes."""
         self.script("arguments[0].click()", self.one(f".result [data-file='{name}']"))
@@ -198,7 +195,6 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     assert page.command[:5] == ["simdtex", "synth", "wall.png", "-o", "texture.png"]
     page.assert_command_repeats(wall.parent)
     assert f"{width} \u00d7 {height} in " in page.one(".doing").text
-    assert page.script("return page.frames") >= 1
     assert page.sees(np.array(PIL.Image.open(wall.parent / "texture.png"))), "the pixels are seen as they are"
 
 
@@ -214,9 +210,8 @@ def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
     until(lambda: page.status == "Paused.")
     page.script("return new Promise((done) => setTimeout(done, 300))")  # what was on its way arrives
     before = page.script("return page.frames")
-    doing = page.one(".doing").text
     page.script("return new Promise((done) => setTimeout(done, 700))")
-    assert (page.script("return page.frames"), page.one(".doing").text, page.results) == (before, doing, 1)
+    assert (page.script("return page.frames"), page.results) == (before, 1)
     Select(page.labelled("Layer")).select_by_value("temperature")
     until(lambda: page.script("return page.seen") == "temperature")
     page.button("Resume").click()
@@ -243,9 +238,6 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
         hole, before, after = (
             np.array(PIL.Image.open(archive.open(name))) for name in ("hole.png", "result-1.png", "texture.png")
         )
-    page.button("Make").click()
-    page.script("return new Promise((done) => setTimeout(done, 300))")
-    assert not page.script("return page.running") and page.results == 2, "another place is no change of the settings"
     assert 0 < (hole > 0).mean() < 0.2
     assert (before[hole == 0] == after[hole == 0]).all()
     assert (before[hole > 0] != after[hole > 0]).any()
@@ -263,23 +255,20 @@ def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     page.paint("Label 3", 60, 10, 60, 38)
     page.result(1)
     assert not page.one(".hint").text and not page.all("[role=alert]:not([hidden])")
-    page.script("page.make(); page.pause()")
-    until(lambda: page.script("return page.watching"))
-    page.paint("Label 3", 50, 10, 70, 10)  # during the run, which begins again
+    page.paint("Label 3", 50, 10, 70, 10)
     page.result(2)
-    assert page.script("return page.painting.strokes.sample.length") == 3
     ActionChains(page.driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
     page.result(3)  # without the last stroke
     page.button("Redo").click()
     page.result(4)
+    assert page.script("return page.painting.strokes.sample.length") == 3
     page.script("page.go('make'); clearTimeout(page.waiting)")  # which hides the strokes
     (tmp_path / "strokes.png").write_bytes(page.download("strokes.png"))
     page.assert_command_repeats(tmp_path)
     labels = np.array(PIL.Image.open(tmp_path / "labels.png"))
     painted = np.array(PIL.Image.open(tmp_path / "strokes.png"))
     assert set(np.unique(painted)) == {0, 1, 3} and painted[10, 50] == painted[38, 60] == 3
-    colours = LABELS[labels]
-    until(lambda: page.sees((striped().astype(int) + colours) // 2))
+    until(lambda: page.sees((striped().astype(int) + LABELS[labels]) // 2))
     wanted = zip(("Unknown", "Label 1", "Label 3"), [(labels == label).sum() for label in (0, 1, 3)], strict=True)
     assert page.one(".classes").text.split("\n") == [f"{name}: {100 * n / labels.size:.1f} %" for name, n in wanted]
 
@@ -325,25 +314,7 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     until(lambda: list(page.folder.glob("texture*.png"))).pop().unlink()
 
 
-def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
-    with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
-        page = Page(chromium, address)
-        port = address.split(":")[2].split("/")[0]
-        page.script("page.auto = false")
-        page.put("Size of features (order)", 4)
-        drop(page.driver, wall)
-        until(lambda: page.script("return page.running"))
-        process.kill()
-        until(lambda: page.alert.startswith("The connection to simdtex is lost."))
-        assert page.status == "Not connected."
-    with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN):
-        page.result(1)  # the page has given the picture again, and asked for the same
-        assert not page.all("[role=alert]:not([hidden])")
-    chromium.close()
-    chromium.switch_to.window(chromium.window_handles[0])
-
-
-def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_path):
+def test_a_killed_server_is_told_and_a_new_one_is_given_the_picture_and_its_map(chromium, wall, tmp_path):
     (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
@@ -354,10 +325,12 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
         drop(page.driver, tmp_path / "normal.png", place=".maps")
         until(lambda: len(page.all(".maps li")) == 1)
         process.kill()
-        until(lambda: page.alert)
+        until(lambda: page.alert.startswith("The connection to simdtex is lost."))
+        assert page.status == "Not connected."
     with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN) as (process, _):
         until(lambda: page.results)
         assert page.one(".maps li").get_attribute("textContent").startswith("normal")
+        assert not page.all("[role=alert]:not([hidden])")
         page.driver.refresh()
         until(lambda: page.script("return Boolean(window.page && page.picture)"))
         process.kill()
@@ -384,14 +357,11 @@ def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, 
     assert page.labelled("Coherence").get_attribute("value") == "1.5"
 
 
-FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
-
-
 def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
     drop(page.driver, wall)
     page.result(1)
-    bad = [one.get_attribute("outerHTML")[:80] for one in page.all(f":is({FOCUS}):not([data-lm-suppress-shortcuts])")]
-    assert not bad and len(page.all(FOCUS)) > 30
+    controls = page.all("button, input, select, summary, textarea, a[href], [tabindex]")
+    assert len(controls) > 30 and all(one.get_attribute("data-lm-suppress-shortcuts") is not None for one in controls)
 
 
 def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
@@ -418,13 +388,8 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
         for selector in ("canvas.preview", "canvas.view"):
             assert swipe(selector) > 30, selector
             swipe(selector, across=2, down=-1)
-        page.script(
-            "const c = page.preview; c.setPointerCapture = () => {}; const b = c.getBoundingClientRect();"
-            "for (const [kind, by] of [['down', 5], ['move', 40], ['up', 40]]) c.dispatchEvent(new PointerEvent("
-            "`pointer${kind}`, {pointerType: 'touch', clientX: b.x + by, clientY: b.y + by}))"
-        )  # a browser that waits longer than Chromium before it takes a finger for a swipe
         assert page.script("return [page.part, page.view.fitted]") == [None, True]
-        page.script("delete page.preview.setPointerCapture; page.chooseByFinger(true)")
+        page.script("page.chooseByFinger(true)")
         assert abs(swipe("canvas.preview")) < 30  # what stands above it may have changed its height
         assert page.script("return page.part") is not None
         page.result(2)
@@ -438,10 +403,6 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
 def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall):
     assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed()
     assert [one.text for one in page.all(".examples button")] == ["tissue", "brick", "grass", "gravel"]
-    pixels = (
-        "const c = arguments[0]; return new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size"
-    )
-    assert all(page.script(pixels, one) > 20 for one in page.all(".examples canvas"))
     drop(page.driver, wall, place=".start")
     page.result(1)
     assert not page.one(".start").is_displayed()
@@ -453,22 +414,6 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         assert 0 < run["top"] < run["bottom"] <= page.script("return innerHeight"), "the run is always in reach"
 
 
-def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
-    shown(page.driver, width=1280, height=720)
-    drop(page.driver, wall)
-    page.result(1)
-    view = page.one("canvas.view").rect
-    for selector in (".strip button:not(.current button)", ".result [data-file='texture.zip']"):
-        rect = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.all(selector)[-1])
-        assert rect["left"] >= view["x"] + view["width"] and rect["bottom"] <= 720
-    page.script(
-        "window.heights = new Set(); const seen = () => { heights.add(document.querySelector('.result').scrollHeight);"
-        "requestAnimationFrame(seen) }; seen(); page.setPart([0, 0, 40, 40])"
-    )
-    page.result(2)
-    assert len(page.script("return [...heights]")) == 1
-
-
 def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -478,17 +423,11 @@ def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
     until(lambda: page.status == "Result 1 is shown.")
     page.script("page.send({kind: 'resume'})")
     until(lambda: page.status == "Result 2 is ready; result 1 is shown.")
-    page.script(
-        "document.querySelector('.columns').style.paddingBottom = '2000px'; scrollTo(0, 1e6);"
-        "page.options.mrf.values = {finish: 99}"
-    )
-    page.script("page.make()")
+    page.script("page.options.mrf.values = {finish: 99}; page.make()")
     until(lambda: page.alert.startswith("Soften seams (finish) is 99; "))
-    box = page.script("return document.querySelector('[role=alert]').getBoundingClientRect().toJSON()")
-    assert page.script("return scrollY") > 300 and 0 <= box["top"] < box["bottom"] <= 1000
     strokes = "[{label: 1, width: 20, points: [[30, 30]]}]"
     page.script(f"page.setTask('guide'); page.painting.change({{sample: {strokes}, output: {strokes}, hole: []}})")
-    page.script("page.options.mrf.values = {}; page.make(); page.showLayer('picture'); scrollTo(0, 0)")
+    page.script("page.options.mrf.values = {}; page.make(); page.showLayer('picture')")
     until(lambda: page.script("return page.view.panes[0].frame.of === 3 && !page.view.drawing"))
     over = page.canvas()
     page.script("page.place = 'make'")
@@ -507,7 +446,6 @@ def test_a_size_and_a_seed_are_chosen_and_results_say_what_changed(page, wall):
     page.script("page.auto = false")
     drop(page.driver, wall)
     page.result(1)
-    assert page.one(".badge").is_displayed(), "it tiles"
     page.script("arguments[0].click()", page.one("[aria-label='256 \u00d7 256']"))
     page.button("Make the texture").click()
     page.result(2)
@@ -520,8 +458,6 @@ def test_a_size_and_a_seed_are_chosen_and_results_say_what_changed(page, wall):
     assert captions() == [*said, *(f"seed {one}" for one in seeds[3:])]
     page.script("arguments[0].click()", page.one("[aria-label='Delete result 6']"))
     until(lambda: page.results == 5 and page.script("return page.shown") == 5)
-    held = "page.view.canvas.dispatchEvent(new KeyboardEvent(arguments[0], {key: 't'})); return page.tiled"
-    assert [page.script(held, kind) for kind in ("keydown", "keyup")] == [True, False]
     page.driver.refresh()
     until(lambda: page.script("return Boolean(window.page && page.found)"))
     assert page.results == 5
@@ -533,7 +469,6 @@ def test_dropped_files_are_one_material(page, tmp_path):
         path.write_bytes(png(texture(64, 72, seed=seed)))
     drop(page.driver, *paths)
     page.result(1)
-    page.result(2) if page.script("return page.found.layers.length") < 7 else None
     assert page.script("return [page.picture.name, page.maps]") == ["wall_albedo.png", ["wall-normal", "wall-height"]]
     until(lambda: "map wall-height" in page.script("return page.found ? page.found.layers : []"))
     paths[0].write_bytes(png(texture(32, 32)))
@@ -552,19 +487,12 @@ def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     assert "further frames or pages; this is the first" in page.one(".named").text
     slider = "return document.querySelector(`[aria-label='${arguments[0]}, slider']`).value"
     assert float(page.script(slider, "Soften seams (finish)")) == 1.5
-    field = page.labelled("Size of features (order)")
-    for value, words in ((1000, "More than 40: a run can take many times as long"), (20, "")):
-        page.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", field, value)
-        note = field.find_element(By.XPATH, "..//small[@class='beyond']").get_attribute("textContent")
-        assert note.startswith(words) and bool(note) == bool(words)
     assert not page.one(".legend").is_displayed()
     page.choose("Layer", "Temperature")
     until(lambda: page.one(".legend").text.startswith("Black: settled."))
     assert "gradient" in page.one(".scale").value_of_css_property("background-image")
-    page.script("page.going = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
-    assert page.one(".doing").text == "Preparing the sample.", "a new run does not show the last one's level"
-    small = "[new Uint8Array(4)]"
-    page.script("page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")")
+    more = "{...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}"
+    page.script(f"page.on_result({more}, [new Uint8Array(4)])")
     assert "Result 1 is no longer kept" in page.status
 
 
@@ -578,7 +506,7 @@ def test_nothing_keeps_people_out(page, wall, dark):
     assert page.faults() == []
 
 
-@pytest.mark.parametrize(("window", "cell"), [(320, None), (390, None), (820, None), (1400, 300), (1400, 850)])
+@pytest.mark.parametrize(("window", "cell"), [(320, None), (820, None), (1400, 300)])
 def test_it_fits_a_phone_and_a_cell_of_a_notebook(page, wall, window, cell):
     shown(page.driver, width=window)
     if cell:
@@ -653,53 +581,36 @@ def test_a_click_explains_a_pixel(inside):
     assert inside.faults() == []
 
 
-def test_the_time_line_steps_and_plays(inside):
+def test_the_line_of_time_steps_plays_and_is_a_slider_for_the_pointer_and_for_keys(inside):
     assert at(inside) is None
     sweeps = inside.script("return page.inside.sweeps")
-    back, forth = (inside.one(f"[aria-label='A set of sites {way}']") for way in ("back", "on"))
     inside.one("[aria-label='A sweep back']").click()
     until(lambda: at(inside) == [len(sweeps) - 1, 2])
-    back.click()
+    inside.one("[aria-label='A set of sites back']").click()
     until(lambda: at(inside) == [len(sweeps) - 1, 1])
     until(lambda: inside.script("return page.seen") == "sets")
     assert "set 1 of 2" in inside.one(".moment").text
-    shown_there = inside.canvas()
-    magenta = (shown_there[..., :3] == [255, 30, 155]).all(-1).mean() / (shown_there[..., 3] > 0).mean()
+    seen = inside.canvas()
+    magenta = (seen[..., :3] == [255, 30, 155]).all(-1).mean() / (seen[..., 3] > 0).mean()
     assert 0.2 < magenta < 0.6, "half of the sites have relaxed last"
-    forth.click()
-    forth.click()
-    until(lambda: at(inside) is None)
     inside.script("page.inside.seek(0, 0)")
     until(lambda: at(inside) == [0, 0])
     inside.button("Play").click()
     until(lambda: at(inside) is not None and at(inside)[0] > 3)
     inside.button("Stop").click()
-    seen = at(inside)
-    assert 3 < seen[0] < len(sweeps)
-
-
-def test_the_line_of_time_is_a_slider_for_the_pointer_and_for_keys(inside):
-    sweeps = inside.script("return page.inside.sweeps")
+    assert 3 < at(inside)[0] < len(sweeps)
     line = inside.one("[role=slider][aria-label=Time]")
     bands = [one.text for one in inside.all(".band > span")]
     assert bands[-2:] == ["level 0 (full size)", "result"] and "level 1 (half size)" in bands
     cells = inside.all(".sweep")
-    assert len(cells) == len(sweeps) + 1
-    heights = inside.script(
-        "return [...document.querySelectorAll('.sweep i')].map((one) => parseFloat(one.style.height))"
-    )
+    heights = inside.script("return [...document.querySelectorAll('.sweep i')].map((i) => parseFloat(i.style.height))")
     np.testing.assert_allclose(heights, [100 * one[4] for one in sweeps], atol=0.01)
-    line.send_keys(Keys.HOME)
-    until(lambda: at(inside) == [0, 0])
-    for keys, moment in ((Keys.ARROW_RIGHT, [0, 1]), (Keys.ARROW_UP, [1, sweeps[1][2]]), (Keys.ARROW_LEFT, [1, 1])):
+    up, down = [1, sweeps[1][2]], [0, sweeps[0][2]]
+    moves = {Keys.HOME: [0, 0], Keys.ARROW_RIGHT: [0, 1], Keys.ARROW_UP: up, Keys.ARROW_LEFT: [1, 1]}
+    for keys, moment in (moves | {Keys.ARROW_DOWN: down, Keys.END: None}).items():
         line.send_keys(keys)
         until(lambda moment=moment: at(inside) == moment)
         assert line.get_attribute("aria-valuetext") == inside.one(".moment").text
-    line.send_keys(Keys.ARROW_DOWN)
-    until(lambda: at(inside) == [0, sweeps[0][2]])
-    assert float(line.get_attribute("aria-valuenow")) == 1
-    line.send_keys(Keys.END)
-    until(lambda: at(inside) is None)
     assert line.get_attribute("aria-valuenow") == line.get_attribute("aria-valuemax")
     drag = ActionChains(inside.driver).move_to_element(cells[2]).click_and_hold()
     drag.move_to_element(cells[4]).release().perform()
@@ -748,9 +659,6 @@ def test_a_pixel_is_watched_from_run_to_run(inside):
     assert inside.one(".moment").text.startswith("Level 0, sweep 2 of")
     inside.choose("Beside it", "Result 3")
     until(lambda: "Result 3 beside it: Bandwidth 0.5 to 0.15." in inside.one(".captions").text)
-    inside.script("page.send({kind: 'inside', open: true, beside: 99}); page.inside.looking = true")
-    until(lambda: "no longer kept" in inside.one(".inside > [role=status]").text)
-    assert not inside.one(".line").is_displayed() and not inside.script("return page.inside.open")
 
 
 def test_a_link_brings_a_look_into_an_example_back(inside, served):
@@ -771,12 +679,6 @@ def test_a_link_brings_a_look_into_an_example_back(inside, served):
         assert explained(other)["pixel"] == [20, 31]
         other.script("location.hash = '#granite&size=40,24'")
         until(lambda: 'no example "granite"' in other.alert)
-        other.script("location.hash = '#gravel&size=40,24&order=2'")
-        until(
-            lambda: (
-                other.script("return [page.picture.name, page.results.get(page.shown)?.width]") == ["gravel.png", 40]
-            )
-        )
     finally:
         other.driver.close()
         other.driver.switch_to.window(inside.handle)
@@ -806,9 +708,6 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
         assert now == wanted
         settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")
         assert settings == [{"order": 4, "schedule": "checkerboard"}, {"order": 4}]
-        path.write_text("{}")
-        drop(other.driver, path, place=".result")
-        until(lambda: "no view" in other.alert)
     finally:
         other.driver.close()
         other.driver.switch_to.window(inside.handle)
@@ -824,19 +723,6 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
     assert inside.one(".inside > [role=status]").text == ""
     inside.script("page.connection.socket.close()")
     until(lambda: inside.script("return !page.inside.open"))
-
-
-def test_the_pane_beside_says_that_it_is_being_computed_and_tables_are_not_clipped(inside):
-    pane = inside.one("canvas.beside")
-    inside.script("page.connection.send = () => {}; page.inside.look(2)")
-    words = "const c = arguments[0]; return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(Boolean)"
-    until(lambda: pane.is_displayed() and inside.script(words, pane), 5)
-    inside.script("page.inside.failed('')")
-    assert not pane.is_displayed()
-    inside.script("delete page.connection.send; page.inside.pixel = [20, 30]; page.inside.look(2)")
-    until(lambda: len(inside.all(".wide")) == 2)
-    for table in inside.all(".wide"):
-        assert inside.script("return arguments[0].scrollWidth - arguments[0].clientWidth", table) <= 0
 
 
 CHANCES = "return [...document.querySelectorAll('.reason .bars')].map((one) => one.textContent);"
