@@ -521,8 +521,7 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
-FIELDS = "name result what layer left top width height step tiled job method seed options part guide hole of open"
-FIELDS += " beside level sweep sets row col"
+FIELDS = "name result layer left width step tiled job method seed options part guide hole of open beside level sets row"
 KINDS = "hello open example map unmap pause resume cancel view shown select download inside seek explain schedules"
 
 
