@@ -124,7 +124,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
     }
     longest = max(*cube.shape[:2], len(block))
     least, most = -(-longest // size), max(1, size // longest)  # whole factors that reduce and enlarge all
-    shown = [(name, magnified(fitted(one, -(-max(one.shape[:2]) // least)), most)) for name, one in pictures.items()]
+    shown = [(name, magnified(fitted(part, -(-max(part.shape[:2]) // least)), most)) for name, part in pictures.items()]
     return contact_sheet(shown, path, columns=4, scale=1)
 
 
@@ -224,5 +224,5 @@ class StageWriter:
 
 def common_scale(pictures: Sequence[NDArray[Any]]) -> int:
     """Return the whole factor for all pictures: the smallest is about `SHOWN_SIDE` wide, the largest at most twice."""
-    sides: list[int] = [max(one.shape[:2]) for one in pictures]
+    sides: list[int] = [max(picture.shape[:2]) for picture in pictures]
     return max(1, min(round(SHOWN_SIDE / min(sides)), 2 * SHOWN_SIDE // max(sides)))

@@ -160,13 +160,13 @@ def benchmark_table(entry: dict[str, Any]) -> Table:
 
 def version_lines() -> list[str]:
     """Return the versions of simdtex and of its libraries, and the default device or the reason why none works."""
-    found = [
+    lines = [
         f"simdtex {version('simdtex')}",
         f"Python {platform.python_version()}, NumPy {version('numpy')}, pyopencl {version('pyopencl')}",
     ]
     try:
         device = find()
     except DeviceError as error:
-        return [*found, str(error)]
+        return [*lines, str(error)]
     driver = f", {device.version}, driver {device.driver}" if device.version else ""
-    return [*found, f"{device}{driver}"]
+    return [*lines, f"{device}{driver}"]
