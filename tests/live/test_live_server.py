@@ -295,32 +295,18 @@ class Deadly:
         return os._exit, (3,)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("a.png", "a.png is not an image"), pytest.param(Deadly(), "ends the process", marks=pytest.mark.slow)],
-)
-def test_a_file_is_read_in_a_process_of_its_own(name, words):
-    with pytest.raises(ValueError, match=words):
-        sessions.read_apart(name, b"hello")
+def test_a_file_is_read_in_a_process_of_its_own(monkeypatch):
+    with pytest.raises(ValueError, match=r"a\.png is not an image"):
+        sessions.read_apart("a.png", b"hello")
+    monkeypatch.setattr(sessions, "READ_WAIT", 0.0)
+    with pytest.raises(ValueError, match="cannot be read within 0 s"):
+        sessions.read_apart("a.png", b"hello")
 
 
 @pytest.mark.slow
-def test_a_reading_that_lasts_too_long_is_ended_and_waits_for_no_other_page(monkeypatch, port):
-    first, second, read = Client(port), Client(port), sessions.read_apart
-    both = threading.Barrier(2)  # which none passes before the other is read too
-
-    def reading(name, data):
-        both.wait(60)
-        monkeypatch.setattr(sessions, "READ_WAIT", 0.0 if name == "a.png" else 60.0)
-        both.wait(60)
-        return read(name, data)
-
-    monkeypatch.setattr(sessions, "read_apart", reading)
-    for name, kind in (("b.png", "picture"), ("a.png", "error")):
-        for page in (first, second):
-            page.say(png(texture()), kind="open", name=name)
-        answers = [page.wait(kind)[0] for page in (first, second)]
-    assert all("a.png cannot be read within 0 s" in answer["text"] for answer in answers)
+def test_a_file_that_crashes_its_reader_is_told():
+    with pytest.raises(ValueError, match="ends the process that reads it: save it again as PNG"):
+        sessions.read_apart(Deadly(), b"")
 
 
 def test_a_server_ends_while_a_file_is_read_and_a_page_does_not_read(monkeypatch):

@@ -122,11 +122,17 @@ def test_the_command_of_a_result_repeats_its_bytes(opened, case, tmp_path, monke
     assert_command_repeats(opened, result["result"], tmp_path, monkeypatch)
 
 
-def test_the_command_of_a_classification_repeats_its_bytes(page, tmp_path, monkeypatch):
+def test_a_classification_is_shown_over_the_picture_and_its_command_repeats_its_bytes(
+    page, every_frame, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(algorithm, "WORK", 2**25)
     pixels = np.dstack([striped(), np.where(striped(1) > 90, 255, 100).astype(np.uint8)])
     page.ask("picture", png(pixels), kind="open", name="Labels.png")
     page.ask("maps", png(pixels), kind="map", name="h.png")
+    page.ask("frame", layer="labels", **WINDOW | {"width": 96})
+    after = len(page.got)
     result = page.result(job="classify", guide=strokes(1, 3), part=[0, 0, 20, 20])
+    page.wait("frame", after=after, of=1)
     assert (result["width"], result["height"], result["layers"]) == (96, 48, ["sample", "labels"])
     assert result["files"] == ["labels.png", "strokes.png", "labels.zip"]
     command = shlex.split(result["command"])
@@ -134,29 +140,17 @@ def test_the_command_of_a_classification_repeats_its_bytes(page, tmp_path, monke
     labels, painted = page.latest.image, page.latest.job.files["strokes.png"]
     assert np.unique(painted).tolist() == [0, 1, 3]
     assert (labels[:, :36] == 1).mean() > 0.3 and not (labels[:, :36] == 3).any()
-    assert [label for label, _ in result["shares"]] == [0, 1, 3], "the labels as they are painted"
-    counted = [(labels == label).mean() for label in (0, 1, 3)]
-    np.testing.assert_allclose([share for _, share in result["shares"]], counted)
+    assert result["shares"] == [(label, pytest.approx((labels == label).mean())) for label in (0, 1, 3)]
+    assert page.wait("begun")[0]["layers"] == ["labels", "sample"]
+    sent = [(one, buffers) for one, buffers in page.got[after:] if one["kind"] == "frame" and one["of"] != "sample"]
+    assert {one["layer"] for one, _ in sent} == {"labels"} and len(sent) > 4
+    first, *_, last = [np.frombuffer(data, np.uint8).reshape(48, 96, 4)[..., :3] for _, (data,) in sent]
+    plain = (first == striped()).all((1, 2))
+    assert not plain[0] and plain[-1] and (np.diff(plain.astype(int)) >= 0).all(), "from the top to the bottom"
+    np.testing.assert_array_equal(last, (striped().astype(int) + LABELS[labels]) // 2)
     assert_command_repeats(page, 1, tmp_path, monkeypatch)
     for name, expected in (("labels.png", labels), ("strokes.png", painted)):
         np.testing.assert_array_equal(read_labels(tmp_path / name), expected)
-
-
-def test_labels_are_shown_over_the_picture_as_rows_are_compared(page, every_frame, monkeypatch):
-    monkeypatch.setattr(algorithm, "WORK", 2**25)
-    page.ask("picture", png(striped()), kind="open", name="a.png")
-    page.ask("frame", layer="labels", **WINDOW | {"width": 96, "height": 48})
-    after = len(page.got)
-    page.result(job="classify", guide=strokes(1, 3))
-    page.wait("frame", after=after, of=1)
-    assert page.wait("begun")[0]["layers"] == ["labels", "sample"]
-    sent = [(one, pixels) for one, pixels in page.got[after:] if one["kind"] == "frame" and one["of"] != "sample"]
-    assert {one["layer"] for one, _ in sent} == {"labels"} and len(sent) > 4
-    frames = [np.frombuffer(pixels, np.uint8).reshape(48, 96, 4)[..., :3] for _, (pixels,) in sent]
-    plain = (frames[0] == striped()).all((1, 2))
-    assert not plain[0] and plain[-1] and (np.diff(plain.astype(int)) >= 0).all(), "from the top to the bottom"
-    np.testing.assert_array_equal(frames[-1], (striped().astype(int) + LABELS[page.latest.image]) // 2)
-    assert (page.latest.image == 0).any(), "where it is darker"
 
 
 def test_too_little_paint_is_a_hint_and_no_error(page):
@@ -256,8 +250,7 @@ def test_frames_go_from_coarse_to_fine_and_end_in_the_result(opened, every_frame
     opened.result()
     _, (pixels,) = opened.wait("frame", after=after, of=1)
     progress = [message for message, _ in opened.got[after:] if message["kind"] == "progress"]
-    frames = [message for message, _ in opened.got[after:] if message["kind"] == "frame" and message["of"] == "run"]
-    assert len(frames) == len(progress)
+    assert len(progress) == sum(message.get("of") == "run" for message, _ in opened.got[after:])
     levels = [one["level"] for one in progress]
     assert levels == sorted(levels, reverse=True) and set(levels) >= {0, 1}
     assert all(0 <= one["fraction"] <= 1 for one in progress)
@@ -293,10 +286,7 @@ def test_an_earlier_result_is_shown_during_a_run(opened, monkeypatch):
     begin_and_pause(opened, seed=8, width=50)
     frame, _ = opened.ask("frame", kind="select", result=1, wanted={"of": 1})
     assert (frame["cols"], frame["layer"]) == (36, "picture")
-    frame, _ = opened.ask("frame", layer="use", **WINDOW, wanted={"layer": "use"})
-    assert (frame["of"], frame["cols"]) == (1, 48)
-    frame, _ = opened.ask("frame", kind="select", result=None, wanted={"of": "run"})
-    assert frame["layer"] == "use"
+    opened.ask("frame", kind="select", result=None, wanted={"of": "run"})
     opened.ask("frame", kind="select", result=1, wanted={"of": 1})
     after = len(opened.got)
     opened.ask("result", kind="resume", wanted={"result": 2, "width": 50})
@@ -377,7 +367,6 @@ WRONG = [
     ("result 5 is no longer kept; make it again with its command line", {"kind": "select", "result": 5}),
     ("Result width is 0; give 1 or more", asked(width=0)),
     ("unknown job 'rm'; choose one of: synth, extend, fill, classify", asked(job="rm")),
-    ("unknown method 'os'; choose one of: mrf, multires, pyramid", asked(method="os")),
     ("there is no control for 'array'; choose one of: ", asked(options={"array": "4x4"})),
     ("Repeat less (balance) is -1; give a number of at least 0", asked(options={"balance": -1})),
     ("options must be names and values, not 3", asked() | {"options": 3}),
