@@ -185,6 +185,13 @@ def test_stages(tmp_path, dtype, channels):
     assert image.read(tmp_path / "a" / f"temperature-{names[1]}").pixels.shape == (11, 15, 3)
 
 
+def test_stages_have_the_limits_of_the_first_picture(tmp_path):
+    writer, values = StageWriter(tmp_path / "a"), np.linspace(0, 1, 480).reshape(20, 24)
+    writer(told("-sweep01", 0, values))
+    writer(told("-sweep02", 0, values / 2))
+    assert image.read(tmp_path / "a" / "level0-sweep02.png").pixels.max() in (127, 128)
+
+
 def test_stages_of_counts_and_of_a_resumed_run(tmp_path):
     full, candidates = np.random.default_rng(0).integers(0, 256, (20, 24), np.uint8), np.ones((20, 24), np.int32)
     candidates[0, :3] = 1, 10, 100

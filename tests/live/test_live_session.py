@@ -89,7 +89,7 @@ JOBS = {
     "pyramid": {"method": "pyramid", "options": {"iterations": 2}},
     "seamless": {"job": "extend", "part": [0, 0, 40, 36]},
 }
-QUICK = ("options", "guide")
+QUICK = ("options", "guide", "hole")
 
 
 def assert_command_repeats(page, number, folder, monkeypatch):
