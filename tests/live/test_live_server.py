@@ -259,13 +259,13 @@ def test_the_run_of_a_page_that_is_gone_ends_unless_it_comes_back_in_time(monkey
         page = Client(port)
         session = pages._sessions[page.key]
         page.say(png(texture()), kind="open", name="a.png")
-        page.say(**asked(width=800, height=800))
+        page.say(**asked(width=400, height=400))
         page.wait("begun")
         page.socket.close()
         if returns:
             soon(lambda: page.key in pages._lost)
             shown = Client(port, session=page.key).wait("picture")[0]
-            assert not shown["new"] and shown["settings"]["width"] == 800
+            assert not shown["new"] and shown["settings"]["width"] == 400
             time.sleep(1)
             assert session._begun, "the run goes on"
             return
