@@ -31,23 +31,21 @@ from simdtex.model.display import OKABE_ITO
 
 INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
 DPI = 140
-
-
 MARKERS = "os^DvP<>X*hpd8H"
+PAGE, RESULTS = "index.html", "results.json"
+
+PathLike = str | os.PathLike[str]
 
 
 def styles(schedules: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
-    """Return the keywords of `matplotlib.axes.Axes.plot` for each schedule, given whether it keeps equation (14).
-
-    Lines are dashed and markers hollow if it breaks equation (14).
-    """
-    found = {}
-    for number, (name, keeps) in enumerate(schedules.items()):
-        colour = "#" + bytes(OKABE_ITO[-1 - number % len(OKABE_ITO)]).hex()
+    """Return the keywords of a plot for each schedule: dashed and hollow unless it keeps equation (14)."""
+    keywords = {}
+    for index, (name, keeps) in enumerate(schedules.items()):
+        colour = "#" + bytes(OKABE_ITO[-1 - index % len(OKABE_ITO)]).hex()
         line, inside = ("-", colour) if keeps else ("--", "white")
-        marker = MARKERS[number % len(MARKERS)]
-        found[name] = {"color": colour, "marker": marker, "linestyle": line, "markerfacecolor": inside}
-    return found
+        marker = MARKERS[index % len(MARKERS)]
+        keywords[name] = {"color": colour, "marker": marker, "linestyle": line, "markerfacecolor": inside}
+    return keywords
 
 
 def new_figure(width: float, height: float) -> Plot:
@@ -75,11 +73,6 @@ def legend(figure: Plot, axes: Axes, place: Any = "outside upper center", column
     entries = dict(zip(labels, handles, strict=True))
     more: dict[str, Any] = {"ncols": columns, "frameon": False, "fontsize": 9, "labelcolor": INK}
     figure.legend(list(entries.values()), list(entries), loc=place, **more)
-
-
-PathLike = str | os.PathLike[str]
-
-PAGE, RESULTS = "index.html", "results.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +121,14 @@ class Section:
 
 
 def check_folder(path: PathLike) -> None:
-    """Raise before long work unless a report can be written to a folder.
-
-    It may exist if it is empty or holds an earlier report and nothing else.
-    """
+    """Raise ValueError before long work unless a folder is new, or is empty but for an earlier report."""
     folder = Path(path)
     try:
         listed = {str(name) for name in json.loads((folder / RESULTS).read_bytes())["files"]}
     except (OSError, ValueError, KeyError, TypeError):
         listed = set()
-    own = {name for name in listed if name in (PAGE, RESULTS) or name.endswith(".png")}
-    earlier_files(folder, "the report", own.__contains__)
+    ours = {name for name in listed if name in (PAGE, RESULTS) or name.endswith(".png")}
+    earlier_files(folder, "the report", ours.__contains__)
 
 
 def write_report(
@@ -152,8 +142,7 @@ def write_report(
     """Write ``index.html``, the PNG of every figure and ``results.json``, either all of them or none.
 
     ``results`` becomes JSON with sorted keys and null for numbers that are not finite; the names of all files, the
-    version and the command line are added. The page contains its pictures and its style, and runs no script. The files
-    of an earlier report are replaced; errors are those of `check_folder` and `atomic_folder`.
+    version and the command line are added. The files of an earlier report are replaced.
     """
     check_folder(folder)
     if command:

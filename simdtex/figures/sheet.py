@@ -61,8 +61,8 @@ def contact_sheet(
     rows = [max(heights[first : first + across]) for first in range(0, len(shown), across)]
     sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + sum(rows)), "white")
     draw = PIL.ImageDraw.Draw(sheet)
-    for number, (label, picture, caption) in enumerate(zip(labels, shown, below, strict=True)):
-        top, left = GAP + sum(rows[: number // across]), GAP + number % across * width
+    for place, (label, picture, caption) in enumerate(zip(labels, shown, below, strict=True)):
+        top, left = GAP + sum(rows[: place // across]), GAP + place % across * width
         draw.text((left, top), label, fill="black", font=font)
         sheet.paste(PIL.Image.fromarray(picture), (left, top + STRIP))
         draw.text((left, top + STRIP + len(picture) + 2), caption, fill="black", font=font)
@@ -124,7 +124,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
     }
     longest = max(*cube.shape[:2], len(block))
     least, most = -(-longest // size), max(1, size // longest)  # whole factors that reduce and enlarge all
-    shown = [(name, magnified(fitted(one, -(-max(one.shape[:2]) // least)), most)) for name, one in pictures.items()]
+    shown = [(name, magnified(fitted(part, -(-max(part.shape[:2]) // least)), most)) for name, part in pictures.items()]
     return contact_sheet(shown, path, columns=4, scale=1)
 
 
@@ -140,10 +140,7 @@ def magnified(picture: Picture, factor: int) -> Picture:
 
 
 def fitted(picture: Picture, side: int) -> Picture:
-    """Return the means of square blocks of a picture (rows, cols[, 3]), so that no side is longer than `side` pixels.
-
-    A picture that fits is returned itself.
-    """
+    """Return the means of square blocks of a picture (rows, cols[, 3]), with sides of at most `side` pixels."""
     factor = reduction(picture.shape, side)
     return picture if factor == 1 else np.array(PIL.Image.fromarray(picture).reduce(factor))
 
@@ -154,10 +151,7 @@ def reduction(shape: tuple[int, ...], side: int | None = None) -> int:
 
 
 def parts(shape: tuple[int, ...], multiple: int = 1) -> Iterator[tuple[slice, slice]]:
-    """Yield the squares that cover a picture of ``shape``, row by row; their sides are about `PART`.
-
-    They begin at multiples of ``multiple``, even if that is larger.
-    """
+    """Yield the squares that cover a picture, row by row; their sides are multiples of ``multiple``, about `PART`."""
     side = multiple * max(1, PART // multiple)
     for top in range(0, shape[0], side):
         for left in range(0, shape[1], side):
@@ -165,17 +159,13 @@ def parts(shape: tuple[int, ...], multiple: int = 1) -> Iterator[tuple[slice, sl
 
 
 def read_fitted(array: Any, show: Callable[[NDArray[Any]], Picture]) -> Picture:
-    """Return a picture that fits on a sheet, (rows, cols, 3), of an array of any size: `fitted` of ``show(array)``.
-
-    The array is read part by part: a NumPy array, or one of a store, (rows, cols[, ...]). ``show`` returns the picture
-    of a part, (rows, cols, 3).
-    """
+    """Return a picture that fits on a sheet, `fitted` of ``show(array)``, of an array that is read part by part."""
     factor = reduction(array.shape)
-    found = np.zeros((ceil(array.shape[0] / factor), ceil(array.shape[1] / factor), 3), np.uint8)
+    sheet = np.zeros((ceil(array.shape[0] / factor), ceil(array.shape[1] / factor), 3), np.uint8)
     for rows, cols in parts(array.shape, factor):
         small = PIL.Image.fromarray(show(array[rows, cols])).reduce(factor)
-        found[rows.start // factor :, cols.start // factor :][: small.height, : small.width] = np.asarray(small)
-    return found
+        sheet[rows.start // factor :, cols.start // factor :][: small.height, : small.width] = np.asarray(small)
+    return sheet
 
 
 _FILE = re.compile(r"((temperature|candidates)-)?(level\d+(-sweep\d+)?|iteration\d+)\.png")
@@ -184,15 +174,10 @@ _FILE = re.compile(r"((temperature|candidates)-)?(level\d+(-sweep\d+)?|iteration
 class StageWriter:
     """A callback that writes the pictures of a run into a folder as they are completed.
 
-    With ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the end of each sweep;
-    with ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end of each level, brighter where a pixel
-    had more candidates, on a logarithmic scale from 1; with ``pyramid``, ``iteration{k}.png``, for a block its middle
-    slice. Pictures are 8-bit previews; each file is written completely or not at all.
-
-    The folder is made at the first picture. It may exist if it is empty or holds only the stages of an earlier run,
-    which are removed at the first picture unless ``resumed()``: the run continues from a checkpoint. ``limits`` are the
-    values shown as black and white if pixels are not uint8, by default those of the first picture. Raises ValueError if
-    the folder cannot be used.
+    A file is ``level{l}-sweep{k}.png``, ``level{l}.png`` or ``iteration{k}.png``, an 8-bit preview, and beside it the
+    temperatures or the numbers of candidates on a logarithmic scale. The folder is made at the first picture, when the
+    stages of an earlier run are removed unless ``resumed()``. ``limits`` are the values shown as black and white if
+    pixels are not uint8, by default those of the first picture. Raises ValueError if the folder cannot be used.
     """
 
     def __init__(
@@ -239,5 +224,5 @@ class StageWriter:
 
 def common_scale(pictures: Sequence[NDArray[Any]]) -> int:
     """Return the whole factor for all pictures: the smallest is about `SHOWN_SIDE` wide, the largest at most twice."""
-    sides: list[int] = [max(one.shape[:2]) for one in pictures]
+    sides: list[int] = [max(picture.shape[:2]) for picture in pictures]
     return max(1, min(round(SHOWN_SIDE / min(sides)), 2 * SHOWN_SIDE // max(sides)))

@@ -102,16 +102,16 @@ def show(
         return draw(made)
     if not pictures or len(titles or pictures) != len(pictures):
         raise ValueError(f"there are {len(pictures)} pictures and {len(titles)} titles; give as many of both")
-    shown = [_pixels(one, channel_axis) for one in pictures]
+    shown = [_pixels(picture, channel_axis) for picture in pictures]
     if tiled:
-        shown = [np.tile(one, (3, 3, 1)) for one in shown]
-    scale = max(1, ENLARGED_SIDE // max(max(one.shape[:2]) for one in shown))
-    sides = [(scale * len(one), scale * one.shape[1]) for one in shown]
+        shown = [np.tile(pixels, (3, 3, 1)) for pixels in shown]
+    scale = max(1, ENLARGED_SIDE // max(max(pixels.shape[:2]) for pixels in shown))
+    sides = [(scale * len(pixels), scale * pixels.shape[1]) for pixels in shown]
     high, wide = GAP + max(rows for rows, _ in sides) + GAP, GAP + sum(cols + GAP for _, cols in sides)
     figure, left = new_figure(wide / plt.rcParams["figure.dpi"], high / plt.rcParams["figure.dpi"]), GAP
-    for one, (rows, cols), title in zip(shown, sides, titles or [""] * len(shown), strict=True):
+    for pixels, (rows, cols), title in zip(shown, sides, titles or [""] * len(shown), strict=True):
         axes = figure.add_axes((left / wide, 1 - (GAP + rows) / high, cols / wide, rows / high), title=title)
-        axes.imshow(one, interpolation="nearest")
+        axes.imshow(pixels, interpolation="nearest")
         axes.set_axis_off()
         left += cols + GAP
     return figure
@@ -144,7 +144,7 @@ def draw(made: Any, number: int = 8) -> Figure:
         return _figure(made, [*titles, "entropy, bits"], planes, how)[0]
     if "variance" in maps:
         both = [made[name] for name in ("mean", "variance")]
-        return _figure(made, [_label(one) for one in both], [one.values for one in both], [{}, {}])[0]
+        return _figure(made, [_label(values) for values in both], [values.values for values in both], [{}, {}])[0]
     if "realisation" in made.coords and not maps and {"y", "x"} <= set(made.dims):
         return _realisations(made, number)
     raise ValueError("there are no realisations and no estimate to draw; use plot.imshow of xarray")
@@ -202,22 +202,22 @@ def _figure(made: Any, titles: Sequence[str], planes: Any, how: Any) -> tuple[Fi
     smooth = "antialiased" if max(rows, cols) > 100 * MAP_INCHES else "nearest"
     where = {"origin": "lower", "extent": extent, "interpolation": smooth}
     for n, (axes, title) in enumerate(zip(grid, titles, strict=False)):
-        own = how if isinstance(how, dict) else how[n]
-        image = axes.imshow(planes[n], **where, **own)
+        colours = how if isinstance(how, dict) else how[n]
+        image = axes.imshow(planes[n], **where, **colours)
         axes.set_title(title, fontsize=10)
         axes.set(xlabel=_label(made["x"]) if ground else "", ylabel=_label(made["y"]) if ground else "")
-        if own is not how:
+        if colours is not how:
             bar = figure.colorbar(image, ax=axes)
     for axes in grid[len(titles) :]:
         axes.set_axis_off()
-    return figure, figure.colorbar(image, ax=list(grid)) if own is how else bar
+    return figure, figure.colorbar(image, ax=list(grid)) if colours is how else bar
 
 
 class _ArrayPlot(DataArrayPlotAccessor):
     def __call__(self, **keywords: Any) -> Any:  # type: ignore[override]
         """Return a figure of the first ``number`` realisations, by default 8; xarray draws all else."""
-        own = keywords.keys() <= {"number"} and "realisation" in self._da.coords and {"y", "x"} <= set(self._da.dims)
-        return draw(self._da, **keywords) if own else super().__call__(**keywords)
+        ours = keywords.keys() <= {"number"} and "realisation" in self._da.coords and {"y", "x"} <= set(self._da.dims)
+        return draw(self._da, **keywords) if ours else super().__call__(**keywords)
 
 
 class _DatasetPlot(DatasetPlotAccessor):
@@ -243,8 +243,8 @@ class Results(xr.Dataset):  # type: ignore[no-untyped-call]
 def described(training: Any, known: Any = None) -> dict[str, str]:
     """Return the attributes ``long_name`` and ``units`` of a training image of xarray, or the name of one variable."""
     names: Any = getattr(known, "names", ())  # of a table
-    found = {"long_name": names[0] if len(names) == 1 else "", "units": ""}
+    texts = {"long_name": names[0] if len(names) == 1 else "", "units": ""}
     if hasattr(training, "coords"):
-        own = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
-        found |= {name: value for name, value in own.items() if value}
-    return {name: str(value) for name, value in found.items() if value}
+        attributes = {"long_name": training.attrs.get("long_name", training.name), "units": training.attrs.get("units")}
+        texts |= {name: value for name, value in attributes.items() if value}
+    return {name: str(value) for name, value in texts.items() if value}

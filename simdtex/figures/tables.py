@@ -23,11 +23,7 @@ _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts: rows from heading to cell, all with the same headings; the first cell names the row.
-
-    A cell that begins with ``breaks`` or ``differs`` is a warning. ``note`` is a remark below the table, on
-    pages only.
-    """
+    """A table of texts: rows from heading to cell; the first cell names the row. ``note`` stands below it on pages."""
 
     caption: str
     rows: Sequence[Mapping[str, str]]
@@ -51,7 +47,7 @@ def settings_table(caption: str, settings: Mapping[str, Any]) -> Table:
 
 
 def warns(cell: str) -> bool:
-    """Return whether a cell is a warning."""
+    """Return whether a cell is a warning: it begins with ``breaks`` or ``differs``."""
     return cell.startswith(("breaks", "differs"))
 
 
@@ -61,8 +57,8 @@ def print_table(table: Table, width: int | None = None) -> None:
     shown = rich.table.Table(
         title=table.caption, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold"
     )
-    for number, (name, numeric) in enumerate(zip(table.header, table.numeric, strict=True)):
-        shown.add_column(name, justify="right" if numeric else "left", overflow="fold", no_wrap=not number)
+    for column, (name, numeric) in enumerate(zip(table.header, table.numeric, strict=True)):
+        shown.add_column(name, justify="right" if numeric else "left", overflow="fold", no_wrap=not column)
     for row in table.rows:
         cells = map(Text, row.values())  # names may contain [brackets], which are no markup
         shown.add_row(*cells, style="yellow" if any(map(warns, row.values())) else None)
@@ -164,13 +160,13 @@ def benchmark_table(entry: dict[str, Any]) -> Table:
 
 def version_lines() -> list[str]:
     """Return the versions of simdtex and of its libraries, and the default device or the reason why none works."""
-    found = [
+    lines = [
         f"simdtex {version('simdtex')}",
         f"Python {platform.python_version()}, NumPy {version('numpy')}, pyopencl {version('pyopencl')}",
     ]
     try:
         device = find()
     except DeviceError as error:
-        return [*found, str(error)]
+        return [*lines, str(error)]
     driver = f", {device.version}, driver {device.driver}" if device.version else ""
-    return [*found, f"{device}{driver}"]
+    return [*lines, f"{device}{driver}"]

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The live page, which shows and controls a run while it executes, in a browser or in a notebook.
 
-A page exchanges messages with a `Session`, over a WebSocket (`simdtex.live.server`) or over a notebook's connection
-(`simdtex.live.widget`). The page itself is in ``page/``: a style sheet, and the parts of an ES module, which `script`
-joins, because a notebook takes one text.
+``page/`` has its style sheet and the parts of its ES module, which `script` joins, because a notebook takes one text.
 """
 
 from importlib.resources import files

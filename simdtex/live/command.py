@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex live``, ``demo``, ``devices`` and ``bench``: the page in the browser, and what this machine can do."""
+"""``simdtex live``: the page in the browser."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
     from simdtex.live.job import Picture
     from simdtex.live.server import serve
 
-    given = None
+    first = None
     if picture:
-        found = read_picture(picture)
-        given = Picture(picture.name, found.pixels, found.channel_axis, found.metadata)
+        image = read_picture(picture)
+        first = Picture(picture.name, image.pixels, image.channel_axis, image.metadata)
 
     def ready(address: str, machine: Machine) -> None:
         click.echo(f"{address}  (on {machine.name}; Ctrl-C ends it)")
@@ -55,5 +55,5 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
             webbrowser.open(address)
 
     with suppress(KeyboardInterrupt):
-        serve(given, device, host, port, ready)
+        serve(first, device, host, port, ready)
     click.echo("ended")

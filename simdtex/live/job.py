@@ -39,11 +39,13 @@ Array = NDArray[Any]
 Maps = dict[str, Array]
 Message = dict[str, Any]
 
-FUNCTIONS: dict[str, Any] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
-"""The functions of the page's jobs, by command: a larger texture, a seamless picture, a filled hole, labels."""
-
-PLANS: dict[str, Any] = {"synth": plan_synthesis, "extend": plan_extension, "fill": plan_filling}
-"""What makes the job of a function, to look inside its run."""
+FUNCTIONS: dict[str, tuple[Any, Any]] = {
+    "synth": (synthesize, plan_synthesis),
+    "extend": (extend, plan_extension),
+    "fill": (fill, plan_filling),
+    "classify": (classify, None),
+}
+"""The function of each job of the page, by command, and the function that plans its run, to look inside the run."""
 
 METHODS = {
     "mrf": "Markov random field: any texture",
@@ -62,25 +64,16 @@ TABLES: dict[str, tuple[Any, str]] = {
 }
 """The options and the command of each set of controls: for the methods, and for the jobs with a single method."""
 
-MAX_SIDE = 2**14
-"""The most rows or columns of an output."""
-
-MIN_REGION = 8
-"""The fewest rows and columns of a region of the picture."""
-
-MAX_POINTS = 2**16
-"""The most points of all strokes together."""
-
-MAX_LABEL = 8
-"""The largest label of a stroke; 0 erases."""
+MAX_SIDE = 2**14  # of an output, pixels
+MIN_REGION = 8  # a side of a region of the picture, pixels
+MAX_POINTS = 2**16  # of all strokes together
+MAX_LABEL = 8  # of a stroke; 0 erases
 
 LABELS = label_colours(MAX_LABEL + 1)
 """The colours of labels, for the brush and over a picture."""
 
 Part = tuple[slice, slice]
-
 WHOLE: Part = (slice(None), slice(None))
-"""All rows and columns."""
 
 RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture", "labels", "strokes")
 """Names that the picture's files cannot have, since other files of an archive have them."""
@@ -99,24 +92,19 @@ class Picture(NamedTuple):
     metadata: Metadata = NOTHING
 
 
-class Job:
-    """A run that a page requests, checked; raises ValueError or TypeError if the message is invalid.
+class PageJob:
+    """A run that a page requests with a ``make`` message (docs/live.rst); raises ValueError or TypeError if invalid.
 
-    The ``message`` has ``job`` (``synth``, ``extend``, ``fill`` or ``classify``) and ``seed``; ``width``, ``height``
-    and ``method`` of ``synth``; ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is
-    the sample of ``synth`` and ``extend``; ``guide``, strokes on the ``sample`` and on the ``output``, where those on
-    the sample are the classes of ``classify``; ``hole``, strokes; ``of``, the number of the result to fill. ``maps``
-    are further maps of the picture, by name, which ``pyramid`` and ``classify`` do not arrange; ``result(number)``
-    returns a result.
+    ``maps`` are further maps of the picture, by name, which ``pyramid`` and ``classify`` do not arrange;
+    ``result(number)`` returns a result.
 
-    The attributes of a job: ``options`` are those that differ from their defaults, ``files`` the pictures that the
-    command line reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the
-    further maps by name. ``given`` are the picture and its maps, ``labelled`` the files of labels, and ``classes`` the
-    painted labels.
+    ``options`` are those that differ from their defaults, ``files`` the pictures that the command line reads, by file
+    name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by name.
+    ``material`` are the picture and its maps, ``labelled`` the files of labels, and ``classes`` the painted labels.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
-        self.message, self.given = message, (picture, dict(maps))
+        self.message, self.material = message, (picture, dict(maps))
         one_of("job", message.get("job"), FUNCTIONS)
         self.kind: str = message["job"]
         self.metadata = picture.metadata._replace(exif=None)
@@ -136,7 +124,7 @@ class Job:
         number = message.get("of") if self.kind == "fill" else None
         if number is None:
             name = file_stem(picture.name, "sample") + ("" if part == WHOLE else "-part")
-            self._read(name, picture.pixels[part], {one: values[part] for one, values in maps.items()})
+            self._read(name, picture.pixels[part], {role: values[part] for role, values in maps.items()})
         else:
             before = result(number)
             self._read(f"result-{number}", before.image, before.maps)
@@ -162,8 +150,8 @@ class Job:
     ) -> tuple[Array, Output]:
         """Run the job on a machine, and return its output; `checkpointing` has the state to continue from, if any."""
         keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True}
-        made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
-        return made
+        image, output = FUNCTIONS[self.kind][0](self.sample, checkpoint=checkpointing, **keywords)
+        return image, output
 
     def replay(self, machine: Machine) -> Replay | HoleReplay:
         """Return the replay of the run; raise ValueError if it is not one run of ``mrf``."""
@@ -171,7 +159,7 @@ class Job:
             name = METHODS["mrf"].partition(":")[0]
             raise ValueError(f'only runs of the method "{name}" can be looked into; make a result by it first')
         keywords = {name: value for name, value in self._keywords.items() if name != "rng"}
-        job: Any = PLANS[self.kind](self.sample, **keywords)
+        job: Any = FUNCTIONS[self.kind][1](self.sample, **keywords)
         if self.kind == "fill":
             return HoleReplay(job, machine, self._keywords["rng"])
         return Replay(job.plan(), machine, self._keywords["rng"])
@@ -205,8 +193,8 @@ class Job:
         """Add the sample and its maps; the names of their files begin with ``name``."""
         self.sample, self.maps = sample, maps
         self.output = f"texture{_suffix(sample)}"
-        self.carried = {one: f"texture-{one}{_suffix(pixels)}" for one, pixels in maps.items()}
-        files = {f"{name}-{one}{_suffix(pixels)}": pixels for one, pixels in maps.items()}
+        self.carried = {role: f"texture-{role}{_suffix(pixels)}" for role, pixels in maps.items()}
+        files = {f"{name}-{role}{_suffix(pixels)}": pixels for role, pixels in maps.items()}
         self._also = list(zip(files, self.carried.values(), strict=True))
         self.files = {f"{name}{_suffix(sample)}": sample, **files}
 
@@ -214,8 +202,6 @@ class Job:
         """Add an argument to the call and to the command line."""
         self._keywords[name] = value
         self._flags += flags
-
-    # These add what the message says to the call and to the command line.
 
     def _size(self, message: Message) -> None:
         for side in ("width", "height"):
@@ -270,11 +256,7 @@ def _painted(message: Message) -> dict[str, Any]:
 
 
 def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
-    """Return the labels painted by strokes of a round brush, (rows, cols), 0 where there are none.
-
-    Each stroke is a dict with a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in
-    pixels; a later stroke covers an earlier one. Raises ValueError or TypeError if ``strokes`` are invalid.
-    """
+    """Return the labels painted by strokes of a round brush, (rows, cols), 0 where there are none."""
     if not isinstance(strokes, list):
         raise TypeError("strokes must be a list; paint again")
     labels = PIL.Image.new("L", (shape[1], shape[0]))
@@ -297,44 +279,44 @@ def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
     return np.array(labels)
 
 
-def _points(given: list[Any]) -> list[tuple[float, float]]:
+def _points(pairs: list[Any]) -> list[tuple[float, float]]:
     with suppress(ValueError, TypeError, OverflowError):
-        points = np.array(given, np.float64)
-        if points.shape == (len(given), 2) and np.isfinite(points).all() and abs(points).max() < 2**20:
+        points = np.array(pairs, np.float64)
+        if points.shape == (len(pairs), 2) and np.isfinite(points).all() and abs(points).max() < 2**20:
             return [(x, y) for x, y in points.tolist()]
     raise TypeError("a point of a stroke must be two numbers; paint again")
 
 
-def _options(given: Any, table: str) -> dict[str, Any]:
+def _options(values: Any, table: str) -> dict[str, Any]:
     """Return the options that differ from their defaults; only options with a control are valid."""
-    if not isinstance(given, dict):
-        raise TypeError(f"options must be names and values, not {shown(given)}")
+    if not isinstance(values, dict):
+        raise TypeError(f"options must be names and values, not {shown(values)}")
     defaults = {control["name"]: control["default"] for control in controls(table)}
-    for name in given:
+    for name in values:
         if name not in defaults:
             raise ValueError(f"there is no control for {shown(name)}; choose one of: {', '.join(defaults)}")
-    return {name: value for name, value in given.items() if value is not None and value != defaults[name]}
+    return {name: value for name, value in values.items() if value is not None and value != defaults[name]}
 
 
-def _part(given: Any, shape: tuple[int, ...]) -> Part:
+def _part(region: Any, shape: tuple[int, ...]) -> Part:
     """Return the rows and columns of a region, `WHOLE` if it is the whole picture."""
-    if given is None:
+    if region is None:
         return WHOLE
-    if not isinstance(given, list) or len(given) != 4:
+    if not isinstance(region, list) or len(region) != 4:
         raise TypeError("a part of the picture is four numbers: left, top, width and height")
     rows, cols = shape[:2]
-    for name, value, most in zip(("left", "top", "width", "height"), given, (cols, rows, cols, rows), strict=True):
+    for name, value, most in zip(("left", "top", "width", "height"), region, (cols, rows, cols, rows), strict=True):
         whole(f"the {name} of the part", value, min(MIN_REGION, most) if name in ("width", "height") else 0, most)
-    left, top, width, height = given
+    left, top, width, height = region
     if left + width > cols or top + height > rows:
         raise ValueError(f"the part reaches beyond the picture of {cols}x{rows}; choose one within it")
-    return WHOLE if given == [0, 0, cols, rows] else (slice(top, top + height), slice(left, left + width))
+    return WHOLE if region == [0, 0, cols, rows] else (slice(top, top + height), slice(left, left + width))
 
 
 def file_stem(name: str, otherwise: str) -> str:
     """Return a file's name without its suffix, in lower case letters, digits and dashes."""
-    found = re.sub(r"[^a-z0-9]+", "-", name.rpartition(".")[0].lower() or name.lower()).strip("-")[:40]
-    return otherwise if found in RESERVED else found
+    stem = re.sub(r"[^a-z0-9]+", "-", name.rpartition(".")[0].lower() or name.lower()).strip("-")[:40]
+    return otherwise if stem in RESERVED else stem
 
 
 def _suffix(pixels: Array) -> str:
@@ -342,20 +324,17 @@ def _suffix(pixels: Array) -> str:
 
 
 def controls(name: str) -> list[dict[str, Any]]:
-    """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider.
-
-    The light of the sample is an option, too.
-
-    A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
-    ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
-    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
-    ``empty``, the text of an empty field; and ``usual``, its number, None if that is not fixed.
-    """
+    """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider."""
     options, job = TABLES[name]
-    shown = {name: one for name, one in table(options).items() if job in one.shown}
+    shown = {name: option for name, option in table(options).items() if job in option.shown}
     words = {"light": LIGHT} if job in ("synth", "extend") else {}  # elsewhere the picture decides, or it has none
-    made = [_control(name, one, one.default_of(job)) for name, one in (shown | words).items()]
+    made = [_control(name, option, option.default_of(job)) for name, option in (shown | words).items()]
     return [control for control in made if "kind" in control]
+
+
+def offered() -> Message:
+    """Return the methods, the controls and the colours of labels of the page."""
+    return {"methods": METHODS, "controls": {name: controls(name) for name in TABLES}, "colours": LABELS.tolist()}
 
 
 def told(sentence: str) -> str:
@@ -363,27 +342,27 @@ def told(sentence: str) -> str:
     labels = {control["name"]: control["label"] for name in TABLES for control in controls(name)}
     labels |= {"seed": "Seed", "width": "Result width", "height": "Result height"}
     names = "|".join(labels)
-    named = re.sub(rf"\b({names})=", lambda one: f"{labels[one[1]]} ", sentence)
-    named = re.sub(rf"^({names})(?= is | must )", lambda one: labels[one[1]], named)
+    named = re.sub(rf"\b({names})=", lambda match: f"{labels[match[1]]} ", sentence)
+    named = re.sub(rf"^({names})(?= is | must )", lambda match: labels[match[1]], named)
     left = names if named == sentence else f"{names}|it"
-    return re.sub(rf"leave ({left}) out", lambda one: f"set {labels.get(one[1], 'it')} to its default", named)
+    return re.sub(rf"leave ({left}) out", lambda match: f"set {labels.get(match[1], 'it')} to its default", named)
 
 
-def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
+def _control(name: str, option: Option, default: Any) -> dict[str, Any]:
     """Return the control of an option; without ``kind`` if it has none."""
-    hint = f"{one.hint or one.help}."
-    hint = f"{hint} Empty: {one.none}." if one.none else hint
-    label = one.label or name.replace("_", " ").capitalize()
-    control = {"name": name, "group": one.group, "label": label, "hint": hint, "default": default}
-    kind = one.kind
+    hint = f"{option.hint or option.help}."
+    hint = f"{hint} Empty: {option.none}." if option.none else hint
+    label = option.label or name.replace("_", " ").capitalize()
+    control = {"name": name, "group": option.group, "label": label, "hint": hint, "default": default}
+    kind = option.kind
     if isinstance(kind, Choice) or (isinstance(kind, Other) and default in kind.valid):
         return control | {"kind": "words", "valid": [[word, word] for word in kind.valid]}
     if is_flag(kind) and default is not None:
         return control | {"kind": "switch"}
-    if isinstance(kind, (Whole, Number)) and one.slider:
-        control |= {"least": kind.least if isfinite(kind.least) else None, "span": one.slider}
-        found = re.match(r"[\d.]+(?=;|$)", one.none)
-        control["usual"] = float(found[0]) if found else default
-        control["empty"] = "" if default is not None else f"automatic: {found[0]}" if found else "automatic"
+    if isinstance(kind, (Whole, Number)) and option.slider:
+        control |= {"least": kind.least if isfinite(kind.least) else None, "span": option.slider}
+        usual = re.match(r"[\d.]+(?=;|$)", option.none)  # the number of an empty field, if that is fixed
+        control["usual"] = float(usual[0]) if usual else default
+        control["empty"] = "" if default is not None else f"automatic: {usual[0]}" if usual else "automatic"
         return control | {"kind": "whole" if isinstance(kind, Whole) else "number"}
     return control

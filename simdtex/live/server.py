@@ -25,7 +25,6 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as websocket_server
-from websockets.typing import Data
 
 from simdtex.jobs.synthesis.job import synthesize
 from simdtex.live import PAGE, script, style
@@ -57,26 +56,13 @@ HEADERS = {
 
 REFUSED = "This address lacks the right token. Open the address that `simdtex live` has printed."
 
-MAX_PAGES = 8
-"""The most pages that are open at the same time."""
-
-KEPT = 600.0
-"""Seconds that a session is kept for a page that has lost the connection, unless another page needs its place."""
-
-RUN_KEPT = 30.0
-"""Seconds that the run of such a session continues."""
-
-MAX_MESSAGE = 2**22
-"""The most bytes of a message without its file, and of a piece of a file."""
-
-SMALL = 2**16
-"""The most bytes of a message that may wait together with others."""
-
-PIECE_WAIT, FILE_WAIT = 10.0, 120.0
-"""The most seconds to receive a piece of a file, and the whole file."""
-
-ENDING = 2.0
-"""The most seconds that the server, when it ends, waits for a session's run or for an incomplete request."""
+MAX_PAGES = 8  # that are open at the same time
+KEPT = 600.0  # seconds that the session of a page without a connection is kept, unless another page needs its place
+RUN_KEPT = 30.0  # seconds that the run of such a session continues
+MAX_MESSAGE = 2**22  # bytes of a message without its file, and of a piece of a file
+SMALL = 2**16  # bytes of a message that may wait together with others
+PIECE_WAIT, FILE_WAIT = 10.0, 120.0  # seconds to receive a piece of a file, and the whole file
+ENDING = 2.0  # seconds that the server, when it ends, waits for a session's run or for an incomplete request
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -121,13 +107,13 @@ class Pages:
                 self._expire()
 
     def _expire(self) -> None:
-        for one, since in list(self._lost.items()):
+        for key, since in list(self._lost.items()):
             alone = time.monotonic() - since
             if alone > KEPT or len(self._sessions) >= MAX_PAGES:
-                del self._lost[one]
-                self._sessions.pop(one).close()
+                del self._lost[key]
+                self._sessions.pop(key).close()
             elif alone > RUN_KEPT:
-                self._sessions[one].receive({"kind": "cancel"})
+                self._sessions[key].receive({"kind": "cancel"})
 
     def close(self) -> None:
         """End all sessions."""
@@ -140,12 +126,7 @@ class Pages:
 def serve(
     picture: Picture | None, device: str | None, address: str, port: int, ready: Callable[[str, Machine], None]
 ) -> None:
-    """Serve the live page until Ctrl-C; every new page starts with ``picture``.
-
-    With any ``address`` but 127.0.0.1, other computers may reach the page; ``port`` 0 takes a free port. ``ready`` is
-    called with the page's address and the machine when the page can be opened. Raises ValueError if the server cannot
-    listen on the address, or if the token is too short.
-    """
+    """Serve the live page until Ctrl-C; call ``ready`` with its address and the machine when it can be opened."""
     token = os.environ.get(TOKEN) or secrets.token_urlsafe(24)
     if not re.fullmatch(r"[\w-]{16,}", token, re.ASCII):
         raise ValueError(f"{TOKEN} must be 16 or more letters, digits, - and _; leave it unset for a fresh one")
@@ -160,10 +141,7 @@ def serve(
 
 @contextmanager
 def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
-    """Serve pages in threads until the block ends, and yield the port; every path begins with the token.
-
-    Raises ValueError if the server cannot listen on the address.
-    """
+    """Serve pages in threads until the block ends, and yield the port; every path begins with the token."""
     try:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         listening = socket.create_server((address, port), family=family)
@@ -177,10 +155,10 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
             host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
         except MultipleValuesError as error:
             return _response(connection, 400, f"The request has several headers {error}.")
-        given, slash, name = request.path.partition("?")[0].lstrip("/").partition("/")
+        secret, slash, name = request.path.partition("?")[0].lstrip("/").partition("/")
         if not is_own_name(host, address):
             return _response(connection, 400, "This server has another name.")
-        if not secrets.compare_digest(given.encode(errors="surrogateescape"), token.encode()):
+        if not secrets.compare_digest(secret.encode(errors="surrogateescape"), token.encode()):
             return _response(connection, 403, REFUSED)
         if not slash:  # without it, relative addresses in the page would lack the token
             response = _response(connection, 308, "")
@@ -227,17 +205,14 @@ def _response(connection: ServerConnection, status: int, text: str, kind: str = 
 
 
 def is_own_name(host: str, address: str) -> bool:
-    """Return whether a Host header names this server, and not a name of another site that resolves to it.
-
-    For a server that listens on all addresses, any numeric address is valid, since only names can be redirected.
-    """
+    """Return whether a Host header names this server, and not a name of another site that resolves to it."""
     found = re.fullmatch(r"(?:\[([0-9a-f:.]*:[0-9a-f:.]*)\]|([^][:@/]+))(:[0-9]+)?", host.lower())
     name = (found[1] or found[2]) if found else ""
     if name in (*LOOPBACK, address.lower()):
         return True
     with suppress(ValueError):
         ipaddress.ip_address(name)
-        return address not in LOOPBACK
+        return address not in LOOPBACK  # only names can be redirected
     return False
 
 
@@ -247,8 +222,8 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
     def send(message: Message, buffers: Sequence[bytes]) -> None:
         with suppress(ConnectionClosed):
             connection.send(json.dumps(message | {"buffers": len(buffers)}))
-            for one in buffers:
-                connection.send(one)
+            for buffer in buffers:
+                connection.send(buffer)
 
     assert connection.request is not None
     session = pages.join(connection.request.path.partition("?session=")[2], send)
@@ -257,7 +232,11 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
         return
     try:
         for text in connection:
-            _carry(text, connection, session)
+            message = json.loads(text)
+            sizes = message.pop("buffers", [])
+            files = [_file(size, connection) for size in sizes[:1]]
+            # a large message is handled before the next one is received
+            session.follow(session.receive(message, files), every=bool(sizes) or len(text) > SMALL)
     except ConnectionClosed:
         pass
     except TimeoutError:
@@ -266,14 +245,6 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
         connection.close(BAD_MESSAGE, "this is no message")
     finally:
         pages.leave(session)
-
-
-def _carry(text: Data, connection: ServerConnection, session: Session) -> None:
-    """Give a session a message and its file; a large one is handled before the page's next one is received."""
-    message = json.loads(text)
-    sizes = message.pop("buffers", [])
-    files = [_file(size, connection) for size in sizes[:1]]
-    session.follow(session.receive(message, files), every=bool(sizes) or len(text) > SMALL)
 
 
 def _file(size: Any, connection: ServerConnection) -> bytes:

@@ -30,8 +30,8 @@ from simdtex.checkpoint import Checkpointing, pack
 from simdtex.io.image import EXAMPLES, TISSUE, Image, example, read_bytes
 from simdtex.jobs.synthesis.job import synthesize
 from simdtex.live import frames
-from simdtex.live.job import LABELS, METHODS, MIN_REGION, TABLES, Hint, Job, Message, Picture, controls, file_stem, told
-from simdtex.live.results import THUMBNAIL, Inside, Result, Results, film
+from simdtex.live.job import MIN_REGION, Hint, Message, PageJob, Picture, file_stem, offered, told
+from simdtex.live.results import THUMBNAIL, Inside, PageResults, Result, film
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.display import temperature_colours
@@ -41,54 +41,27 @@ from simdtex.model.source_map import map_role
 from simdtex.options import one_of, resolve, table
 from simdtex.run import Progress
 
-__all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
-
 Send = Callable[[Message, Sequence[bytes]], None]
 
-MAX_BYTES = 2**27
-"""The most bytes of a file from the page."""
+MAX_BYTES = 2**27  # of a file from the page
+MAX_PIXELS = 2**25  # of a picture from the page
+MAX_MAPS = 16  # further maps of a material
+MAX_HELD = 2**29  # bytes of a picture and its further maps
+MAX_STATE = 2**27  # bytes of the state of a run at the end of a level, which is kept
+MAX_QUEUE = 64  # messages that wait to be handled
+READ_WAIT = 60.0  # seconds to read a picture from the page
 
-MAX_PIXELS = 2**25
-"""The most pixels of a picture from the page."""
-
-READ_WAIT = 60.0
-"""The most seconds to read a picture from the page."""
-
-MAX_STATE = 2**27
-"""The most bytes of the state of a run at the end of a level, which is kept."""
-
-MAX_MAPS = 16
-"""The most further maps of a material."""
-
-MAX_HELD = 2**29
-"""The most bytes of a picture and its further maps."""
-
-MAX_QUEUE = 64
-"""The most messages that wait to be handled."""
-
-STARTING_SIDE = 512
-"""About the longest side of the first output, pixels, which is otherwise twice its sample; and of a large sample."""
-
-PREVIEW = 512
-"""The longest side of the preview of the picture, pixels."""
-
-LARGE = 1024
-"""The first sample is only the middle of a picture with a longer side than this, pixels, so that it comes soon."""
+STARTING_SIDE = 512  # about the longest side of the first output, else twice its sample; and of a large sample; pixels
+LARGE = 1024  # of a picture with a longer side the first sample is the middle, so that the run ends soon, pixels
+PREVIEW = 512  # longest side of the preview of the picture, pixels
+DEMO_SIDE = 160  # of the demonstration run on a page without a picture, pixels
 
 FILMED = ("coloring", "checkerboard", "synchronous", "raster")
 """The schedules of which a page gets films."""
 
-DEMO_SIDE = 160
-"""Rows and columns of the demonstration run on a page without a picture."""
-
-INTERVAL = 4
-"""Time between two frames in units of the time to make the last one: frames take at most a quarter of a run."""
-
-MAX_RATE = 30
-"""The most frames per second."""
-
-MAX_UNSEEN = 2
-"""The most frames that are sent and not yet shown by the page."""
+INTERVAL = 4  # time between two frames in times to make the last one: frames take at most a quarter of a run
+MAX_RATE = 30  # frames per second
+MAX_UNSEEN = 2  # frames that are sent and not yet shown by the page
 
 log = logging.getLogger(__name__)
 
@@ -98,14 +71,10 @@ class Cancelled(Exception):
 
 
 class Levels:
-    """The states of a run of ``mrf`` at the end of each level.
-
-    ``key`` is the job without its options; None keeps no state. If an earlier run, ``before``, has the same key, this
-    run starts after the last level that is the same in both.
-    """
+    """The states of a run of ``mrf`` at the end of each level; it begins with those shared with ``before``."""
 
     def __init__(self, key: Any, options: mrf.Options, before: Levels | None = None) -> None:
-        self._key, self._options = key, options
+        self._key, self._options = key, options  # the job without its options; None keeps no state
         self._states: dict[int, Any] = {}
         if before is not None and key is not None and before._key == key and before._states:
             first = mrf.begins(before._options, options, 1 + max(before._states))
@@ -119,8 +88,8 @@ class Levels:
     @property
     def checkpointing(self) -> Checkpointing:
         """The state that the run starts from, and the function that receives its states."""
-        found = None if self.level is None else deepcopy(self._states[self.level])
-        return Checkpointing(found, self._offer)
+        state = None if self.level is None else deepcopy(self._states[self.level])
+        return Checkpointing(state, self._offer)
 
     def _offer(self, info: Any, tree: Callable[[], Any]) -> None:
         """Keep the state at the end of a level."""
@@ -152,16 +121,16 @@ class Session:
         self.key = secrets.token_urlsafe(16)  # with which a page that reconnects finds its session
         self.send, self._machine, self._picture = send, machine, picture
         self._maps: dict[str, NDArray[Any]] = {}
-        self.results = Results()
+        self.results = PageResults()
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
         self._inside: dict[int, Inside] = {}  # the replayed results: the shown one, and one beside it
         self._films: Iterator[bool] = iter(())  # the films that are still to be made
-        self._window = frames.Window()
+        self._view = frames.View()
         self._wanted: Message | None = None  # the requested job, until it is finished
         self._asked: Message | None = None  # the last requested job with this picture
         self._refused = ""  # why the last job could not be done
         self._begun: Message | None = None  # the message that announced the current run
-        self._job: Job | None = None  # the job of the current run
+        self._job: PageJob | None = None  # the job of the current run
         self._paused = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
@@ -263,13 +232,12 @@ class Session:
 
     def _on_hello(self, message: Message, buffers: Sequence[Any]) -> None:
         """Send everything that the page shows, since it may have been reloaded during a run."""
-        tables = {name: controls(name) for name in TABLES}
-        hello = {"version": version("simdtex"), "device": self._machine.name, "controls": tables, "bytes": MAX_BYTES}
-        shown = {name: frames.thumbnail(frames.picture(one, one), THUMBNAIL) for name, one in _examples().items()}
-        hello |= {"methods": METHODS, "examples": {name: [one.width, one.height] for name, one in shown.items()}}
-        hello |= {"colours": LABELS.tolist(), "scale": temperature_colours(np.linspace(0, 1, 9)).tolist()}
+        small = {name: frames.thumbnail(frames.picture(image, image), THUMBNAIL) for name, image in _examples().items()}
+        hello = {"version": version("simdtex"), "device": self._machine.name, "bytes": MAX_BYTES, **offered()}
+        hello |= {"examples": {name: [frame.width, frame.height] for name, frame in small.items()}}
+        hello |= {"scale": temperature_colours(np.linspace(0, 1, 9)).tolist()}
         hello |= {"session": self.key, "fresh": self._picture is None}
-        self.send({"kind": "hello", **hello}, [one.pixels for one in shown.values()])
+        self.send({"kind": "hello", **hello}, [frame.pixels for frame in small.values()])
         self._unseen = 0
         if self._picture is None:
             return
@@ -286,9 +254,8 @@ class Session:
         self._open(_read(message, buffers))
 
     def _on_example(self, message: Message, buffers: Sequence[Any]) -> None:
-        found = _examples()
-        one_of("example", message.get("name"), found)
-        pixels = found[message["name"]]
+        one_of("example", message.get("name"), _examples())
+        pixels = _examples()[message["name"]]
         self._open(Picture(f"{message['name']}.png", pixels, None if pixels.ndim == 2 else -1))
 
     def _on_lead(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -322,20 +289,20 @@ class Session:
             self.send({"kind": "demo", "width": DEMO_SIDE, "height": DEMO_SIDE}, pictures)
 
     def _on_map(self, message: Message, buffers: Sequence[Any]) -> None:
-        given = _read(message, buffers)
+        further = _read(message, buffers)
         if self._picture is None:
             raise ValueError("a map belongs to a picture; give the picture first")
-        size, wanted = (f"{one.pixels.shape[1]}x{one.pixels.shape[0]}" for one in (given, self._picture))
+        size, wanted = (f"{image.pixels.shape[1]}x{image.pixels.shape[0]}" for image in (further, self._picture))
         if size != wanted:
-            raise ValueError(f"{given.name} is {size} and the picture {wanted}; give a map of the picture's size")
+            raise ValueError(f"{further.name} is {size} and the picture {wanted}; give a map of the picture's size")
         if len(self._maps) >= MAX_MAPS:
             raise ValueError(f"there are {MAX_MAPS} maps already; remove one first")
-        held = sum(one.nbytes for one in (given.pixels, self._picture.pixels, *self._maps.values()))
+        held = sum(pixels.nbytes for pixels in (further.pixels, self._picture.pixels, *self._maps.values()))
         if held > MAX_HELD:
             raise ValueError(
                 f"the picture and its maps have {held} bytes and at most {MAX_HELD} are held; remove a map"
             )
-        self._maps[file_stem(given.name, "map")] = given.pixels
+        self._maps[file_stem(further.name, "map")] = further.pixels
         self.send({"kind": "maps", "names": list(self._maps)}, [])
 
     def _on_unmap(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -366,7 +333,7 @@ class Session:
         self._wanted, self._paused = None, False
 
     def _on_view(self, message: Message, buffers: Sequence[Any]) -> None:
-        self._window, self._stale = frames.parse_window(message), True
+        self._view, self._stale = frames.parse_view(message), True
 
     def _on_shown(self, message: Message, buffers: Sequence[Any]) -> None:
         self._unseen = max(0, self._unseen - 1)
@@ -395,46 +362,43 @@ class Session:
         if shown is None:
             raise ValueError("there is no result to look into yet; make one first")
         kept, self._inside = self._inside, {}
-        found = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
-        self._inside = {one.number: kept.get(one.number) or Inside(one.job, self._machine) for one in found}
-        samples = [frames.thumbnail(one.sample, PREVIEW) for one in self._inside.values()]
-        looked = [
+        both = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
+        self._inside = {each.number: kept.get(each.number) or Inside(each.job, self._machine) for each in both}
+        samples = [frames.thumbnail(inside.sample, PREVIEW) for inside in self._inside.values()]
+        panes = [
             {"result": number, "preview": [small.width, small.height], **inside.describe()}
             for small, (number, inside) in zip(samples, self._inside.items(), strict=True)
         ]
         self._stale = True
-        self.send({"kind": "inside", "panes": looked}, [small.pixels for small in samples])
+        self.send({"kind": "inside", "panes": panes}, [small.pixels for small in samples])
 
     def _on_seek(self, message: Message, buffers: Sequence[Any]) -> None:
         """Show a moment of the replayed results or, without a level, the results."""
-        for one in self._inside.values():
-            if message.get("level") is None:
-                one.finish()
-            else:
-                one.seek(message["level"], message.get("sweep"), message.get("sets"))
+        for inside in self._inside.values():
+            inside.seek(message.get("level"), message.get("sweep"), message.get("sets"))
         self._stale = True
-        self.send({"kind": "moments", "moments": [one.moment for one in self._inside.values()]}, [])
+        self.send({"kind": "moments", "moments": [inside.moment for inside in self._inside.values()]}, [])
 
     def _on_explain(self, message: Message, buffers: Sequence[Any]) -> None:
-        for pane, one in enumerate(self._inside.values()):
+        row, col = message.get("row"), message.get("col")
+        for pane, inside in enumerate(self._inside.values()):
             try:
-                other = {"order": message.get("order"), "trust": message.get("trust", 0)}
-                found = one.explain(message.get("row"), message.get("col"), **other)
+                why = inside.explain(row, col, order=message.get("order"), trust=message.get("trust", 0))
             except ValueError as error:
-                found = {"pixel": [message.get("row"), message.get("col")], "reason": str(error)}
-            self.send({"kind": "explained", "pane": pane, **found}, [])
+                why = {"pixel": [row, col], "reason": str(error)}
+            self.send({"kind": "explained", "pane": pane, **why}, [])
 
     def _on_schedules(self, message: Message, buffers: Sequence[Any]) -> None:
         """Make films of a small run with each of `FILMED`, one at a time, while no other message waits."""
         if self._picture is None:
             raise ValueError("there is no picture yet; give one first")
-        self._films = self._make_films(Job(message, self._picture, self._maps, self.results.find))
+        self._films = self._make_films(PageJob(message, self._picture, self._maps, self.results.find))
 
-    def _make_films(self, job: Job) -> Iterator[bool]:
+    def _make_films(self, job: PageJob) -> Iterator[bool]:
         """Send a film of a job with each of `FILMED`, and yield True after each."""
         for name in FILMED:
             message = job.message | {"options": job.options | {"schedule": name}}
-            described, pictures = film(Job(message, *job.given, self.results.find), self._machine)
+            described, pictures = film(PageJob(message, *job.material, self.results.find), self._machine)
             self.send({"kind": "schedule", "name": name, **described}, pictures)
             yield True
 
@@ -466,11 +430,11 @@ class Session:
         settings = None
         if job and restore:
             settings = self._asked = job.message
-            picture, maps = job.given
+            picture, maps = job.material
             if picture is not self._picture:
                 self._levels = None
-            before, after = ((one, *more.values()) for one, more in ((self._picture, self._maps), job.given))
-            if [id(one) for one in before] != [id(one) for one in after]:
+            before, after = ((image, *maps.values()) for image, maps in ((self._picture, self._maps), job.material))
+            if [id(each) for each in before] != [id(each) for each in after]:
                 self._picture, self._maps = picture, dict(maps)
                 self._send_picture(new=False)
         self.send({"kind": "selected", "result": number, "settings": settings}, [])
@@ -478,21 +442,18 @@ class Session:
     def _send_frame(
         self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True, pane: int = 0
     ) -> None:
-        """Send the page's window of its layer, of a result, the run or the sample."""
+        """Send the page's view of its layer, of a result, the run or the sample."""
         assert self._picture is not None
-        name, pixels = self._window.layer, self._picture.pixels
-        if not layers or (name == "sample" and name not in layers):
-            name, layer = "sample", frames.picture(pixels, pixels)
-        else:
-            name = name if name in layers else next(iter(layers))
-            layer = layers[name]()
-        frame = frames.render(layer, self._window, smooth=smooth)._asdict()
+        picture = self._picture.pixels
+        layers = {**layers, "sample": layers.get("sample", lambda: frames.picture(picture, picture))}
+        name = self._view.layer if self._view.layer in layers else next(iter(layers))
+        layer = layers[name]()
+        frame = frames.render(layer, self._view, smooth=smooth)._asdict()
         pixels = frame.pop("pixels")
-        fields = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._window.step, "of": of}
-        fields["pane"] = pane
+        fields = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._view.step, "of": of}
         self._stale = False
         self._unseen += 1
-        self.send({"kind": "frame", **fields, **frame}, [pixels])
+        self.send({"kind": "frame", **fields, "pane": pane, **frame}, [pixels])
 
     def _show_selected(self) -> None:
         """Send a frame of the selected result and of the one beside it, or of the sample."""
@@ -510,7 +471,7 @@ class Session:
         assert self._picture is not None
         with self._reported(str(message.get("job"))), suppress(Cancelled):
             try:
-                job = Job(message, self._picture, self._maps, self.results.find)
+                job = PageJob(message, self._picture, self._maps, self.results.find)
                 levels = self._begin(job)
                 began = time.perf_counter()
                 image, output = job.run(self._machine, partial(self._watch, job), levels.checkpointing)
@@ -526,13 +487,13 @@ class Session:
                 if self._wanted is message:
                     self._wanted = None
 
-    def _begin(self, job: Job) -> Levels:
+    def _begin(self, job: PageJob) -> Levels:
         """Return the states of the run, with the level that it starts from, and send that to the page."""
         key = {name: value for name, value in job.message.items() if name != "options"}
         restarts = job.method == "mrf" and job.kind != "fill"
-        own = {name: value for name, value in job.options.items() if name in table(mrf.Options)}
-        key |= {name: value for name, value in job.options.items() if name not in own}  # of inputs
-        options = resolve(mrf.Options, job.kind, own if restarts else {})
+        searched = {name: value for name, value in job.options.items() if name in table(mrf.Options)}
+        key |= {name: value for name, value in job.options.items() if name not in searched}  # of inputs
+        options = resolve(mrf.Options, job.kind, searched if restarts else {})
         levels = Levels(key if restarts else None, options, self._levels)
         first = "labels" if job.kind == "classify" else "picture"
         layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
@@ -541,7 +502,7 @@ class Session:
         self.send(self._begun, [])
         return levels
 
-    def _watch(self, job: Job, progress: Progress) -> None:
+    def _watch(self, job: PageJob, progress: Progress) -> None:
         """Handle messages during a run, show it, and wait while it is paused: the callback of the run."""
         while True:
             self._handle_all()
@@ -554,7 +515,7 @@ class Session:
                 return
             self._handle(*self._messages.get())
 
-    def _show_run(self, job: Job, progress: Progress) -> None:
+    def _show_run(self, job: PageJob, progress: Progress) -> None:
         """Send the progress of the run, and a frame of it or of the selected result."""
         fields = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
         self.send({"kind": "progress", **fields, "paused": self._paused}, [])
@@ -577,10 +538,7 @@ def _examples() -> dict[str, NDArray[np.uint8]]:
 
 
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
-    """Return the part of a picture that is the first sample, None for all, and the output's width and height.
-
-    The output of a regular sample has a size that its lattice fits.
-    """
+    """Return the part of a picture that is the first sample, None for all, and the output's width and height."""
     rows, cols = picture.pixels.shape[:2]
     width, height, part = cols, rows, None
     if max(rows, cols) > LARGE:
@@ -607,8 +565,8 @@ def _read(message: Message, buffers: Sequence[Any]) -> Picture:
     name = name.replace("\\", "/").rpartition("/")[2][:100] or "picture"
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
-    found = read_apart(name, data)
-    return Picture(name, found.pixels, found.channel_axis, found.metadata)
+    image = read_apart(name, data)
+    return Picture(name, image.pixels, image.channel_axis, image.metadata)
 
 
 def read_apart(name: str, data: bytes) -> Image:
@@ -620,15 +578,15 @@ def read_apart(name: str, data: bytes) -> Image:
     there.close()
     try:
         late = ValueError(f"{name} cannot be read within {READ_WAIT:.0f} s: save it again as PNG")
-        found: Image | ValueError = here.recv() if here.poll(READ_WAIT) else late
+        answer: Image | ValueError = here.recv() if here.poll(READ_WAIT) else late
     except EOFError:
-        found = ValueError(f"{name} ends the process that reads it: save it again as PNG")
+        answer = ValueError(f"{name} ends the process that reads it: save it again as PNG")
     finally:
         process.kill()
         here.close()
-    if isinstance(found, ValueError):
-        raise found
-    return found
+    if isinstance(answer, ValueError):
+        raise answer
+    return answer
 
 
 def _reading(there: Connection, name: str, data: bytes) -> None:

@@ -104,9 +104,7 @@ class Live(AnyWidget):
     def wait(self, timeout: float | None = None) -> NDArray[Any]:
         """Return the latest result when no run is left; start a first run if there is no result.
 
-        With *Run All*, the page appears only after all cells have ended, so the first run starts here. ``timeout`` is
-        in seconds. Raises ValueError if there is no sample, or if the job was refused or cancelled, and TimeoutError
-        after ``timeout``.
+        Raises ValueError if there is no sample or the job was refused, and TimeoutError after ``timeout`` seconds.
         """
         if self._session is None:
             raise ValueError("there is no picture yet; give one first")

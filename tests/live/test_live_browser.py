@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from live import png, striped, texture
 import simdtex
 from simdtex.io.image import example
 from simdtex.live import script, style
-from simdtex.live.job import LABELS
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,8 +74,8 @@ class Page:
 
     def labelled(self, text):
         """The control that a label of these words is for."""
-        found = self.driver.find_element(By.XPATH, f"//label[normalize-space()='{text}']")
-        return self.driver.find_element(By.ID, found.get_attribute("for"))
+        label = self.driver.find_element(By.XPATH, f"//label[normalize-space()='{text}']")
+        return self.driver.find_element(By.ID, label.get_attribute("for"))
 
     def button(self, text):
         return self.driver.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
@@ -107,9 +107,6 @@ class Page:
 
     def choose(self, label, text):
         Select(self.labelled(label)).select_by_visible_text(text)
-
-    def open(self, selector):
-        self.script("document.querySelector(arguments[0]).open = true", selector)
 
     def download(self, name):
         """Download a file of the result: its bytes."""
@@ -190,6 +187,25 @@ def wall(tmp_path):
     return path
 
 
+@pytest.fixture
+def made(page, wall):
+    """A page with the result of a dropped picture."""
+    drop(page.driver, wall)
+    page.result(1)
+    return page
+
+
+@contextmanager
+def beside(page, address):
+    """Another page, in a tab of its own."""
+    other = Page(page.driver, address)
+    try:
+        yield other
+    finally:
+        other.driver.close()
+        other.driver.switch_to.window(page.handle)
+
+
 def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -198,60 +214,51 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     assert page.command[:5] == ["simdtex", "synth", "wall.png", "-o", "texture.png"]
     page.assert_command_repeats(wall.parent)
     assert f"{width} \u00d7 {height} in " in page.one(".doing").text
-    assert page.script("return page.frames") >= 1
     assert page.sees(np.array(PIL.Image.open(wall.parent / "texture.png"))), "the pixels are seen as they are"
 
 
-def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
-    page.script("page.auto = false")
-    drop(page.driver, wall)
-    page.result(1)
-    page.put("Result width", 700)
-    page.put("Result height", 700)
-    page.button("Make the texture").click()
-    until(lambda: page.script("return page.running"))
-    page.button("Pause").click()
-    until(lambda: page.status == "Paused.")
-    page.script("return new Promise((done) => setTimeout(done, 300))")  # what was on its way arrives
-    before = page.script("return page.frames")
-    doing = page.one(".doing").text
-    page.script("return new Promise((done) => setTimeout(done, 700))")
-    assert (page.script("return page.frames"), page.one(".doing").text, page.results) == (before, doing, 1)
-    Select(page.labelled("Layer")).select_by_value("temperature")
-    until(lambda: page.script("return page.seen") == "temperature")
-    page.button("Resume").click()
-    page.result(2)
-    page.assert_command_repeats(wall.parent)
-    page.put("Result height", 4000)
-    page.button("Make the texture").click()
-    until(lambda: page.script("return page.running"))
-    page.button("Cancel").click()
-    until(lambda: page.status == "Cancelled.")
-    assert page.results == 2
+def test_a_run_pauses_resumes_and_is_cancelled(made, wall):
+    made.script("page.auto = false")
+    made.put("Result width", 700)
+    made.put("Result height", 700)
+    made.button("Make the texture").click()
+    until(lambda: made.script("return page.running"))
+    made.button("Pause").click()
+    until(lambda: made.status == "Paused.")
+    made.script("return new Promise((done) => setTimeout(done, 300))")  # what was on its way arrives
+    before = made.script("return page.frames")
+    made.script("return new Promise((done) => setTimeout(done, 700))")
+    assert (made.script("return page.frames"), made.results) == (before, 1)
+    Select(made.labelled("Layer")).select_by_value("temperature")
+    until(lambda: made.script("return page.seen") == "temperature")
+    made.button("Resume").click()
+    made.result(2)
+    made.assert_command_repeats(wall.parent)
+    made.put("Result height", 4000)
+    made.button("Make the texture").click()
+    until(lambda: made.script("return page.running"))
+    made.button("Cancel").click()
+    until(lambda: made.status == "Cancelled.")
+    assert made.results == 2
 
 
-def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path):
-    drop(page.driver, wall)
-    page.result(1)
-    page.button("Paint").click()
-    until(lambda: page.one(".tools").is_displayed())
-    canvas = page.one("canvas.view")
-    ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(30, 20).release().perform()
-    page.button("Fill the hole").click()
-    page.result(2)
-    with zipfile.ZipFile(BytesIO(page.download("texture.zip"))) as archive:
+def test_a_painted_hole_is_filled_and_nothing_else_changes(made):
+    made.button("Paint").click()
+    until(lambda: made.one(".tools").is_displayed())
+    canvas = made.one("canvas.view")
+    ActionChains(made.driver).move_to_element(canvas).click_and_hold().move_by_offset(30, 20).release().perform()
+    made.button("Fill the hole").click()
+    made.result(2)
+    with zipfile.ZipFile(BytesIO(made.download("texture.zip"))) as archive:
         hole, before, after = (
             np.array(PIL.Image.open(archive.open(name))) for name in ("hole.png", "result-1.png", "texture.png")
         )
-    page.button("Make").click()
-    page.script("return new Promise((done) => setTimeout(done, 300))")
-    assert not page.script("return page.running") and page.results == 2, "another place is no change of the settings"
     assert 0 < (hole > 0).mean() < 0.2
     assert (before[hole == 0] == after[hole == 0]).all()
     assert (before[hole > 0] != after[hole > 0]).any()
 
 
-def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
+def test_painted_classes_are_labelled_and_strokes_undone(page, tmp_path):
     page.script("page.setTask('classes')")
     (tmp_path / "ground.png").write_bytes(png(striped()))
     drop(page.driver, tmp_path / "ground.png")
@@ -259,29 +266,21 @@ def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
     until(lambda: page.script("return page.view.cols") == 96)
     page.paint("Label 1", 20, 10, 20, 38)
     until(lambda: page.one(".hint").text.startswith("Only label 1 is painted;"))
-    assert page.one(".classes").text == "Label 1" and page.results == 0
     page.paint("Label 3", 60, 10, 60, 38)
     page.result(1)
     assert not page.one(".hint").text and not page.all("[role=alert]:not([hidden])")
-    page.script("page.make(); page.pause()")
-    until(lambda: page.script("return page.watching"))
-    page.paint("Label 3", 50, 10, 70, 10)  # during the run, which begins again
+    page.paint("Label 3", 50, 10, 70, 10)
     page.result(2)
-    assert page.script("return page.painting.strokes.sample.length") == 3
     ActionChains(page.driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform()
     page.result(3)  # without the last stroke
     page.button("Redo").click()
     page.result(4)
-    page.script("page.go('make'); clearTimeout(page.waiting)")  # which hides the strokes
     (tmp_path / "strokes.png").write_bytes(page.download("strokes.png"))
     page.assert_command_repeats(tmp_path)
-    labels = np.array(PIL.Image.open(tmp_path / "labels.png"))
-    painted = np.array(PIL.Image.open(tmp_path / "strokes.png"))
+    labels, painted = (np.array(PIL.Image.open(tmp_path / f"{name}.png")) for name in ("labels", "strokes"))
     assert set(np.unique(painted)) == {0, 1, 3} and painted[10, 50] == painted[38, 60] == 3
-    colours = LABELS[labels]
-    until(lambda: page.sees((striped().astype(int) + colours) // 2))
-    wanted = zip(("Unknown", "Label 1", "Label 3"), [(labels == label).sum() for label in (0, 1, 3)], strict=True)
-    assert page.one(".classes").text.split("\n") == [f"{name}: {100 * n / labels.size:.1f} %" for name, n in wanted]
+    wanted = zip(("Unknown", "Label 1", "Label 3"), [(labels == label).mean() for label in (0, 1, 3)], strict=True)
+    assert page.one(".classes").text.split("\n") == [f"{name}: {100 * share:.1f} %" for name, share in wanted]
 
 
 def test_everything_is_done_by_the_keyboard_alone(page):
@@ -304,7 +303,7 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     tab_to(lambda one: one.get_attribute("aria-label") == "Zoom in")
     scale = page.script("return page.view.unit")
     keys(Keys.ENTER)
-    assert page.script("return page.view.unit") == int(scale) + 1, "the next whole factor"
+    assert page.script("return page.view.unit") > scale
     tab_to(lambda one: one.tag_name == "canvas")
     left = page.script("return page.view.left")
     keys(Keys.ARROW_RIGHT)
@@ -325,25 +324,7 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     until(lambda: list(page.folder.glob("texture*.png"))).pop().unlink()
 
 
-def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
-    with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
-        page = Page(chromium, address)
-        port = address.split(":")[2].split("/")[0]
-        page.script("page.auto = false")
-        page.put("Size of features (order)", 4)
-        drop(page.driver, wall)
-        until(lambda: page.script("return page.running"))
-        process.kill()
-        until(lambda: page.alert.startswith("The connection to simdtex is lost."))
-        assert page.status == "Not connected."
-    with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN):
-        page.result(1)  # the page has given the picture again, and asked for the same
-        assert not page.all("[role=alert]:not([hidden])")
-    chromium.close()
-    chromium.switch_to.window(chromium.window_handles[0])
-
-
-def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_path):
+def test_a_killed_server_is_told_and_a_new_one_is_given_the_picture_and_its_map(chromium, wall, tmp_path):
     (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
@@ -354,10 +335,12 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
         drop(page.driver, tmp_path / "normal.png", place=".maps")
         until(lambda: len(page.all(".maps li")) == 1)
         process.kill()
-        until(lambda: page.alert)
+        until(lambda: page.alert.startswith("The connection to simdtex is lost."))
+        assert page.status == "Not connected."
     with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN) as (process, _):
         until(lambda: page.results)
         assert page.one(".maps li").get_attribute("textContent").startswith("normal")
+        assert not page.all("[role=alert]:not([hidden])")
         page.driver.refresh()
         until(lambda: page.script("return Boolean(window.page && page.picture)"))
         process.kill()
@@ -369,79 +352,54 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
     chromium.switch_to.window(chromium.window_handles[0])
 
 
-def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
-    page.script("page.auto = false")
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("page.setPart([8, 4, 50, 60])")
-    page.script("page.painting.change({sample: [{label: 1, width: 9, points: [[9, 9]]}], output: [], hole: []})")
-    page.put("Coherence", 1.5)
-    page.script("page.connection.socket.close()")
-    until(lambda: page.status == "Not connected.")
-    until(lambda: page.status == "Result 1 is ready." and "seed" in page.one(".doing").text)
-    assert page.script("return page.layer") == "picture"
-    assert page.script("return [page.part, page.painting.strokes.sample.length]") == [[8, 4, 50, 60], 1]
-    assert page.labelled("Coherence").get_attribute("value") == "1.5"
+def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(made):
+    made.script("page.auto = false")
+    made.script("page.setPart([8, 4, 50, 60])")
+    made.script("page.painting.change({sample: [{label: 1, width: 9, points: [[9, 9]]}], output: [], hole: []})")
+    made.put("Coherence", 1.5)
+    made.script("page.connection.socket.close()")
+    until(lambda: made.status == "Not connected.")
+    until(lambda: made.status == "Result 1 is ready." and "seed" in made.one(".doing").text)
+    assert made.script("return page.layer") == "picture"
+    assert made.script("return [page.part, page.painting.strokes.sample.length]") == [[8, 4, 50, 60], 1]
+    assert made.labelled("Coherence").get_attribute("value") == "1.5"
 
 
-FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
-
-
-def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    bad = [one.get_attribute("outerHTML")[:80] for one in page.all(f":is({FOCUS}):not([data-lm-suppress-shortcuts])")]
-    assert not bad and len(page.all(FOCUS)) > 30
-
-
-def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
-    shown(page.driver, width=390, height=700)
-    page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(made):
+    shown(made.driver, width=390, height=700)
+    made.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
 
     def swipe(selector, across=1, down=-3):
-        page.script("arguments[0].scrollIntoView({block: 'center'})", page.one(selector))
-        box = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.one(selector))
-        before = page.script("return scrollY")
+        made.script("arguments[0].scrollIntoView({block: 'center'})", made.one(selector))
+        box = made.script("return arguments[0].getBoundingClientRect().toJSON()", made.one(selector))
+        before = made.script("return scrollY")
         x, y = box["x"] + 20, box["y"] + box["height"] / 2
-        moves = [("Move", [(x + across * i, y + down * i)]) for i in range(1, 30)]
-        touches = [("Start", [(x, y)]), *moves, ("End", [])]
-        for kind, points in touches:
-            at = [{"x": left, "y": top} for left, top in points]
-            page.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": at})
-        page.script("return new Promise((done) => setTimeout(done, 200))")
-        return page.script("return scrollY") - before
+        moves = [("Move", [{"x": x + across * i, "y": y + down * i}]) for i in range(1, 30)]
+        for kind, points in [("Start", [{"x": x, "y": y}]), *moves, ("End", [])]:
+            made.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+        made.script("return new Promise((done) => setTimeout(done, 200))")
+        return made.script("return scrollY") - before
 
     try:
-        drop(page.driver, wall)
-        page.result(1)
-        page.script("document.querySelector('.columns').style.paddingBottom = '900px'")
+        made.script("document.querySelector('.columns').style.paddingBottom = '900px'")
         for selector in ("canvas.preview", "canvas.view"):
             assert swipe(selector) > 30, selector
             swipe(selector, across=2, down=-1)
-        page.script(
-            "const c = page.preview; c.setPointerCapture = () => {}; const b = c.getBoundingClientRect();"
-            "for (const [kind, by] of [['down', 5], ['move', 40], ['up', 40]]) c.dispatchEvent(new PointerEvent("
-            "`pointer${kind}`, {pointerType: 'touch', clientX: b.x + by, clientY: b.y + by}))"
-        )  # a browser that waits longer than Chromium before it takes a finger for a swipe
-        assert page.script("return [page.part, page.view.fitted]") == [None, True]
-        page.script("delete page.preview.setPointerCapture; page.chooseByFinger(true)")
+        assert made.script("return [page.part, page.view.fitted]") == [None, True]
+        made.script("page.chooseByFinger(true)")
         assert abs(swipe("canvas.preview")) < 30  # what stands above it may have changed its height
-        assert page.script("return page.part") is not None
-        page.result(2)
-        page.script("page.view.zoom(1)")
-        page.script("return new Promise((done) => setTimeout(done, 100))")
+        assert made.script("return page.part") is not None
+        made.result(2)
+        made.script("page.view.zoom(1)")
+        made.script("return new Promise((done) => setTimeout(done, 100))")
         assert abs(swipe("canvas.view")) < 30, "what is larger than the view is moved in it"
     finally:
-        page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+        made.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
 def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall):
-    assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed()
+    assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed() and page.faults() == []
     assert [one.text for one in page.all(".examples button")] == ["tissue", "brick", "grass", "gravel"]
-    pixels = (
-        "const c = arguments[0]; return new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size"
-    )
-    assert all(page.script(pixels, one) > 20 for one in page.all(".examples canvas"))
     drop(page.driver, wall, place=".start")
     page.result(1)
     assert not page.one(".start").is_displayed()
@@ -453,78 +411,20 @@ def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall)
         assert 0 < run["top"] < run["bottom"] <= page.script("return innerHeight"), "the run is always in reach"
 
 
-def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
-    shown(page.driver, width=1280, height=720)
-    drop(page.driver, wall)
-    page.result(1)
-    view = page.one("canvas.view").rect
-    for selector in (".strip button:not(.current button)", ".result [data-file='texture.zip']"):
-        rect = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.all(selector)[-1])
-        assert rect["left"] >= view["x"] + view["width"] and rect["bottom"] <= 720
-    page.script(
-        "window.heights = new Set(); const seen = () => { heights.add(document.querySelector('.result').scrollHeight);"
-        "requestAnimationFrame(seen) }; seen(); page.setPart([0, 0, 40, 40])"
-    )
-    page.result(2)
-    assert len(page.script("return [...heights]")) == 1
-
-
-def test_status_refusals_and_strokes_are_of_what_is_shown(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("page.newSeed(); page.pause()")
-    until(lambda: page.status == "Running.")
-    page.all(".strip button")[0].click()
-    until(lambda: page.status == "Result 1 is shown.")
-    page.script("page.send({kind: 'resume'})")
-    until(lambda: page.status == "Result 2 is ready; result 1 is shown.")
-    page.script(
-        "document.querySelector('.columns').style.paddingBottom = '2000px'; scrollTo(0, 1e6);"
-        "page.options.mrf.values = {finish: 99}"
-    )
-    page.script("page.make()")
-    until(lambda: page.alert.startswith("Soften seams (finish) is 99; "))
-    box = page.script("return document.querySelector('[role=alert]').getBoundingClientRect().toJSON()")
-    assert page.script("return scrollY") > 300 and 0 <= box["top"] < box["bottom"] <= 1000
-    strokes = "[{label: 1, width: 20, points: [[30, 30]]}]"
-    page.script(f"page.setTask('guide'); page.painting.change({{sample: {strokes}, output: {strokes}, hole: []}})")
-    page.script("page.options.mrf.values = {}; page.make(); page.showLayer('picture'); scrollTo(0, 0)")
-    until(lambda: page.script("return page.view.panes[0].frame.of === 3 && !page.view.drawing"))
-    over = page.canvas()
-    page.script("page.place = 'make'")
-    until(lambda: page.script("return !page.view.drawing"))
-    covered = (over != page.canvas()).any(-1).sum() / page.script("return page.view.unit") ** 2
-    assert 0 < covered < 0.25 * np.pi * 10**2, "only an outline hides the result"
-    page.script("page.setTask('hole')")
-    drop(page.driver, wall)
-    until(lambda: page.status == "Ready.")
-
-
-def test_a_size_and_a_seed_are_chosen_and_results_say_what_changed(page, wall):
-    def captions():
-        return [one.text.split(", ", 1)[1] for one in page.all(".strip li:not(.current) button:first-child span")]
-
-    page.script("page.auto = false")
-    drop(page.driver, wall)
-    page.result(1)
-    assert page.one(".badge").is_displayed(), "it tiles"
-    page.script("arguments[0].click()", page.one("[aria-label='256 \u00d7 256']"))
-    page.button("Make the texture").click()
-    page.result(2)
-    page.put("Keep structure", 4)
-    page.script("arguments[0].click()", page.button("Four seeds"))
-    page.result(6)
-    seeds = page.script("return [...page.results.values()].map(({settings}) => settings.seed)")
-    assert len(set(seeds)) == 5 and np.ptp(seeds[2:]) == 3
-    said = ["More of the texture", "256 \u00d7 256", f"Keep structure 2 to 4, seed {seeds[2]}"]
-    assert captions() == [*said, *(f"seed {one}" for one in seeds[3:])]
-    page.script("arguments[0].click()", page.one("[aria-label='Delete result 6']"))
-    until(lambda: page.results == 5 and page.script("return page.shown") == 5)
-    held = "page.view.canvas.dispatchEvent(new KeyboardEvent(arguments[0], {key: 't'})); return page.tiled"
-    assert [page.script(held, kind) for kind in ("keydown", "keyup")] == [True, False]
-    page.driver.refresh()
-    until(lambda: page.script("return Boolean(window.page && page.found)"))
-    assert page.results == 5
+def test_sizes_and_seeds_are_chosen_and_results_say_what_changed(made):
+    made.script("page.auto = false")
+    made.script("arguments[0].click()", made.one("[aria-label='256 \u00d7 256']"))
+    made.script("arguments[0].click()", made.button("Four seeds"))
+    made.result(5)
+    seeds = made.script("return [...page.results.values()].map(({settings}) => settings.seed)")
+    assert len(set(seeds)) == 5 and np.ptp(seeds[1:]) == 3
+    captions = [one.text.split(", ", 1)[1] for one in made.all(".strip li:not(.current) button:first-child span")]
+    changes = [f"256 \u00d7 256, seed {seeds[1]}", *(f"seed {seed}" for seed in seeds[2:])]
+    assert captions == ["More of the texture", *changes]
+    made.script("arguments[0].click()", made.one("[aria-label='Delete result 5']"))
+    until(lambda: made.results == 4 and made.script("return page.shown") == 4)
+    made.script("page.options.mrf.values = {finish: 99}; page.make()")
+    until(lambda: made.alert.startswith("Soften seams (finish) is 99; "))
 
 
 def test_dropped_files_are_one_material(page, tmp_path):
@@ -533,7 +433,6 @@ def test_dropped_files_are_one_material(page, tmp_path):
         path.write_bytes(png(texture(64, 72, seed=seed)))
     drop(page.driver, *paths)
     page.result(1)
-    page.result(2) if page.script("return page.found.layers.length") < 7 else None
     assert page.script("return [page.picture.name, page.maps]") == ["wall_albedo.png", ["wall-normal", "wall-height"]]
     until(lambda: "map wall-height" in page.script("return page.found ? page.found.layers : []"))
     paths[0].write_bytes(png(texture(32, 32)))
@@ -542,62 +441,26 @@ def test_dropped_files_are_one_material(page, tmp_path):
     assert page.script("return page.maps.length") == 2
 
 
-def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
-    page.script("page.auto = false")
-    file = tmp_path / "moving.gif"
-    first, second = (PIL.Image.fromarray(texture(64, 72, seed=seed)) for seed in (1, 2))
-    first.save(file, save_all=True, append_images=[second])
-    drop(page.driver, file)
-    page.result(1)
-    assert "further frames or pages; this is the first" in page.one(".named").text
-    slider = "return document.querySelector(`[aria-label='${arguments[0]}, slider']`).value"
-    assert float(page.script(slider, "Soften seams (finish)")) == 1.5
-    field = page.labelled("Size of features (order)")
-    for value, words in ((1000, "More than 40: a run can take many times as long"), (20, "")):
-        page.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", field, value)
-        note = field.find_element(By.XPATH, "..//small[@class='beyond']").get_attribute("textContent")
-        assert note.startswith(words) and bool(note) == bool(words)
-    assert not page.one(".legend").is_displayed()
-    page.choose("Layer", "Temperature")
-    until(lambda: page.one(".legend").text.startswith("Black: settled."))
-    assert "gradient" in page.one(".scale").value_of_css_property("background-image")
-    page.script("page.going = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
-    assert page.one(".doing").text == "Preparing the sample.", "a new run does not show the last one's level"
-    small = "[new Uint8Array(4)]"
-    page.script("page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")")
-    assert "Result 1 is no longer kept" in page.status
-
-
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_nothing_keeps_people_out(page, wall, dark):
-    shown(page.driver, width=1400, dark=dark)
-    assert page.faults() == []
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
-    assert page.faults() == []
-
-
-@pytest.mark.parametrize(("window", "cell"), [(320, None), (390, None), (820, None), (1400, 300), (1400, 850)])
-def test_it_fits_a_phone_and_a_cell_of_a_notebook(page, wall, window, cell):
-    shown(page.driver, width=window)
-    if cell:
-        page.script("document.getElementById('simdtex-live').style.width = arguments[0] + 'px'", cell)
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
-    scrolled = "document.querySelector('.simdtex')" if cell else "document.documentElement"
-    assert page.script(f"return {scrolled}.scrollWidth") <= (cell or window)
-    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(cell or window, 800)
-
-
-def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wall, served):
+def test_it_keeps_nobody_out_fits_everywhere_and_loads_nothing_from_elsewhere(page, wall, served):
     page.driver.get_log("browser")
     drop(page.driver, wall)
     page.result(1)
     loaded = page.script("return performance.getEntriesByType('resource').map((one) => one.name)")
     assert {name.rsplit("/", 1)[0] for name in loaded} == {served.rstrip("/")}
-    assert page.driver.get_log("browser") == []
+    assert page.driver.get_log("browser") == [], "nothing is complained of"
+    controls = page.all("button, input, select, summary, textarea, a[href], [tabindex]")
+    assert len(controls) > 30 and all(one.get_attribute("data-lm-suppress-shortcuts") is not None for one in controls)
+    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    for dark in (False, True):
+        shown(page.driver, width=1400, dark=dark)
+        assert page.faults() == []
+    for window, cell in ((320, None), (820, None), (1400, 300)):  # of a notebook
+        shown(page.driver, width=window)
+        page.script(f"document.getElementById('simdtex-live').style.width = '{cell}px'" if cell else "")
+        scrolled = "document.querySelector('.simdtex')" if cell else "document.documentElement"
+        until(lambda: page.script("return !page.view.drawing"))
+        assert page.script(f"return {scrolled}.scrollWidth") <= (cell or window)
+        assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(cell or window, 800)
 
 
 # -- a look inside a run
@@ -631,17 +494,14 @@ def at(page):
 def test_a_click_explains_a_pixel(inside):
     canvas = inside.one("canvas.view")
     inside.script("page.view.zoom(1)")
-    left, top, unit = inside.script("return [page.view.left, page.view.top, page.view.unit]")
-    middle = canvas.size["width"] / 2, canvas.size["height"] / 2
-    pixel = int(top + middle[1] / unit), int(left + middle[0] / unit)
+    left = inside.script("return page.view.left")
     ActionChains(inside.driver).move_to_element(canvas).click().perform()
     why = explained(inside)
-    assert max(abs(one - other) for one, other in zip(why["pixel"], pixel, strict=True)) <= 1
     pixel = tuple(why["pixel"])
+    assert max(abs(side - 24) for side in pixel) <= 1, "in the middle"
     expected = simdtex.explain(example("grass")[:192, :192], (48, 48), pixel, order=4, schedule="checkerboard", rng=1)
     assert why["reason"] == expected.reason
-    rows = [row.text for row in inside.all(".reason tbody tr")]
-    assert len(rows) == len(expected.shown())
+    assert len(inside.all(".reason tbody tr")) == len(expected.shown())
     assert ", ".join(map(str, expected.candidates.place[expected.taken])) in inside.one(".reason tr.taken").text
     canvas.send_keys(Keys.ARROW_RIGHT)
     until(lambda: explained(inside)["pixel"] == [pixel[0], pixel[1] + 1])
@@ -653,53 +513,36 @@ def test_a_click_explains_a_pixel(inside):
     assert inside.faults() == []
 
 
-def test_the_time_line_steps_and_plays(inside):
+def test_the_line_of_time_steps_plays_and_is_a_slider_for_the_pointer_and_for_keys(inside):
     assert at(inside) is None
     sweeps = inside.script("return page.inside.sweeps")
-    back, forth = (inside.one(f"[aria-label='A set of sites {way}']") for way in ("back", "on"))
     inside.one("[aria-label='A sweep back']").click()
     until(lambda: at(inside) == [len(sweeps) - 1, 2])
-    back.click()
+    inside.one("[aria-label='A set of sites back']").click()
     until(lambda: at(inside) == [len(sweeps) - 1, 1])
     until(lambda: inside.script("return page.seen") == "sets")
     assert "set 1 of 2" in inside.one(".moment").text
-    shown_there = inside.canvas()
-    magenta = (shown_there[..., :3] == [255, 30, 155]).all(-1).mean() / (shown_there[..., 3] > 0).mean()
+    seen = inside.canvas()
+    magenta = (seen[..., :3] == [255, 30, 155]).all(-1).mean() / (seen[..., 3] > 0).mean()
     assert 0.2 < magenta < 0.6, "half of the sites have relaxed last"
-    forth.click()
-    forth.click()
-    until(lambda: at(inside) is None)
     inside.script("page.inside.seek(0, 0)")
     until(lambda: at(inside) == [0, 0])
     inside.button("Play").click()
     until(lambda: at(inside) is not None and at(inside)[0] > 3)
     inside.button("Stop").click()
-    seen = at(inside)
-    assert 3 < seen[0] < len(sweeps)
-
-
-def test_the_line_of_time_is_a_slider_for_the_pointer_and_for_keys(inside):
-    sweeps = inside.script("return page.inside.sweeps")
+    assert 3 < at(inside)[0] < len(sweeps)
     line = inside.one("[role=slider][aria-label=Time]")
     bands = [one.text for one in inside.all(".band > span")]
     assert bands[-2:] == ["level 0 (full size)", "result"] and "level 1 (half size)" in bands
     cells = inside.all(".sweep")
-    assert len(cells) == len(sweeps) + 1
-    heights = inside.script(
-        "return [...document.querySelectorAll('.sweep i')].map((one) => parseFloat(one.style.height))"
-    )
+    heights = inside.script("return [...document.querySelectorAll('.sweep i')].map((i) => parseFloat(i.style.height))")
     np.testing.assert_allclose(heights, [100 * one[4] for one in sweeps], atol=0.01)
-    line.send_keys(Keys.HOME)
-    until(lambda: at(inside) == [0, 0])
-    for keys, moment in ((Keys.ARROW_RIGHT, [0, 1]), (Keys.ARROW_UP, [1, sweeps[1][2]]), (Keys.ARROW_LEFT, [1, 1])):
+    up, down = [1, sweeps[1][2]], [0, sweeps[0][2]]
+    moves = {Keys.HOME: [0, 0], Keys.ARROW_RIGHT: [0, 1], Keys.ARROW_UP: up, Keys.ARROW_LEFT: [1, 1]}
+    for keys, moment in (moves | {Keys.ARROW_DOWN: down, Keys.END: None}).items():
         line.send_keys(keys)
         until(lambda moment=moment: at(inside) == moment)
         assert line.get_attribute("aria-valuetext") == inside.one(".moment").text
-    line.send_keys(Keys.ARROW_DOWN)
-    until(lambda: at(inside) == [0, sweeps[0][2]])
-    assert float(line.get_attribute("aria-valuenow")) == 1
-    line.send_keys(Keys.END)
-    until(lambda: at(inside) is None)
     assert line.get_attribute("aria-valuenow") == line.get_attribute("aria-valuemax")
     drag = ActionChains(inside.driver).move_to_element(cells[2]).click_and_hold()
     drag.move_to_element(cells[4]).release().perform()
@@ -722,126 +565,57 @@ def test_order_and_trust_act_on_the_pixel_without_a_run(inside):
     inside.script("page.inside.pick(11, 21)")
     first = explained(inside)
     assert (first["order"], len(first["offsets"])) == (4, 12)
-    for name, value in (("order", 8), ("trust", 1)):
-        inside.script("for (const one of [1, 2, 3, 5]) " + "{" + SLIDE.replace("arguments[1]", "one") + "}", name)
-        inside.script(SLIDE, name, value)  # the last answer counts
+    for name, *values in (("order", 2, 8), ("trust", 0.5, 1)):  # the last answer counts
+        for value in values:
+            inside.script(SLIDE, name, value)
         until(lambda: not inside.script("return page.inside.explaining || page.inside.again"))
         now = explained(inside)
         assert now["order"] == 8 and len(now["offsets"]) == 24
         assert (np.array(now["trust"]) == 1).all() == (name == "trust")
-        assert now["totals"] != first["totals"] and (now["level"], now["sweep"]) == (first["level"], first["sweep"])
     assert "order 8, 24 neighbours; doubt t of the neighbours: 0 %" in inside.one(".dice output").text
     inside.button("As in the run").click()
     until(lambda: explained(inside)["totals"] == first["totals"])
     assert inside.script("return page.results.size") == 4
-
-
-def test_a_pixel_is_watched_from_run_to_run(inside):
-    inside.script("page.inside.seekPlace(0, 2, 1)")
     moment = at(inside)
-    inside.script("page.inside.pick(11, 21)")
-    explained(inside)
-    inside.script("page.options.mrf.values = {order: 4, schedule: 'checkerboard', bandwidth: 0.5}; page.make()")
-    inside.result(4)
-    until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 4)
-    assert explained(inside)["pixel"] == [11, 21] and at(inside)[1] == moment[1] == 1
-    assert inside.one(".moment").text.startswith("Level 0, sweep 2 of")
-    inside.choose("Beside it", "Result 3")
-    until(lambda: "Result 3 beside it: Bandwidth 0.5 to 0.15." in inside.one(".captions").text)
-    inside.script("page.send({kind: 'inside', open: true, beside: 99}); page.inside.looking = true")
-    until(lambda: "no longer kept" in inside.one(".inside > [role=status]").text)
-    assert not inside.one(".line").is_displayed() and not inside.script("return page.inside.open")
+    inside.script("page.options.mrf.values.bandwidth = 0.5; page.make()")  # the pixel is watched from run to run
+    inside.result(5)
+    until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 5)
+    assert explained(inside)["pixel"] == [11, 21] and at(inside) == moment
+    inside.choose("Beside it", "Result 4")
+    until(lambda: "Result 4 beside it: Bandwidth 0.5 to 0.15." in inside.one(".captions").text)
 
 
-def test_a_link_brings_a_look_into_an_example_back(inside, served):
+def test_a_link_and_a_saved_view_bring_all_of_it_back(inside, served):
     inside.script("page.inside.seekPlace(0, 2, 1); page.showLayer('temperature')")
     at(inside)
-    inside.script("page.inside.pick(20, 31)")
+    inside.script("page.view.zoom(1); page.inside.pick(20, 31)")
     explained(inside)
-    wanted = inside.script("return [page.inside.at, page.inside.pixel, page.layer]")
+    place = "return [page.inside.at, page.inside.pixel, page.layer]"
+    wanted = inside.script(place)
     inside.button("Copy a link").click()
     link = inside.driver.current_url
     assert link.endswith(
         "#grass&method=mrf&size=48,48&seed=1&order=4&schedule=checkerboard&pixel=20,31&moment=0,2,1&layer=temperature"
     )
-    other = Page(inside.driver, served + link[link.index("#") :])
-    try:
+    with beside(inside, served + link[link.index("#") :]) as other:
         until(lambda: other.status == "The view is restored.")
-        until(lambda: other.script("return [page.inside.at, page.inside.pixel, page.layer]") == wanted)
+        until(lambda: other.script(place) == wanted)
         assert explained(other)["pixel"] == [20, 31]
         other.script("location.hash = '#granite&size=40,24'")
         until(lambda: 'no example "granite"' in other.alert)
-        other.script("location.hash = '#gravel&size=40,24&order=2'")
-        until(
-            lambda: (
-                other.script("return [page.picture.name, page.results.get(page.shown)?.width]") == ["gravel.png", 40]
-            )
-        )
-    finally:
-        other.driver.close()
-        other.driver.switch_to.window(inside.handle)
-
-
-def test_a_saved_view_brings_all_of_it_back(inside, served):
     inside.choose("Beside it", "Result 2")
     until(lambda: inside.script("return page.inside.panes.length") == 2)
-    inside.script("page.inside.seek(page.inside.sweeps.length - 2, 1); page.showLayer('temperature')")
-    moment = at(inside)
-    inside.script("page.view.zoom(1); page.inside.pick(20, 30)")
-    explained(inside)
-    wanted = inside.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
-    assert wanted[0] == moment
+    corner = "return [page.view.unit, page.view.left]"
+    wanted = inside.script(place), inside.script(corner)
     inside.button("Save this view").click()
     path = inside.folder / "grass-view.json"
     until(lambda: path.exists() and path.stat().st_size)
-    other = Page(inside.driver, served)
-    count = "const send = page.send.bind(page); page.runs = 0; "
-    count += "page.send = (message, buffers) => { page.runs += message.kind === 'make'; send(message, buffers); }"
-    try:
-        other.script(count)
+    with beside(inside, served) as other:
         drop(other.driver, path, place=".start")
         until(lambda: other.status == "The view is restored.")
-        assert other.script("return page.runs") == 2
-        now = other.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
-        assert now == wanted
+        assert (other.script(place), other.script(corner)) == wanted
         settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")
         assert settings == [{"order": 4, "schedule": "checkerboard"}, {"order": 4}]
-        path.write_text("{}")
-        drop(other.driver, path, place=".result")
-        until(lambda: "no view" in other.alert)
-    finally:
-        other.driver.close()
-        other.driver.switch_to.window(inside.handle)
-
-
-def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_into(inside):
-    inside.script("page.method = 'pyramid'; page.make()")
-    inside.result(4)
-    until(lambda: "Markov random field" in inside.one(".inside > [role=status]").text)
-    assert not inside.one(".line").is_displayed()
-    inside.all(".strip li > button:first-child")[1].click()
-    until(lambda: inside.script("return page.inside.open && page.inside.panes[0].result") == 2)
-    assert inside.one(".inside > [role=status]").text == ""
-    inside.script("page.connection.socket.close()")
-    until(lambda: inside.script("return !page.inside.open"))
-
-
-def test_the_pane_beside_says_that_it_is_being_computed_and_tables_are_not_clipped(inside):
-    pane = inside.one("canvas.beside")
-    inside.script("page.connection.send = () => {}; page.inside.look(2)")
-    words = "const c = arguments[0]; return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(Boolean)"
-    until(lambda: pane.is_displayed() and inside.script(words, pane), 5)
-    inside.script("page.inside.failed('')")
-    assert not pane.is_displayed()
-    inside.script("delete page.connection.send; page.inside.pixel = [20, 30]; page.inside.look(2)")
-    until(lambda: len(inside.all(".wide")) == 2)
-    for table in inside.all(".wide"):
-        assert inside.script("return arguments[0].scrollWidth - arguments[0].clientWidth", table) <= 0
-
-
-CHANCES = "return [...document.querySelectorAll('.reason .bars')].map((one) => one.textContent);"
-DRAWN = "document.querySelector('.dice button').click(); return document.querySelector('.dice output').value;"
-WIDER = "const h = document.querySelector('.dice input'); h.value = 2; h.dispatchEvent(new Event('input'));"
 
 
 def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
@@ -854,48 +628,37 @@ def test_the_lecture_has_six_questions_on_one_screen_and_needs_nothing(page):
     until(lambda: page.one(".questions").is_displayed())
     shown(page.driver, width=1280, height=720)
     box = page.one(".questions")
+    bottom = "return document.querySelector(arguments[0]).getBoundingClientRect().bottom"
     for number in range(1, 7):
-        title = page.one(".questions h2").text
-        assert title.startswith(f"{number} of 6") and title.endswith("?")
-        asked = page.one(".questions p").text
-        assert page.one(".pointed").is_displayed()
+        title, asked = page.one(".questions h2").text, page.one(".questions p").text
+        assert title.startswith(f"{number} of 6") and title.endswith("?") and page.one(".pointed").is_displayed()
         if number == 3:
             until(lambda: page.all(".reason tr"))
             for place in (".questions", ".panes canvas", ".reason table", ".dice", ".reason > figure canvas"):
-                assert (
-                    page.script("return document.querySelector(arguments[0]).getBoundingClientRect().bottom", place)
-                    <= 720
-                )
-            before = page.script(CHANCES)
-            until(lambda before=before: page.script(f"{WIDER} {CHANCES}") != before, 10)  # an explanation may follow
-            until(lambda: "candidates count" in page.one(".dice output").text, 10)
-            until(lambda: "The dice say" in page.script(DRAWN), 10)  # here, too
+                assert page.script(bottom, place) <= 720
+            chances = "return [...document.querySelectorAll('.reason .bars')].map((one) => one.textContent);"
+            wider = "const h = document.querySelector('.dice input'); h.value = 2; h.dispatchEvent(new Event('input'));"
+            before, wider = page.script(chances), f"{wider} {chances}"
+            until(lambda before=before, wider=wider: page.script(wider) != before, 10)  # an explanation may follow
+            draw = "document.querySelector('.dice button').click(); return document.querySelector('.dice output').value"
+            until(lambda draw=draw: "The dice say" in page.script(draw), 10)  # here, too
         box.send_keys(Keys.ENTER)
         assert page.one(".questions p").text != asked, "the answer"
-        words = {2: {"near", "hot"}, 3: {"differs", "taken"}, 4: {"hot"}, 6: {"taken"}}
-        for dark in (True, False):
-            shown(page.driver, width=1280, height=720, dark=dark)
-            assert page.faults() == []
-        coloured = {one.get_attribute("class").split()[1] for one in page.all(".questions .word")}
-        assert coloured == words.get(number, set())
+        assert page.faults() == []
         if number == 6:
             until(lambda: len(page.all(".films figure")) == 4)
             captions = [one.text for one in page.all(".films figcaption")]
-            assert [one.split()[0] for one in captions] == ["coloring", "checkerboard", "synchronous", "raster"]
             assert captions[0].startswith("coloring 16 steps a sweep") and "No two neighbours" in captions[0]
             assert captions[2].startswith("synchronous 1 step a sweep") and "100 %" in captions[2]
-            bottom = "return document.querySelector('.films').getBoundingClientRect().bottom"
-            assert page.script(bottom) <= 720
-            film = "const c = document.querySelector('.films canvas'); return c.toDataURL()"
+            assert page.script(bottom, ".films") <= 720
+            film = "return document.querySelector('.films canvas').toDataURL()"
             first = page.script(film)
             until(lambda film=film, first=first: page.script(film) != first, 10)
         box.send_keys(Keys.ARROW_LEFT, "n")
         box.send_keys(Keys.ENTER)
     assert not page.one(".questions").is_displayed()
     assert page.driver.switch_to.active_element == button
-    why = explained(page)
-    assert why["weighed"] in (44 * 44, 24 * 24), "all candidates of a level, at a pixel at random"
-    assert len(why["totals"]) == min(1024, why["weighed"])
+    assert explained(page)["weighed"] in (44 * 44, 24 * 24), "all candidates of a level, at a pixel at random"
     shown(page.driver, width=1400)
 
 
@@ -905,11 +668,7 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page, tmp_path):
     page.result(1)
     until(lambda: page.script("return page.seen") == "picture")
     assert not page.one(".fitting").is_displayed(), "the first size is one that fits"
-    zooms = "return [...document.querySelectorAll('.result .bar .bar button')].map((one) => one.offsetLeft)"
-    places = page.script(zooms)
-    page.script("page.latticeShown = true; page.view.unit = 0.05")
-    assert page.script(zooms) == places
-    page.script("page.latticeShown = false; page.view.fit(); page.width = page.height = 170; page.make()")
+    page.script("page.width = page.height = 170; page.make()")
     page.result(2)
     rows, cols = page.script("return page.results.get(2).lattice.fitting")
     until(lambda: page.one(".fitting").is_displayed() and page.script("return !page.view.drawing"))
@@ -951,7 +710,6 @@ def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     until(lambda: page.one(".questions").is_displayed())
     page.one(".questions").send_keys(*[Keys.ENTER] * 5)
     until(lambda: page.one(".questions h2").text.startswith("3 of 6") and page.all(".reason tr.taken"))
-    assert len([one for one in page.all(".dice input") if one.is_displayed()]) == 1, "the others need a server"
     assert page.faults() == []
     page.one(".questions").send_keys(*[Keys.ENTER] * 6)
     until(lambda: len([one for one in page.all(".films canvas") if one.is_displayed()]) == 4)

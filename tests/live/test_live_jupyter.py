@@ -38,15 +38,11 @@ const done = arguments[0], app = window.jupyterapp;
 })().then(done, (error) => done(String(error)));
 """
 """Runs the first cell once the kernel is ready."""
-KINDS = {
-    "the view": "canvas.view",
-    "a button": "button:not(:disabled)",
-    "a checkbox": "input[type=checkbox]",
-    "a choice": "select",
-    "a number": "input[type=number]",
-    "a heading": "summary",
-}
-QUIET = ("--LabApp.news_url=", "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate")
+CONTROLS = ("canvas.view", "button:not(:disabled)", "input[type=checkbox]", "select", "input[type=number]", "summary")
+SETTINGS = (
+    "--LabApp.news_url= --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate --no-browser --allow-root"
+)
+SETTINGS += " --expose-app-in-browser --ip=127.0.0.1 --ServerApp.port_retries=0 --IdentityProvider.token=key"
 
 
 @pytest.fixture(scope="module")
@@ -61,19 +57,10 @@ def lab(tmp_path_factory):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = (
-        "jupyterlab",
-        "--no-browser",
-        "--expose-app-in-browser",
-        "--allow-root",
-        "--ip=127.0.0.1",
-        f"--port={port}",
-        *QUIET,
-    )
     address = f"http://127.0.0.1:{port}"
     with open(folder / "log", "wb") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", *command, "--ServerApp.port_retries=0", "--IdentityProvider.token=key"],
+            [sys.executable, "-m", "jupyterlab", f"--port={port}", *SETTINGS.split()],
             cwd=folder,
             env=os.environ | own,
             stdout=log,
@@ -104,7 +91,7 @@ def notebook(lab):
         until(lambda: len(cells(driver)) == 3, 120)
         driver.set_script_timeout(120)
         assert driver.execute_async_script(RUN) is True
-        until(lambda: all(visible(driver, selector) for selector in KINDS.values()), 120)
+        until(lambda: all(visible(driver, selector) for selector in CONTROLS), 120)
         yield driver
 
 
@@ -125,19 +112,15 @@ def press(driver, *keys):
     return len(cells(driver))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_keys_of_the_widget_are_no_commands_of_the_notebook(notebook, kind):
+def test_keys_of_the_widget_are_no_commands_of_the_notebook(notebook):
     """``d d`` deletes the cell, ``x`` cuts it, ``a`` and ``b`` add one, in JupyterLab's command mode."""
-    control = visible(notebook, KINDS[kind])[0]
-    notebook.execute_script("arguments[0].focus()", control)
-    assert notebook.switch_to.active_element == control
-    assert notebook.find_elements(By.CSS_SELECTOR, ".jp-Notebook.jp-mod-commandMode")
-    assert press(notebook, "dd") == 3
-    assert press(notebook, "xab") == 3
-    assert notebook.switch_to.active_element == control
-
-
-def test_a_click_on_a_heading_leaves_no_key_to_the_notebook(notebook):
+    for selector in CONTROLS:
+        control = visible(notebook, selector)[0]
+        notebook.execute_script("arguments[0].focus()", control)
+        assert notebook.switch_to.active_element == control
+        assert notebook.find_elements(By.CSS_SELECTOR, ".jp-Notebook.jp-mod-commandMode")
+        assert press(notebook, "dd") == press(notebook, "xab") == 3, selector
+        assert notebook.switch_to.active_element == control
     visible(notebook, "h2")[0].click()
     assert press(notebook, "dd") == 3
 
@@ -151,7 +134,6 @@ def test_the_widget_has_the_theme_of_the_notebook(notebook, theme, paper):
 
 
 def test_the_same_keys_delete_a_cell_that_has_the_focus(notebook):
-    """Else the test above would prove nothing."""
     cells(notebook)[2].find_element(By.CSS_SELECTOR, ".jp-InputPrompt").click()
     press(notebook, "dd")
     until(lambda: len(cells(notebook)) == 2)
