@@ -16,7 +16,7 @@ from simdtex.driver import Device, Seed, check_shape, run
 from simdtex.inputs import check_inputs
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar.algorithm import Level, Problem, Program, by_lane
+from simdtex.maspar.algorithm import ArrayLevel, Problem, Program, by_lane
 from simdtex.maspar.array import EXECUTED, ProcessorArray
 from simdtex.maspar.machine import MP1, Count
 from simdtex.methods import mrf
@@ -179,7 +179,7 @@ def problem(run: Lattices) -> Problem:
     return Problem(first, run.offsets[by_lane(run.offsets)], run.options.neighbourhood, xi, run.seed)
 
 
-def level_of(run: Lattices, number: int) -> Level:
+def level_of(run: Lattices, number: int) -> ArrayLevel:
     """Return the input of the program for a level."""
     places, working = run.places(number), run.sample.working.astype(np.float32)
     reach, own = places.reach[by_lane(run.offsets)], working[:, places.positions]
@@ -189,7 +189,7 @@ def level_of(run: Lattices, number: int) -> Level:
     row, col = np.divmod(np.arange(places.positions.size, dtype=np.int32), cols)
     noise = (row * runs + col % runs) * -(-cols // (runs * LANES)) * LANES + col // runs
     free = run.free_sweeps(number), run.kept_only
-    return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
+    return ArrayLevel(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
 
 
 def emulated(

@@ -97,7 +97,7 @@ NEIGHBOURS_AT_ONCE = 2**20
 NOTHING: NDArray[Any] = np.zeros(0, np.int64)
 
 
-class Plan(NamedTuple):
+class LatticeColoring(NamedTuple):
     """The colouring of a lattice.
 
     ``pattern``, the sublattice whose cosets are the colours; ``colors``, the number of used colours; ``seam`` (n,)
@@ -113,7 +113,7 @@ class Plan(NamedTuple):
 
 
 @Operation
-def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
+def coloring(machine: Launcher | None, grid: Grid, plan: LatticeColoring) -> Array:
     """Return the colours of a lattice, or of a window of it: an int32 array with the grid's shape, on the machine.
 
     A window's sites have their colours in the whole. Cost: O(sites log seam).
@@ -159,7 +159,7 @@ def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array
 
 
 @lru_cache(maxsize=32)
-def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
+def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> LatticeColoring:
     """Return the colouring of a picture's whole lattice, for equation (14).
 
     It is the best lattice colouring of the plane if its size admits that without a seam. Otherwise it is either a
@@ -188,7 +188,7 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Pl
     else:
         used[best.coset(*np.divmod(np.delete(np.arange(rows * cols), seam), cols))] = True
     names = (np.cumsum(used) - 1).astype(np.int32)
-    return Plan(best, int(used.sum()), seam, names[own], names)
+    return LatticeColoring(best, int(used.sum()), seam, names[own], names)
 
 
 def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:

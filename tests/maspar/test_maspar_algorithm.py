@@ -9,7 +9,7 @@ from cases import REFERENCE, assert_same_bits, slow_but, texture
 
 import simdtex
 from simdtex import maspar
-from simdtex.maspar.algorithm import Level, Pass, Problem, Program, by_lane
+from simdtex.maspar.algorithm import ArrayLevel, Pass, Problem, Program, by_lane
 from simdtex.maspar.array import MAPPINGS, ProcessorArray
 from simdtex.maspar.machine import MP1
 from simdtex.maspar.sites import Walk
@@ -113,7 +113,7 @@ def test_distances_are_summed_lane_by_lane_and_row_by_row(machine):
     while len(lanes) > 1:
         lanes = lanes[: len(lanes) // 2] + lanes[len(lanes) // 2 :]
     icm, number, own = Choice(False, False, window(1.0, 255)), np.zeros(1, np.int32), np.zeros((1, 1), np.float32)
-    level = Level(0, grid, icm, number, own, sample[:, None, None].astype(np.float32), number)
+    level = ArrayLevel(0, grid, icm, number, own, sample[:, None, None].astype(np.float32), number)
     for device in (REFERENCE, machine):
         mp1 = MP1(device, ProcessorArray(8, 8), (8, 8))
         program = Program(mp1, Problem(np.zeros((2, 1), np.int32), offsets, 18, -1, 0))
@@ -146,7 +146,7 @@ def test_a_pass_takes_the_memory_that_it_uses(draws, density):
     mp1.memory = need = mp1.used + 4 * words
     for n in (1, 5000):
         tables = [np.zeros(shape, np.float32) for shape in ((1, n), (4, 1, n))]
-        level = Level(0, grid, choice, np.zeros(n, np.int32), *tables, np.zeros(n, np.int32))
+        level = ArrayLevel(0, grid, choice, np.zeros(n, np.int32), *tables, np.zeros(n, np.int32))
         with mp1.frame():
             Pass(program, level, walk)
             assert mp1.used == need

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Multiresolution sampling: the procedure of De Bonet (1997).
 
-`analyse` (analysis.py) is the first phase; `Run` is the second, the paper's SynthesizePyramid and CollapsePyramid level
-by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
+`analyse` (analysis.py) is the first phase; `MultiresRun` is the second, the paper's SynthesizePyramid and
+CollapsePyramid level by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ VALUES = 4
 
 
 @dataclass(frozen=True)
-class Plan:
+class MultiresPlan:
     """A run of the method ``multires`` before it has a machine and a seed.
 
     Attributes
@@ -58,16 +58,16 @@ class Plan:
     options: Options
     analysis: Analysis | None = None
 
-    def on(self, machine: Machine, seed: int) -> Run:
+    def on(self, machine: Machine, seed: int) -> MultiresRun:
         """Return the run on a machine after the first phase of the paper; raise if the memory does not suffice."""
         channels, size = self.sample.shape[-1], self.sample.dtype.itemsize
         within_32_bits(self.shape, max(VALUES, channels))  # before any work
         memory.require_host(_on_host(self.shape, channels, size))
         analysis = self.analysis or analyse(machine, self.sample, self.options)
-        return Run(machine, analysis, self.shape, self.options, seed)
+        return MultiresRun(machine, analysis, self.shape, self.options, seed)
 
 
-class State(NamedTuple):
+class MultiresState(NamedTuple):
     """The state between two launches.
 
     ``level``, the current level; ``done``, its number of sampled pixels; ``source`` and ``counts`` of all levels, as in
@@ -85,7 +85,7 @@ End = tuple[Stage, NDArray[np.int32]]
 """The end of a level: its stage, and the numbers (rows, cols, 2) of candidates and of nodes compared."""
 
 
-class Run:
+class MultiresRun:
     """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
 
     No pixel depends on another of its level; a step samples some pixels of a level, or collapses the level. Cost: for
@@ -106,25 +106,25 @@ class Run:
         self._lattice = machine.put(lattice(self.shapes, 0))
         self._launches: Iterator[tuple[int, int]] = iter(())
 
-    def begin(self) -> State:
+    def begin(self) -> MultiresState:
         """Return the first state, whose top level is that of the sample, copied and repeated."""
         top = self.analysis.levels - 1
         sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
-        return self._prepared(State(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
+        return self._prepared(MultiresState(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
 
-    def _prepared(self, state: State) -> State:
+    def _prepared(self, state: MultiresState) -> MultiresState:
         """Return the state, after preparing the input of launches."""
         self._structure = structure_of(self.machine, self.analysis, self.options)
         return self._entered(state)
 
-    def _entered(self, state: State) -> State:
+    def _entered(self, state: MultiresState) -> MultiresState:
         """Return the state, after planning the launches of its level."""
         if 0 <= state.level < self.analysis.levels - 1:
             count, least = pixels([self.shapes[state.level]]), first_launch(self.analysis, state.level)
             self._launches = paced(count, least, state.done)
         return state
 
-    def step(self, state: State, watch: Any = None) -> tuple[State, End | None]:
+    def step(self, state: MultiresState, watch: Any = None) -> tuple[MultiresState, End | None]:
         """Sample some pixels of the level, (9) to (12), or collapse it if all are sampled."""
         level, sampled = state.level, Sampled(state.source, state.counts, self._lattice)
         if state.done < pixels([self.shapes[level]]):  # Loop x', y'
@@ -152,11 +152,11 @@ class Run:
         blend = self.options.seams == "blend"
         return laplacian_collapse(self.machine, band, self.machine.put(source), coarse, self.analysis.torus, blend)
 
-    def ended(self, state: State) -> bool:
+    def ended(self, state: MultiresState) -> bool:
         """Return whether all levels are collapsed."""
         return state.level < 0
 
-    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+    def result(self, state: MultiresState, observer: MultiresRecord) -> tuple[NDArray[Any], Output]:
         """Return the finest level's picture, with its source map, stages and statistics."""
         finest = observer.stages[-1]
         assert finest.source is not None
@@ -167,29 +167,29 @@ class Run:
         }
         return finest.image, OutputWithSource(finest.source, None, observer.stages, statistics)
 
-    def save(self, state: State) -> dict[str, Any]:
+    def save(self, state: MultiresState) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
         get = self.machine.get
         picture = None if state.picture is None else get(state.picture)
         return state._replace(source=get(state.source), counts=get(state.counts), picture=picture)._asdict()
 
-    def load(self, saved: dict[str, Any]) -> State:
+    def load(self, saved: dict[str, Any]) -> MultiresState:
         """Return the state that `save` copied, on this machine."""
-        state, put = State(**saved), self.machine.put
+        state, put = MultiresState(**saved), self.machine.put
         picture = None if state.picture is None else put(state.picture)
         return self._prepared(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
 
-    def observer(self, callback: Callback | None) -> Record:
+    def observer(self, callback: Callback | None) -> MultiresRecord:
         """Return the observer of this run."""
-        return Record(self, callback)
+        return MultiresRecord(self, callback)
 
 
-class Record(Observer):
+class MultiresRecord(Observer):
     """The observer of a run: it reports every launch, and keeps the stage of every level."""
 
-    _run: Run
+    _run: MultiresRun
 
-    def step(self, state: State, end: End | None) -> None:
+    def step(self, state: MultiresState, end: End | None) -> None:
         """Report the sampled pixels; at the end of a level, keep its stage and report it."""
         if end:
             stage, counts = end
