@@ -276,8 +276,8 @@ def test_what_is_no_schedule_is_refused():
 
 
 def test_a_package_brings_schedules_as_entry_points(monkeypatch):
-    brought = {"nothing": "builtins:object", "gone": "no_such_package:Schedule"}
-    brought |= dict.fromkeys(("mine", "luby"), "simdtex.schedules:Raster")
+    brought = dict.fromkeys(("mine", "luby"), "simdtex.schedules:Raster")
+    brought |= {"nothing": "builtins:object", "gone": "no_such_package:Schedule"}
 
     def entry_points(*, group):
         assert group == "simdtex.schedules"
