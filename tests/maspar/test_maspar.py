@@ -87,6 +87,7 @@ def test_masks_nest_and_inactive_elements_change_nothing(device):
 
 
 @given(SHAPES, SHAPES, st.sampled_from(MAPPINGS), st.integers(1, 4))
+@settings(max_examples=40)
 def test_the_x_net_moves_by_pixels_around_the_edges(pes, shape, mapping, distance):
     mp1 = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape)
     values = np.arange(mp1.layout.padded.size).reshape(mp1.layout.padded.shape)
@@ -155,7 +156,7 @@ def test_instructions_are_counted_with_their_costs():
     assert {cost.source for cost in COSTS.values() if "Blank 1990" not in cost.source} == {"assumption"}
 
 
-@pytest.mark.parametrize(("order", "moves"), [(1, 4), (2, 8), (8, 24), (18, 60), (32, 100)])
+@pytest.mark.parametrize(("order", "moves"), [(1, 4), (8, 24), (18, 60)])
 def test_one_path_of_unit_moves_leads_through_all_offsets(order, moves):
     offsets, at, met = neighbourhood_offsets(order), np.zeros(2, int), []
     steps = path(offsets)
@@ -181,7 +182,7 @@ lattices = given(
 
 
 @lattices
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     offsets, radius, number = neighbourhood_offsets(order), 4, 1 + np.arange(shape[0] * shape[1]).reshape(shape)
@@ -217,8 +218,7 @@ def test_colours_beyond_a_word_and_on_a_device(machine):
     assert count > 64
 
 
-@pytest.mark.parametrize("mapping", MAPPINGS)
-@pytest.mark.parametrize("synchronous", [False, True])
+@pytest.mark.parametrize(("synchronous", "mapping"), [(False, MAPPINGS[0]), (True, MAPPINGS[1])])
 def test_ising_has_the_spins_of_the_experiment(device, mapping, synchronous):
     spins = ising(MP1(device, ProcessorArray(4, 8, mapping), (8, 16)), 2.5, 6, 3, synchronous)
     schedule = "synchronous" if synchronous else "checkerboard"
