@@ -49,7 +49,7 @@ def test_a_large_torus_at_the_critical_point_has_onsagers_energy():
 # -- Heat-bath Ising: the operations bit for bit, and which schedules sample the Ising distribution.
 
 OFFSETS = neighbourhood_offsets(1)
-EXACT = ["coloring", "coloring-fixed", "luby", "checkerboard", "raster", "random-scan"]
+EXACT = ["coloring", "luby"]
 
 
 def problem(seed=0, shape=(6, 5), torus=True, tile=None, temperatures=(1.5, 3.0), seeds=3, count=None):
@@ -239,7 +239,7 @@ def test_a_deviation_counts_by_students_t_over_all_comparisons(runs):
 
 def test_schedules_that_keep_equation_14_have_the_exact_energy_and_others_differ(any_device):
     """On a small lattice, below, near and above T_c."""
-    names = [*EXACT, "synchronous", "random-subset", "block:4x4"]
+    names = [*EXACT, "synchronous", "block:4x4"]
     options = {"seeds": 32, "sweeps": 200, "burn_in": 100, "seed": 5}
     found = findings([ising(opencl(any_device), (8, 8), [1.8, CRITICAL, 2.8], name, **options) for name in names])
     for one in found:
@@ -250,9 +250,8 @@ def test_schedules_that_keep_equation_14_have_the_exact_energy_and_others_differ
         elif one.schedule == "synchronous":
             assert not one.independent and one.differs and one.sigmas > 4.5, one
             assert abs(one.neighbours) < 0.004  # neighbours know nothing of one another
-    for schedule in ("random-subset", "block:4x4"):
-        ones = [one for one in found if one.schedule == schedule]
-        assert any(one.differs for one in ones) and not any(one.independent for one in ones)
+    blocks = [one for one in found if one.schedule == "block:4x4"]
+    assert any(one.differs for one in blocks) and not any(one.independent for one in blocks)
 
 
 # -- ``simdtex schedules --ising``, as its user meets it.
