@@ -37,10 +37,7 @@ class Partition:
         raise NotImplementedError
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
-        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers.
-
-        The default is an array of the machine, which has the groups of `plan`.
-        """
+        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers."""
         return coloring(machine, grid, self.plan(grid, order, seed))
 
     def count(self, grid: Grid, order: int, seed: int) -> int:

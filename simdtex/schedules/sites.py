@@ -45,11 +45,7 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
 
 
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Return the stretches, of at most `CHUNK` sites, of the groups of a list, which begin at ``starts``.
-
-    The first result is the position of each stretch's first site, and the end of the list, (stretches + 1,); the second
-    is the number of the first stretch of each group, and the number of stretches, (groups + 1,).
-    """
+    """Return the bounds of the stretches, of at most `CHUNK` sites, of groups, and the number of each group's first."""
     pieces = -(-np.diff(starts) // CHUNK)
     firsts = np.concatenate([[0], np.cumsum(pieces)])
     within = np.arange(firsts[-1]) - np.repeat(firsts[:-1], pieces)
@@ -120,11 +116,11 @@ def coloring(machine: Launcher | None, grid: Grid, plan: LatticeColoring) -> Arr
     """
     if machine is None:
         *layer, row, col = np.ix_(*grid.lines())
-        found = plan.pattern.coset(row, col, *layer)
-        found = plan.names[found] if plan.names.size else found
-        number = row * grid.whole.cols + col
-        at = np.searchsorted(plan.seam, number)
-        return np.where(np.append(plan.seam, -1)[at] == number, np.append(plan.own, 0)[at], found).astype(np.int32)
+        coset = plan.pattern.coset(row, col, *layer)
+        color = plan.names[coset] if plan.names.size else coset
+        site = row * grid.whole.cols + col
+        at = np.searchsorted(plan.seam, site)
+        return np.where(np.append(plan.seam, -1)[at] == site, np.append(plan.own, 0)[at], color).astype(np.int32)
     colors, (names, seam, own) = (
         machine.empty(grid.shape, np.int32),
         map(machine.put, (plan.names, plan.seam, plan.own)),
@@ -136,11 +132,9 @@ def coloring(machine: Launcher | None, grid: Grid, plan: LatticeColoring) -> Arr
 
 @Operation
 def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return the sites colour by colour, and the bounds of the colours among them.
+    """Return the sites (S,) int32 colour by colour, row by row within each, and the bounds of the colours among them.
 
-    The result is the sites' numbers (S,) int32, row by row within a colour, on the machine, and (count + 1,) int64, the
-    first index of each colour in them, and the end of the last. Raises ValueError if a colour is not one of 0 to
-    ``count`` - 1. Cost: O(sites + count).
+    Raises ValueError if a colour is not one of 0 to ``count`` - 1. Cost: O(sites + count).
     """
     if machine is None:
         sites: Array = np.argsort(colors, None, kind="stable").astype(np.int32)
@@ -208,8 +202,7 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
         k, m, own = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
         met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
-    found: NDArray[np.int64] = site[np.concatenate(clash)]
-    return found
+    return np.compress(np.concatenate(clash), site)
 
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
@@ -271,10 +264,9 @@ ROUNDS = 4
 def luby(
     machine: Launcher | None, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
 ) -> NDArray[np.uint8]:
-    """Return the members of the set, (rows, cols) uint8, on the host, where a schedule needs them.
+    """Return the members of the set among ``active`` sites, (rows, cols) uint8, on the host: the greedy choice.
 
-    ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
-    priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
+    Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
     grid, sites, begin = replace(grid, tile=None), grid.size, grid.key[0]
     if machine is None:

@@ -101,21 +101,18 @@ class MultiresRun:
         within_32_bits(shape, max(VALUES, channels))
         self.machine, self.analysis, self.options, self.seed = machine, analysis, options, seed
         self.shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-        on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
+        held = 4 * (pixels(analysis.shapes) * channels + prod(analysis.features.shape))
+        on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + held
         memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
         self._lattice = machine.put(lattice(self.shapes, 0))
+        self._structure = structure_of(machine, analysis, options)
         self._launches: Iterator[tuple[int, int]] = iter(())
 
     def begin(self) -> MultiresState:
         """Return the first state, whose top level is that of the sample, copied and repeated."""
         top = self.analysis.levels - 1
         sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
-        return self._prepared(MultiresState(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
-
-    def _prepared(self, state: MultiresState) -> MultiresState:
-        """Return the state, after preparing the input of launches."""
-        self._structure = structure_of(self.machine, self.analysis, self.options)
-        return self._entered(state)
+        return self._entered(MultiresState(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
 
     def _entered(self, state: MultiresState) -> MultiresState:
         """Return the state, after planning the launches of its level."""
@@ -137,8 +134,8 @@ class MultiresRun:
         source, counts = read_sources(self.machine, sampled, self.shapes, level)
         picture = self._collapsed(level, source, state.picture)  # CollapsePyramid
         image = analysis.sample.picture(self.machine.get(picture), source if level == 0 else None)
-        given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
-        place = places(given, analysis.shapes[level][1])
+        pixel = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
+        place = places(pixel, analysis.shapes[level][1])
         stage = Stage(level, image, place, np.ascontiguousarray(counts[..., 0]))
         after = state._replace(level=level - 1, done=0, picture=picture)  # Loop i from top level downto 0
         return self._entered(after), (stage, counts)
@@ -177,7 +174,7 @@ class MultiresRun:
         """Return the state that `save` copied, on this machine."""
         state, put = MultiresState(**saved), self.machine.put
         picture = None if state.picture is None else put(state.picture)
-        return self._prepared(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
+        return self._entered(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
 
     def observer(self, callback: Callback | None) -> MultiresRecord:
         """Return the observer of this run."""
@@ -216,11 +213,7 @@ class MultiresRecord(Observer):
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
-    """Return rows and columns of a level of the output: whole tiles and the beginning of one more.
-
-    ``shape`` and ``sample`` are the sides of the output and of the sample, ``own`` those of the sample's level, and
-    ``spacing`` is 2**level.
-    """
+    """Return rows and columns of a level of the output: tiles like the sample's level, and the beginning of one."""
     rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
     return rows, cols
 
@@ -228,8 +221,3 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
 def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:
     """Return the bytes on the host of an output with its stages."""
     return prod(shape) * (66 + channels * (4 + itemsize))
-
-
-def _held(analysis: Analysis) -> int:
-    """Return the bytes of an analysis on the device."""
-    return 4 * (pixels(analysis.shapes) * len(analysis.sample.planes) + int(prod(analysis.features.shape)))

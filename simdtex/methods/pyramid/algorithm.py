@@ -97,15 +97,7 @@ def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids:
 
 @dataclass(frozen=True)
 class PyramidPlan:
-    """A run of the method ``pyramid`` before it has a machine and a seed.
-
-    Attributes
-    ----------
-    sample : (rows, cols, channels) array
-    shape : (int, int)
-        Rows and columns of the output.
-    options : Options
-    """
+    """A run of the method ``pyramid`` before it has a machine and a seed, of a sample (rows, cols, channels)."""
 
     sample: NDArray[Any]
     shape: tuple[int, int]
