@@ -79,8 +79,6 @@ def among(
     return sites, before[firsts]
 
 
-UNCOLORED = -1
-
 VAST = 2**17
 """Rows plus columns beyond which a pattern that fits is used, if any, without a greedy colouring of the seam.
 
@@ -185,15 +183,10 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> La
     return LatticeColoring(best, int(used.sum()), seam, names[own], names)
 
 
-def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
-    """Return the sites with neighbours before them across the seam, in ascending order."""
-    row, col = np.arange(rows)[:, None] * cols, np.arange(cols)
-    return np.union1d(row[-radius:] + col, row + col[(col < radius) | (col >= cols - radius)])
-
-
 def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
     """Return the later site of each pair of neighbours across the seam in one coset."""
-    site = _along(rows, cols, int(offsets.max()))
+    radius, first, col = int(offsets.max()), np.arange(rows)[:, None] * cols, np.arange(cols)
+    site = np.union1d(first[-radius:] + col, first + col[(col < radius) | (col >= cols - radius)])
     clash = [np.zeros(0, bool)]
     for here in _pieces(site, len(offsets)):
         row, col = np.divmod(here, cols)
@@ -241,7 +234,7 @@ def _greedy(
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
     rank = np.append(rank, -1)  # the last, n in `near`, is that of no neighbour
-    colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
+    colors, left = np.full(n, -1, np.int32), np.arange(n)
     while left.size:
         now = left[(rank[near[:, left]] < rank[left]).all(0)]
         colors[now] = taken[now].argmin(1)
@@ -250,7 +243,7 @@ def _greedy(
         those = near[:, now]
         taken[those[those < n], np.broadcast_to(colors[now], those.shape)[those < n]] = True
         rank[now] = -1
-        left = left[colors[left] == UNCOLORED]
+        left = left[colors[left] < 0]
     return colors
 
 

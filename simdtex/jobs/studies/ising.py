@@ -190,7 +190,11 @@ class _Run:
         self.everywhere = schedules.Masked(self.grid)
         self.offsets = machine.put(offsets)
         self.chances = machine.put(heat_bath_chances(experiment.temperatures, len(offsets)))
-        self.spins = machine.put(np.tile(_first(experiment, seed), (len(experiment.temperatures), 1, 1)))
+        first = np.ones((experiment.seeds, *experiment.size), np.uint8)
+        if experiment.start == "random":
+            of = np.arange(self.grid.size), random.START, np.arange(experiment.seeds)[:, None]
+            first = (random.draw4(seed, 0, 0, *of)[0] >> np.uint32(31)).astype(np.uint8).reshape(first.shape)
+        self.spins = machine.put(np.tile(first, (len(experiment.temperatures), 1, 1)))
         self.chains = int(self.spins.shape[0])
         self.state = schedule.init(self.setting)
         self.single: list[tuple[int, int]] = []  # postponed steps of one site each
@@ -242,15 +246,6 @@ class _Run:
 
     def _sync(self, sites: int) -> None:
         self.machine.sync(100 * sites * self.chains)  # a draw is about as much work as 100 fma
-
-
-def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
-    """Return the spins before the first sweep, (seeds, H, W)."""
-    size, seeds = experiment.size, experiment.seeds
-    if experiment.start == "up":
-        return np.ones((seeds, *size), np.uint8)
-    bits = random.draw4(seed, 0, 0, np.arange(prod(size)), random.START, np.arange(seeds)[:, None])[0]
-    return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
 
 
 def _measure(spins: NDArray[np.uint8]) -> NDArray[np.float64]:

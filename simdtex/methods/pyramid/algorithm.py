@@ -266,16 +266,10 @@ def _begin(
     if start.shape != (*shape, channels):
         size = " x ".join(str(n) for n in shape)
         raise ValueError(f"start has shape {start.shape}; give one of {size} pixels, grey or with {channels} channels")
-    own = _own_channels(start)
-    return lambda c: machine.put(own[c][None, None])
-
-
-def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
-    """Return the decorrelated channels (C, ...) of an image (..., C), in 2**-14 standard deviations."""
-    planes = Stretched(image.reshape(-1, 1, image.shape[-1])).planes
+    planes = Stretched(start.reshape(-1, 1, channels)).planes
     normal = palette([planes], [1.0]).decorrelated(planes)
-    channels = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)
-    return channels.reshape(-1, *image.shape[:-1])
+    own = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)  # in 2**-14 standard deviations
+    return lambda c: machine.put(own[c].reshape(1, 1, *shape))
 
 
 class PyramidRecord(Observer):
