@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -113,13 +112,6 @@ def test_accuracy_of_a_perfect_labelling_and_of_swapped_and_shifted_labels(class
     assert everywhere < 1 and away > everywhere
 
 
-def test_parts_of_a_picture_lie_apart(classify):
-    rows, cols = np.indices((128, 128))
-    place = np.stack([rows, cols, rows * 0], -1).astype(np.uint8)
-    training, test = ({tuple(pixel) for pixel in one.reshape(-1, 3).tolist()} for one in classify.parted(place))
-    assert training and test and not training & test
-
-
 def test_equalised_textures_have_the_flat_histogram_of_their_training_part(classify):
     rng = np.random.default_rng(1)
     ramp = classify.Texture(*(np.stack([rng.integers(low, 90, (32, 32))] * 3, -1).astype(np.uint8) for low in (40, 20)))
@@ -136,12 +128,6 @@ def test_a_mosaic_shows_the_test_part_of_its_label(classify):
         names = np.array([int(name) for name in mosaic.textures])
         assert len(set(names)) == 5
         assert (classify.grey(mosaic.picture) == names[mosaic.truth - 1]).all()
-
-
-def test_auroc_of_scores_that_part_and_of_equal_ones(classify):
-    assert classify.auroc([0.1, 0.2], [0.3, 0.4, 0.5]) == 1
-    assert classify.auroc([0.5, 0.5], [0.5, 0.5]) == 0.5
-    assert classify.auroc([0.1, 0.4], [0.3, 0.2]) == 0.5
 
 
 def test_the_field_removes_a_spot(classify):
@@ -167,12 +153,6 @@ def test_the_tables(classify, tmp_path, monkeypatch):
         with open(tmp_path / f"{part}.csv", encoding="utf-8", newline="") as file:
             header, *rows = csv.reader(file)
         assert rows and all(len(row) == len(header) for row in rows), part
-
-
-def test_missing_baselines_are_told(classify, monkeypatch):
-    monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
-    with pytest.raises(SystemExit, match="pip install"):
-        classify.probabilities([], [])
 
 
 # -- The figures of benchmarks/fill.py, on fillings whose fault is known.
@@ -235,12 +215,6 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture
 def front(script):
     return script("front")
-
-
-def test_a_flat_height_map_has_flat_normals_and_a_slope_that_rises_to_the_right_faces_left(front):
-    assert np.array_equal(np.unique(front.normals(np.full((5, 7), 3.0)).reshape(-1, 3), axis=0), [[128, 128, 255]])
-    slope = front.normals(np.tile(np.arange(9.0) * 10, (9, 1)))[4, 4]
-    assert slope[0] < 128 and slope[1] == 128
 
 
 def test_the_mast_is_in_the_hole_and_samples_are_pieces_of_one_size(front):

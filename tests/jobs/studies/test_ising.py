@@ -20,7 +20,7 @@ from simdtex.jobs.studies.operations import ising_commit, ising_relax, ising_seq
 from simdtex.jobs.studies.report import _sublattice, ising_tables
 from simdtex.maspar.algorithm import heat_bath_chances
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.schedules import Info
+from simdtex.schedules import Info, Synchronous, Watched
 
 # -- The exact energy of the Ising model, against every state of small lattices.
 
@@ -49,7 +49,6 @@ def test_a_large_torus_at_the_critical_point_has_onsagers_energy():
 # -- Heat-bath Ising: the operations bit for bit, and which schedules sample the Ising distribution.
 
 OFFSETS = neighbourhood_offsets(1)
-EXACT = ["coloring", "luby"]
 
 
 def problem(seed=0, shape=(6, 5), torus=True, tile=None, temperatures=(1.5, 3.0), seeds=3, count=None):
@@ -170,32 +169,23 @@ def test_what_is_measured_is_what_it_says():
     assert_same_bits(beside.energy[1:].copy(), run.energy)  # a temperature knows nothing of the others
 
 
-class Turns:
+class Turns(Watched):
     """A step of one site, then all others at once, then one site again."""
 
-    name, tile, windows = "turns", None, False
-
-    def independent(self, grid, offsets):
-        return False
-
-    def init(self, setting):
-        return np.arange(setting.grid.size, dtype=np.int32), 0
-
     def step(self, setting, state, active):
-        sites, count = state
-        part = (sites[:1], sites[1:-1], sites[-1:])[count % 3]
-        info = Info(part, count, count % 3 == 2)
-        return (sites, count + 1), info
+        count = (state[0] if state else 0) + 1
+        part = np.split(np.arange(setting.grid.size, dtype=np.int32), [1, setting.grid.size - 1])[(count - 1) % 3]
+        return (count,), Info(part, count - 1, count % 3 == 0)
 
 
 def test_single_sites_and_steps_of_many_keep_their_order(machine):
+    chances, bits = heat_bath_chances([2.0], 4), random.draw4(1, 0, 0, np.arange(16), random.START, [[0], [1]])[0]
+    expected = (bits >> 31).astype(np.uint8).reshape(2, 4, 4)
+    for key, sites in enumerate(np.split(np.arange(16, dtype=np.int32), [1, 15])):
+        expected = relaxed(REFERENCE, Grid((4, 4)), expected, sites, chances, seed=1, key=key)[1]
     for m in (machine, REFERENCE):
-        spins = ising(m, (4, 4), [2.0], Turns(), seeds=2, sweeps=1, burn_in=0, start="random").spins[0]
-        grid, chances = Grid((4, 4)), heat_bath_chances([2.0], 4)
-        bits = random.draw4(1, 0, 0, np.arange(16), random.START, np.arange(2)[:, None])[0]
-        expected = (bits >> 31).astype(np.uint8).reshape(2, 4, 4)
-        for key, sites in enumerate(np.split(np.arange(16, dtype=np.int32), [1, 15])):
-            expected = relaxed(REFERENCE, grid, expected, sites, chances, seed=1, key=key)[1]
+        turns = Turns(Synchronous())
+        spins = ising(m, (4, 4), [2.0], turns, seeds=2, sweeps=1, burn_in=0, start="random").spins[0]
         assert_same_bits(spins, expected)
 
 
@@ -220,38 +210,40 @@ def chains(energy, spins=(4, 4)):
 
 def test_an_error_is_that_of_the_means_of_chains():
     energy = np.random.default_rng(3).normal(-1.7, 0.1, (20, 1)) + np.zeros((20, 500))  # sweeps that are all alike
-    (one,) = findings([chains(energy)])
-    assert one.energy == pytest.approx(energy.mean())
-    assert one.error == pytest.approx(energy[:, 0].std(ddof=1) / np.sqrt(20))
-    assert one.sigmas == pytest.approx((one.energy - one.exact) / one.error)
+    (found,) = findings([chains(energy)])
+    assert found.energy == pytest.approx(energy.mean())
+    assert found.error == pytest.approx(energy[:, 0].std(ddof=1) / np.sqrt(20))
+    assert found.sigmas == pytest.approx((found.energy - found.exact) / found.error)
 
 
-@pytest.mark.parametrize("runs", [1, 10])
-def test_a_deviation_counts_by_students_t_over_all_comparisons(runs):
+def test_a_deviation_counts_by_students_t_over_all_comparisons():
     noise = np.random.default_rng(3).normal(0, 1, 20)
     noise = (noise - noise.mean()) / noise.std(ddof=1) * np.sqrt(20)  # of a standard error of 1
-    (one,) = findings([chains(np.full((20, 10), 0.0))])
-    limit = stats.t.isf(0.001 / runs / 2, 19)
-    for factor, differs in ((0.99, False), (1.01, True)):
-        energy = one.exact + np.repeat((noise + factor * limit)[:, None], 10, 1)
-        assert [found.differs for found in findings([chains(energy)] * runs)] == [differs] * runs
+    (found,) = findings([chains(np.full((20, 10), 0.0))])
+    for runs, factor in ((1, 0.99), (1, 1.01), (10, 0.99), (10, 1.01)):
+        limit = stats.t.isf(0.001 / runs / 2, 19)
+        energy = found.exact + np.repeat((noise + factor * limit)[:, None], 10, 1)
+        assert [each.differs for each in findings([chains(energy)] * runs)] == [factor > 1] * runs
 
 
-def test_schedules_that_keep_equation_14_have_the_exact_energy_and_others_differ(any_device):
+EVERY = ("coloring", "coloring-fixed", "luby", "checkerboard", "raster", "random-scan", "synchronous", "block:4x4")
+
+
+@pytest.mark.parametrize("names", [EVERY[::6], pytest.param(EVERY, marks=pytest.mark.slow)], ids=len)
+def test_schedules_that_keep_equation_14_have_the_exact_energy_and_others_differ(any_device, names):
     """On a small lattice, below, near and above T_c."""
-    names = [*EXACT, "synchronous", "block:4x4"]
     options = {"seeds": 32, "sweeps": 200, "burn_in": 100, "seed": 5}
     found = findings([ising(opencl(any_device), (8, 8), [1.8, CRITICAL, 2.8], name, **options) for name in names])
-    for one in found:
-        if one.schedule in EXACT:
-            assert one.independent and not one.differs, one
-            assert one.error < 0.025  # not for want of precision
-            assert one.neighbours > 0.008, one
-        elif one.schedule == "synchronous":
-            assert not one.independent and one.differs and one.sigmas > 4.5, one
-            assert abs(one.neighbours) < 0.004  # neighbours know nothing of one another
-    blocks = [one for one in found if one.schedule == "block:4x4"]
-    assert any(one.differs for one in blocks) and not any(one.independent for one in blocks)
+    for finding in found:
+        assert finding.independent == (finding.schedule in EVERY[:6])
+        if finding.independent:
+            assert not finding.differs, finding
+            assert finding.error < 0.025  # not for want of precision
+            assert finding.neighbours > 0.008, finding
+        elif finding.schedule == "synchronous":
+            assert finding.differs and finding.sigmas > 4.5, finding
+            assert abs(finding.neighbours) < 0.004  # neighbours know nothing of one another
+    assert any(finding.differs for finding in found if finding.schedule == names[-1])
 
 
 # -- ``simdtex schedules --ising``, as its user meets it.

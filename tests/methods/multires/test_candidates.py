@@ -11,7 +11,7 @@ from plain_multires import as_large
 
 import simdtex
 from simdtex import random
-from simdtex.methods.multires.analysis import structure_of
+from simdtex.methods.multires.analysis import lattice, structure_of
 from simdtex.methods.multires.candidates import Sampled, Structure, candidates
 from simdtex.methods.multires.options import Options
 
@@ -43,16 +43,6 @@ class Problem(NamedTuple):
         """Where a level is in ``source`` and ``counts``."""
         begin = sum(self.pixels(below) for below in range(level))
         return slice(begin, begin + self.pixels(level))
-
-    def with_thresholds(self, threshold):
-        threshold = np.broadcast_to(threshold, self.structure.threshold.shape).astype(np.uint32)
-        return self._replace(structure=self.structure._replace(threshold=threshold))
-
-
-def lattice(shapes, first):
-    begins = np.cumsum([0, *(r * c if level >= first else 0 for level, (r, c) in enumerate(shapes))])
-    edge = [(shapes[0][0] % 2**level > 0) + 2 * (shapes[0][1] % 2**level > 0) for level in range(len(shapes))]
-    return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins[:-1], edge, strict=True)], np.int32)
 
 
 def problem(seed=0, *, tile=(7, 6), shape=(17, 13), levels=4, features=3, kinds=4, of=SMALL):
@@ -253,28 +243,13 @@ def test_any_division_into_ranges_changes_no_bit(machine, p, cuts, match):
         assert_same_bits(sampled_on(m, p, match, 11, ends), whole)
 
 
-def test_nothing_but_the_range_is_written(machine):
-    p = problem(5)
-    for m in (REFERENCE, machine):
-        structure, sampled = p.on(m)
-        candidates(m, structure, sampled, 2, range(p.pixels(2)), True, 1)
-        before = host(m, sampled[:2])
-        candidates(m, structure, sampled, 1, range(3, 17), True, 1)
-        for ours, theirs in zip(host(m, sampled[:2]), before, strict=True):
-            own = range(p.own(1).start + 3, p.own(1).start + 17)
-            assert_same_bits(np.delete(ours, own, 0), np.delete(theirs, own, 0))
-            assert (ours[own] != theirs[own]).any()
-        for ours, theirs in zip(host(m, structure), p.structure, strict=True):
-            assert_same_bits(ours, theirs)
-
-
 @phases
 @pytest.mark.parametrize("closed", [1, 2])
 def test_levels_that_are_not_compared_are_counted_all_the_same(machine, closed, match):
     """Every difference passes below a level; more candidates than places of the scan that are noted."""
     p = problem(9, tile=(37, 26), shape=(40, 31), levels=3, features=9, kinds=1)
-    threshold = np.where(np.arange(3)[:, None] < closed, ALL, 1)
-    p = p.with_thresholds(threshold)
+    threshold = np.broadcast_to(np.where(np.arange(3)[:, None] < closed, ALL, 1), (3, 9)).astype(np.uint32)
+    p = p._replace(structure=p.structure._replace(threshold=threshold))
     theirs = sampled_on(REFERENCE, p, match, 7)
     assert theirs[1][p.own(0)][:, 0].max() > 64
     assert_same_bits(sampled_on(machine, p, match, 7), theirs)

@@ -2,9 +2,8 @@
 
 import itertools
 import logging
-import math
-from dataclasses import fields
 from fractions import Fraction
+from math import inf as INF
 
 import numpy as np
 import pytest
@@ -16,15 +15,12 @@ from skimage import data
 
 import simdtex
 from simdtex.jobs.studies.quality import seam
-from simdtex.methods.multires import options as multires
 from simdtex.methods.multires.analysis import differences, thresholds
 from simdtex.methods.multires.mend import SHARE, _least, _path, mend
 from simdtex.methods.multires.options import Options
 from simdtex.methods.pyramid.stretched import Stretched
 
 # -- De Bonet's method as users see it: its limits, what a picture is made of, thresholds, contrast and colour.
-
-INF = math.inf
 
 
 def synthesize(sample, shape, **options):
@@ -219,24 +215,7 @@ def test_a_texture_tiles_and_shows_no_lines():
         assert 0.9 < np.median([lines(picture, period) for picture in pictures]) < 1.06
 
 
-def test_blending_takes_nothing_from_elsewhere():
-    """What is drawn is the same; only bands where pieces meet differ."""
-    sample = PHOTOGRAPHS["gravel"]
-    (cut, one), (blend, two) = (run(sample, (192, 192), device=None, seams=seams) for seams in ("cut", "blend"))
-    assert_same_bits(one.source, two.source)
-    assert (cut != blend).any()
-    assert max(lines(blend, 8), lines(blend, 16)) < max(lines(cut, 8), lines(cut, 16))
-
-
 # -- What the method takes, and what it says along the way.
-
-
-def halved(n, tile, times):
-    """Pixels in a line at a level of an output that is made of tiles: each is halved and rounded up on its own."""
-    whole, rest = divmod(n, tile)
-    for _ in range(times):
-        tile, rest = -(-tile // 2), -(-rest // 2)
-    return whole * tile + rest
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 5), (2, 2), (4, 4)], ids=str)
@@ -278,68 +257,43 @@ def test_one_level_is_a_tiling():
         assert (stage.candidates == 1).all()
 
 
-@pytest.mark.parametrize(("size", "shape", "levels"), [((13, 7), (20, 17), None), ((16, 8), (39, 21), 2)], ids=str)
-def test_the_stages_are_the_levels_of_every_tile_coarsest_first(size, shape, levels):
-    sample = texture(size, 2, np.uint16)
-    image, output = run(sample, shape, levels=levels)
-    count = levels or 1 + math.ceil(math.log2(max(size)))
-    assert [stage.level for stage in output.stages] == list(reversed(range(count)))
-    for stage in output.stages:
-        own = tuple(halved(n, m, stage.level) for n, m in zip(shape, size, strict=True))
-        assert (stage.image.shape, stage.image.dtype) == ((*own, 2), np.uint16)
-        assert (stage.source.shape, stage.source.dtype) == ((*own, 2), np.int32)
-        assert stage.candidates.shape == own
-        assert np.issubdtype(stage.candidates.dtype, np.integer)
+@pytest.mark.parametrize("alpha", [0.5, INF])
+def test_the_statistics_count_what_was_done_level_by_level(alpha):
+    image, output = run(texture((13, 7)), (20, 17), alpha=alpha, rng=7)
+    told = output.statistics
+    assert (told["device"], told["seed"], told["device_seconds"]) == (REFERENCE.name, 7, None)
+    assert told["options"] == vars(Options(alpha=alpha)) | {"levels": 5}
+    assert [level["nodes"] for level in told["levels"]] == [0, 1, 1 + 2, 1 + 2 + 8, 1 + 2 + 8 + 28]
+    shapes = [(2, 3), (3, 3), (6, 5), (11, 10), (20, 17)]  # 20 is a tile of 13 and 7 more, each halved on its own
+    for level, number, stage, own in zip(told["levels"], range(4, -1, -1), output.stages, shapes, strict=True):
+        assert level["level"] == stage.level == number
+        assert (level["rows"], level["cols"]) == stage.candidates.shape == own
+        assert stage.image.shape == own and stage.source.shape == (*own, 2)
+        assert (level["most"], level["candidates"]) == (stage.candidates.max(), stage.candidates.mean())
+        assert level["compared"] == level["nodes"] if alpha == INF else level["compared"] <= level["nodes"]
+    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"]) > 0
     assert_same_bits(output.stages[-1].image, image)
     assert_same_bits(output.stages[-1].source, output.source)
     assert output.temperature is None
-
-
-@pytest.mark.parametrize("alpha", [0.5, INF])
-def test_the_statistics_count_what_was_done(alpha):
-    _, output = run(texture((13, 7)), (20, 17), alpha=alpha, rng=7)
-    told = output.statistics
-    assert (told["device"], told["seed"], told["device_seconds"]) == (REFERENCE.name, 7, None)
-    assert set(told["options"]) == {option.name for option in fields(multires.Options)}
-    assert told["options"]["alpha"] == alpha
-    assert told["options"]["levels"] == 5
-    assert [level["level"] for level in told["levels"]] == [4, 3, 2, 1, 0]
-    nodes = [0, 1, 1 + 2, 1 + 2 + 8, 1 + 2 + 8 + 28]
-    assert [level["nodes"] for level in told["levels"]] == nodes
-    for level, stage in zip(told["levels"], output.stages, strict=True):
-        assert (level["rows"], level["cols"]) == stage.candidates.shape
-        assert level["most"] == stage.candidates.max()
-        assert level["candidates"] == stage.candidates.mean()
-        if alpha == INF:
-            assert level["compared"] == level["nodes"]
-        assert stage.level == 4 or 1 <= level["compared"] <= level["nodes"]
-        assert level["seconds"] >= 0
-    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
+    assert len(run(texture((16, 8)), (39, 21), levels=2)[1].stages) == 2
 
 
 def test_progress_tells_every_piece_of_every_level(monkeypatch):
     sample, seen = np.moveaxis(texture((13, 7), 3), -1, 0), []
-
-    def look(progress):
-        seen.append((progress, progress.image(), progress.candidates()))
-
     whole, output = run(sample, (40, 30), channel_axis=0)
     monkeypatch.setattr("simdtex.methods.multires.analysis.LAUNCH", 1)  # so that levels come in pieces
-    image = synthesize(sample, (40, 30), channel_axis=0, callback=look)
+    image = synthesize(sample, (40, 30), channel_axis=0, callback=lambda p: seen.append((p, p.image(), p.candidates())))
     assert_same_bits(image, whole)
     fractions = [progress.fraction for progress, *_ in seen]
     assert fractions == sorted(fractions)
     assert 0 < fractions[0] < fractions[-1] == 1
     ends = [progress.level for progress, *_ in seen if progress.stage]
-    assert ends == [4, 3, 2, 1, 0], "one end for each"
-    assert len(seen) > 2 * len(ends)
+    assert ends == [4, 3, 2, 1, 0] and len(seen) > 2 * len(ends)
     stages = {stage.level: stage for stage in output.stages}
     for progress, picture, candidates in seen:
-        assert progress.levels == 5
         shown = stages[progress.level + (progress.stage is None)]  # else the level before
-        assert_same_bits(picture, shown.image)
-        assert_same_bits(candidates, shown.candidates)
-        assert progress.doing == f"level {progress.level}"
+        assert_same_bits([picture, candidates], [shown.image, shown.candidates])
+        assert (progress.levels, progress.doing) == (5, f"level {progress.level}")
         assert progress.stage in (None, f"level{progress.level}")
 
 
