@@ -111,7 +111,7 @@ class Recorder:
         if not self.sweeps or progress.level != self.sweeps[-1].level:
             self._last = []
         moved = [image != earlier for earlier in self._last]  # from one and from two sweeps ago
-        moved = [one if self._axis is None else one.any(self._axis) for one in moved]
+        moved = moved if self._axis is None else [differs.any(self._axis) for differs in moved]
         self.sweeps.append(
             SweepRecord(
                 progress.level,

@@ -9,7 +9,6 @@ The exact energy of the Ising model on a torus, J = k_B = 1, no field, is that o
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log, pi, prod, sqrt, tanh
@@ -113,7 +112,7 @@ class Chains:
     """Markov chains of the Ising model: T temperatures, R chains at each, n sweeps after the burn-in.
 
     ``energy`` (T, R, n) is that per spin after each sweep; ``even`` and ``odd`` are the mean spins of the sublattices
-    whose row + column is even and odd; ``spins`` (T, R, H, W) uint8 those at the end. ``relaxations`` are of one chain.
+    whose row + column is even and odd; ``spins`` (T, R, H, W) uint8 those at the end.
     """
 
     schedule: str
@@ -123,10 +122,6 @@ class Chains:
     even: NDArray[np.float64]
     odd: NDArray[np.float64]
     spins: NDArray[np.uint8]
-    steps: int
-    relaxations: int
-    launches: int
-    seconds: float
 
     @property
     def magnetisation(self) -> NDArray[np.float64]:
@@ -154,7 +149,6 @@ def ising(
     size, sweeps, burn_in = experiment.size, experiment.sweeps, experiment.burn_in
     chains = experiment.seeds * len(experiment.temperatures)
     memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
-    began, launches = time.perf_counter(), machine.launches
     run = _Run(machine, experiment, schedules.get(schedule), seed)
     measured = np.empty((sweeps, 3, chains))
     for sweep in range(burn_in + sweeps):
@@ -173,10 +167,6 @@ def ising(
         even=even,
         odd=odd,
         spins=run.look().reshape(-1, experiment.seeds, *size),
-        steps=run.steps,
-        relaxations=run.relaxations,
-        launches=machine.launches - launches,
-        seconds=time.perf_counter() - began,
     )
 
 
@@ -198,7 +188,6 @@ class _Run:
         self.chains = int(self.spins.shape[0])
         self.state = schedule.init(self.setting)
         self.single: list[tuple[int, int]] = []  # postponed steps of one site each
-        self.steps = self.relaxations = 0
 
     def look(self) -> NDArray[np.uint8]:
         """Return the spins, (chains, H, W)."""
@@ -212,8 +201,6 @@ class _Run:
         for state, chosen in schedules.decisions(self.schedule, self.setting, self.state, self.everywhere):
             self.state = state
             for info in chosen.apart(self.machine):
-                self.steps += 1
-                self.relaxations += info.sites.size
                 if info.sites.size == 1 and not self.schedule.tile:
                     self.single.append((int(info.sites[0]), info.turn))
                 elif info.sites.size:

@@ -152,7 +152,6 @@ def test_a_run_is_the_same_on_a_device_and_the_reference(machine, schedule):
     ours, theirs = (ising(m, (4, 6), [1.8, 2.5], schedule, **options) for m in (machine, REFERENCE))
     for name in ("energy", "even", "odd", "spins"):
         assert_same_bits(getattr(ours, name), getattr(theirs, name))
-    assert (ours.steps, ours.relaxations) == (theirs.steps, theirs.relaxations)
 
 
 def test_what_is_measured_is_what_it_says():
@@ -205,7 +204,7 @@ def chains(energy, spins=(4, 4)):
     """Chains of one temperature with these energies (R, n)."""
     none = np.zeros((1, *energy.shape))
     up = np.ones((1, len(energy), *spins), np.uint8)
-    return Chains("luby", True, np.array([2.0]), energy[None], none, none, up, 1, 1, 1, 0.0)
+    return Chains("luby", True, np.array([2.0]), energy[None], none, none, up)
 
 
 def test_an_error_is_that_of_the_means_of_chains():
