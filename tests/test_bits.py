@@ -13,7 +13,7 @@ from runs import digest
 from tiny import JOBS
 
 ROOT = Path(__file__).resolve().parent.parent
-REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
+pytestmark = pytest.mark.slow
 
 CHILD = """
 import json, sys
@@ -41,11 +41,6 @@ def child(code, *arguments, **variables):
     )
 
 
-def missing(what):
-    (pytest.fail if REQUIRED else pytest.skip)(f"{what} is not here")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("threads", "driver"), [(2, None), (1, None), (1, "basic")])
 def test_any_number_of_threads_has_the_references_bits(reference, threads, driver):
     """And the driver ``basic``, which has no thread of its own."""
@@ -61,27 +56,20 @@ def test_any_number_of_threads_has_the_references_bits(reference, threads, drive
     assert json.loads(done.stdout) == [threads, digest(reference("more")[0])], "PoCL heeds the limit"
 
 
-def vendors(folder, library):
-    """A folder that shows the loader one runtime alone."""
-    (folder / "only.icd").write_text(f"{library}\n")
-    return str(folder)
+def vendors(folder, *patterns):
+    """A folder that shows the loader one runtime alone; None where it is not here."""
+    found = [path for pattern in patterns for path in sorted(Path("/usr/lib").glob(pattern))]
+    (folder / "only.icd").write_text("".join(f"{path}\n" for path in found[:1]))
+    return str(folder) if found else None
 
 
-def library(pattern):
-    found = sorted(Path("/usr/lib").glob(pattern))
-    return found[0] if found else None
-
-
-@pytest.mark.parametrize(
-    "name", ["multires-open", *(pytest.param(name, marks=pytest.mark.slow) for name in ("more", "density-colour"))]
-)
+@pytest.mark.parametrize("name", ["multires-open", "more", "density-colour"])
 def test_rusticl_has_the_references_bits(tmp_path, reference, name):
     """Mesa's runtime on its software rasteriser: slow, and independent of all others."""
-    found = library("**/libRusticlOpenCL.so.1")
+    found = vendors(tmp_path, "**/libRusticlOpenCL.so.1")
     if found is None:
         pytest.skip("rusticl is not here")
-    variables = {"OCL_ICD_VENDORS": vendors(tmp_path, found), "RUSTICL_ENABLE": "llvmpipe"}
-    done = child(CHILD, "llvmpipe", name, **variables)
+    done = child(CHILD, "llvmpipe", name, OCL_ICD_VENDORS=found, RUSTICL_ENABLE="llvmpipe")
     if "No device matches" in done.stdout or "cannot be used" in done.stdout:
         pytest.skip("rusticl has no usable device here")
     assert done.returncode == 0, done.stdout
@@ -153,10 +141,10 @@ REPORT = re.compile(r"data race|Invalid (read|write)|uninitialized|out of bounds
 
 
 def under_oclgrind(folder, code, *arguments, races="1"):
-    found = library("oclgrind/liboclgrind-rt-icd.so") or library("**/liboclgrind-rt-icd.so")
+    found = vendors(folder, "oclgrind/liboclgrind-rt-icd.so", "**/liboclgrind-rt-icd.so")
     if found is None:
-        missing("Oclgrind")
-    variables = {"OCL_ICD_VENDORS": vendors(folder, found), "OCLGRIND_DATA_RACES": races}
+        (pytest.fail if os.environ.get("SIMDTEX_REQUIRE_OPENCL") else pytest.skip)("Oclgrind is not here")
+    variables = {"OCL_ICD_VENDORS": found, "OCLGRIND_DATA_RACES": races}
     return child(code, *arguments, OCLGRIND_CHECK_API="1", PYOPENCL_NO_CACHE="1", **variables)
 
 
@@ -164,7 +152,6 @@ EVERY = "import runpy; runpy.run_module('tiny', run_name='__main__')"
 SLOWEST = ("tileset", "tiles", "classify", "maps")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "arguments", "races"),
     [
@@ -183,7 +170,6 @@ def test_no_kernel_races_or_leaves_its_bounds(tmp_path, code, arguments, races):
     assert set(re.findall(r"Function: (\w+)", done.stdout)) <= {"clGetDeviceInfo"}, done.stdout
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("plant", "words"), [("race", "data race"), ("outside", "Invalid write")])
 def test_a_planted_fault_is_reported(tmp_path, plant, words):
     """So that the silence of the test above means something."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.maspar.algorithm import Level, Pass, Problem, Program
+from simdtex.maspar.algorithm import ArrayLevel, Pass, Problem, Program
 from simdtex.maspar.array import ProcessorArray
 from simdtex.maspar.machine import COSTS, MP1, Mask
 from simdtex.maspar.sites import Walk
@@ -55,7 +55,7 @@ class Account:
         mp1 = MP1(None, self.array, (grid.pixels[0], grid.pixels[1]), inf)
         any_value = np.broadcast_to(np.float32(0), (len(self._offsets), self._channels, candidates))
         number = any_value[0, 0].astype(np.int32)
-        level = Level(0, grid, choice, number, any_value[0], any_value, number)
+        level = ArrayLevel(0, grid, choice, number, any_value[0], any_value, number)
         program = Program(mp1, Problem(np.zeros((1 + self._channels, 1), np.int32), self._offsets, 1, -1, 0))
         relaxation = Pass(program, level, Walk(mp1, grid, self._offsets))
 

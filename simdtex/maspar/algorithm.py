@@ -24,7 +24,7 @@ from simdtex.methods.mrf.square import LANES
 from simdtex.model.lattice import Grid
 
 
-class Level(NamedTuple):
+class ArrayLevel(NamedTuple):
     """The constants of a level on the ACU.
 
     ``number`` is l, ``grid`` S^l, and ``choice`` the Gaussian of (7) and what is drawn from it; ``source`` (n,) are the
@@ -86,7 +86,7 @@ class Program:
                 mp1.table(self.state[c], problem.first[1 + c], drawn)
             self.temperature.set(1024)  # 5
 
-    def relax(self, level: Level) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+    def relax(self, level: ArrayLevel) -> Iterator[tuple[int, NDArray[np.bool_]]]:
         """Relax a level until its end; after each step, yield its sweep and the (layers, PEs) that relaxed.
 
         Sites of the level above have t = 0, since that is its equilibrium; all others have t = 1 yet.
@@ -117,7 +117,7 @@ class Program:
 class Pass:
     """The relaxation of all chosen sites of a level in parallel, 6.2.2."""
 
-    def __init__(self, program: Program, level: Level, walk: Walk) -> None:
+    def __init__(self, program: Program, level: ArrayLevel, walk: Walk) -> None:
         mp1, (neighbours, channels, _), choice = program.mp1, level.sample.shape, level.choice
         self.mp1, self.program, self.level, self.walk, self.channels = mp1, program, level, walk, channels
         self.near, self.heat = mp1.plural("float32", neighbours * (channels + 1)), mp1.plural()

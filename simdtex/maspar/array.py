@@ -92,7 +92,7 @@ class ProcessorArray:
         return sum(sum(self.moves(grid, down * s, right * s)) for down, right, _ in path(offsets))
 
 
-class Layout:
+class PixelLayout:
     """The places of the pixels of a picture (rows, cols) on an array.
 
     ``padded`` is the picture padded to whole layers, ``pixel`` (layers, PEs, 2) are row and column of each PE's pixel

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.maspar.array import Layout
+from simdtex.maspar.array import PixelLayout
 from simdtex.methods.mrf.arithmetic import fma32, minus_gumbel
 from simdtex.methods.mrf.lcpdf import Key, ParzenWindow, spread, stepped, weighed, weights
 from simdtex.methods.mrf.relax import PAIRS
@@ -30,7 +30,7 @@ STEPPED = 64
 class On(NamedTuple):
     """The PEs that execute an instruction: ``at`` are their layers and their numbers, (active,) each."""
 
-    layout: Layout
+    layout: PixelLayout
     at: tuple[NDArray[np.intp], NDArray[np.intp]]
 
 

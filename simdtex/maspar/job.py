@@ -16,12 +16,11 @@ from simdtex.driver import Device, Seed, run
 from simdtex.inputs import check_inputs, check_shape
 from simdtex.machine import Machine
 from simdtex.machine.memory import require
-from simdtex.maspar.algorithm import Level, Problem, Program, by_lane
+from simdtex.maspar.algorithm import ArrayLevel, Problem, Program, by_lane
 from simdtex.maspar.array import EXECUTED, ProcessorArray
-from simdtex.maspar.machine import MP1, Count
+from simdtex.maspar.machine import MP1, Count, Plural
 from simdtex.methods import mrf
 from simdtex.methods.mrf.level import Lattices
-from simdtex.methods.mrf.problem import Input
 from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.square import LANES
 from simdtex.model.array import MAPPINGS, parse_array
@@ -166,9 +165,53 @@ class Emulation:
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Execution]:
         """Run the program, and return the picture, channels last, and the rest of the output."""
-        return emulated(
-            mrf.plan(self.pictures, self.shape, self.options), self.array, self.memory, machine, seed, callback
-        )
+        array, memory = self.array, self.memory
+        run = Lattices(mrf.plan(self.pictures, self.shape, self.options), machine, seed)
+        mp1 = MP1(machine, array, self.shape, memory)
+        need = 8 * (run.sample.top + 1) * run.choice(0).mode
+        if not mp1.fits(need):
+            raise ValueError(
+                f"the mode of a density takes {need} bytes of each PE for {run.sample.top + 1} grey levels, and a PE "
+                f'has {memory}; give more memory, pixel="source" or relaxation="gibbs"'
+            )
+        n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
+        held = min(memory, need + mp1.layers * (8 * terms + 160))
+        require(machine, array.size * held + 4 * terms * n, 4 * terms * n, "give a smaller array or sample")
+        program, steps, stages = Program(mp1, problem(run)), [], []
+        address = mp1.layout.address[: self.shape[0], : self.shape[1]]
+
+        def values(of: Plural) -> NDArray[Any]:
+            """Return a variable in the pixels of the picture, (words, rows, cols)."""
+            held = machine.get(of.data)
+            return np.moveaxis(held.reshape(-1, held.shape[-1])[address], -1, 0)
+
+        def picture(number: int) -> NDArray[Any]:
+            grid = run.grid(number)
+            x, source = values(program.state)[:-1].astype(np.uint16), values(program.source)[0]
+            return run.sample.picture(grid.decimated(x), grid.decimated(source))
+
+        expected, seen, left = expected_work(run), (-1, 0), 1.0
+        for number in reversed(range(run.levels)):
+            for sweep, active in program.relax(level_of(run, number)):
+                steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
+                if callback is None:
+                    continue
+                if seen != (number, sweep):
+                    seen, t = (number, sweep), values(program.state)[-1]
+                    left = float(run.grid(number).decimated(t).mean()) / 1024
+                share = fraction_done(expected, number, 1 - sqrt(min(1.0, left)), 0.0)
+                doing, now = f"level {number}, sweep {sweep}", partial(picture, number)
+                callback(Progress(level=number, levels=run.levels, fraction=share, doing=doing, image=now))
+            stages.append(Stage(number, picture(number)))
+        counts: dict[str, dict[str, Count]] = {}
+        for (section, kind), count in mp1.counts.items():
+            counts.setdefault(section, {})[kind] = count
+        source = run.sample.place(values(program.source)[0])
+        statistics = known_before(run) | {"seed": seed, "device": machine.name}
+        statistics |= {"array": f"{array.rows}x{array.cols}", "mapping": array.mapping, "layers": mp1.layers}
+        more: dict[str, Any] = {"counts": counts, "seconds": mp1.seconds(), "steps": steps}
+        t = values(program.state)[-1] / 1024
+        return stages[-1].image, Execution(source, t, stages, statistics, **more)
 
 
 def problem(run: Lattices) -> Problem:
@@ -179,7 +222,7 @@ def problem(run: Lattices) -> Problem:
     return Problem(first, run.offsets[by_lane(run.offsets)], run.options.neighbourhood, xi, run.seed)
 
 
-def level_of(run: Lattices, number: int) -> Level:
+def level_of(run: Lattices, number: int) -> ArrayLevel:
     """Return the input of the program for a level."""
     places, working = run.places(number), run.sample.working.astype(np.float32)
     reach, own = places.reach[by_lane(run.offsets)], working[:, places.positions]
@@ -189,55 +232,4 @@ def level_of(run: Lattices, number: int) -> Level:
     row, col = np.divmod(np.arange(places.positions.size, dtype=np.int32), cols)
     noise = (row * runs + col % runs) * -(-cols // (runs * LANES)) * LANES + col // runs
     free = run.free_sweeps(number), run.kept_only
-    return Level(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
-
-
-def emulated(
-    plan: Input, array: ProcessorArray, memory: int, machine: Machine, seed: int, callback: Callback | None
-) -> tuple[NDArray[Any], Execution]:
-    """Run the program, and return the picture, channels last, and the rest of the output."""
-    run = Lattices(plan, machine, seed)
-    mp1 = MP1(machine, array, (plan.shape[0], plan.shape[1]), memory)
-    need = 8 * (run.sample.top + 1) * run.choice(0).mode
-    if not mp1.fits(need):
-        raise ValueError(
-            f"the mode of a density takes {need} bytes of each PE for {run.sample.top + 1} grey levels, and a PE has "
-            f'{memory}; give more memory, pixel="source" or relaxation="gibbs"'
-        )
-    n, terms = max(run.places(k).positions.size for k in range(run.levels)), len(run.offsets) * run.sample.channels
-    held = min(memory, need + mp1.layers * (8 * terms + 160))
-    require(machine, array.size * held + 4 * terms * n, 4 * terms * n, "give a smaller array or sample")
-    program, steps, stages = Program(mp1, problem(run)), [], []
-
-    def values(of: Any) -> NDArray[Any]:
-        """Return a variable in the pixels of the picture, (words, rows, cols)."""
-        held = machine.get(of.data)
-        rows, cols = plan.shape
-        return np.moveaxis(held.reshape(-1, held.shape[-1])[mp1.layout.address[:rows, :cols]], -1, 0)
-
-    def picture(number: int) -> NDArray[Any]:
-        grid = run.grid(number)
-        x, source = values(program.state)[:-1].astype(np.uint16), values(program.source)[0]
-        return run.sample.picture(grid.decimated(x), grid.decimated(source))
-
-    expected, seen, left = expected_work(run), (-1, 0), 1.0
-    for number in reversed(range(run.levels)):
-        for sweep, active in program.relax(level_of(run, number)):
-            steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
-            if callback is None:
-                continue
-            if seen != (number, sweep):
-                seen, left = (number, sweep), float(run.grid(number).decimated(values(program.state)[-1]).mean()) / 1024
-            share = fraction_done(expected, number, 1 - sqrt(min(1.0, left)), 0.0)
-            doing, now = f"level {number}, sweep {sweep}", partial(picture, number)
-            callback(Progress(level=number, levels=run.levels, fraction=share, doing=doing, image=now))
-        stages.append(Stage(number, picture(number)))
-    counts: dict[str, dict[str, Count]] = {}
-    for (section, kind), count in mp1.counts.items():
-        counts.setdefault(section, {})[kind] = count
-    source = run.sample.place(values(program.source)[0])
-    statistics = known_before(run) | {"seed": seed, "device": machine.name}
-    statistics |= {"array": f"{array.rows}x{array.cols}", "mapping": array.mapping, "layers": mp1.layers}
-    more: dict[str, Any] = {"counts": counts, "seconds": mp1.seconds(), "steps": steps}
-    t = values(program.state)[-1] / 1024
-    return stages[-1].image, Execution(source, t, stages, statistics, **more)
+    return ArrayLevel(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine
 from simdtex.maspar import instructions
-from simdtex.maspar.array import Layout, ProcessorArray
+from simdtex.maspar.array import PixelLayout, ProcessorArray
 from simdtex.maspar.instructions import COMPARISONS, OPERATIONS, On
 from simdtex.methods.mrf.lcpdf import Key
 
@@ -179,7 +179,7 @@ class MP1:
         self, machine: Machine | None, array: ProcessorArray, shape: tuple[int, int], memory: float = 2**16
     ) -> None:
         self.machine, self.array, self.shape, self.memory = machine, array, shape, memory
-        self.layout = Layout(array, shape)
+        self.layout = PixelLayout(array, shape)
         self.layers, self.used, self._section = self.layout.high * self.layout.wide, 0, ""
         self.counts: dict[tuple[str, str], Count] = defaultdict(Count)
         self.everywhere = self.mask = self._mask(np.broadcast_to(True, (self.layers, array.size)))

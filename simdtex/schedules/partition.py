@@ -14,10 +14,10 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.model.lattice import Grid, Sublattice, coloring_of_layers
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Lists, Setting
-from simdtex.schedules.sites import Plan, by_color, coloring, lattice_plan
+from simdtex.schedules.sites import LatticeColoring, by_color, coloring, lattice_plan
 
 
-class State(NamedTuple):
+class PartitionState(NamedTuple):
     """The state of a partition: ``sweep``, the number of sweeps started."""
 
     sweep: int = 0
@@ -32,24 +32,21 @@ class Partition:
     tile: tuple[int, int] | None = None
     windows = False
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """Return the groups of the whole lattice of a grid, as colours."""
         raise NotImplementedError
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> Array:
-        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers.
-
-        The default is an array of the machine, which has the groups of `plan`.
-        """
+        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers."""
         return coloring(machine, grid, self.plan(grid, order, seed))
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the number of groups of the whole lattice, if `windows` is true."""
         return self.plan(grid, order, seed).colors
 
-    def init(self, setting: Setting) -> State:
+    def init(self, setting: Setting) -> PartitionState:
         """Return the state of a level."""
-        return State()
+        return PartitionState()
 
     def lists(self, setting: Setting) -> Lists:
         """Return all sites, group after group, and the bounds of the groups (`simdtex.schedules.sites.by_color`)."""
@@ -65,7 +62,7 @@ class Partition:
             group = machine.put(group.astype(np.int64, casting="same_kind").clip(-1, count).astype(np.int32))
         return by_color(machine, group, count)
 
-    def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
+    def step(self, setting: Setting, state: PartitionState, active: Active) -> tuple[PartitionState, Info]:
         """Return all groups with active sites; a sweep relaxes the sites that were active at its start."""
         sweep = state.sweep + 1
         key = self.lists, setting.grid, setting.order, setting.seed
@@ -77,7 +74,7 @@ class Partition:
             steps = steps[_orders(setting.seed, setting.level, first * AHEAD, len(steps))[at]]
         steps = steps[steps[:, 1] > steps[:, 0]]
         steps = steps if len(steps) else np.zeros((1, 2), np.int64)  # an empty sweep is one empty group
-        return State(sweep), Info(sites, sweep, True, steps)
+        return PartitionState(sweep), Info(sites, sweep, True, steps)
 
 
 AHEAD = 32
@@ -106,11 +103,11 @@ class Coloring(Partition):
         """Always."""
         return True
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """Return the colouring of a volume or a picture."""
         if grid.layered:
             m, *by = coloring_of_layers(order)
-            return Plan(Sublattice(m, m - 1, 1, *by), m)
+            return LatticeColoring(Sublattice(m, m - 1, 1, *by), m)
         rows, cols = grid.whole.shape
         return lattice_plan(rows, cols, grid.torus, order, seed)
 
@@ -142,9 +139,9 @@ class Checkerboard(Partition):
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in grid.shape)
         return even and bool((offsets.sum(1) % 2 == 1).all())
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """Layer plus row plus column, even or odd; one colour of a single site."""
-        return Plan(Sublattice(2, 1, 1, layers=1), min(2, grid.whole.size))
+        return LatticeColoring(Sublattice(2, 1, 1, layers=1), min(2, grid.whole.size))
 
 
 class Synchronous(Partition):
@@ -161,9 +158,9 @@ class Synchronous(Partition):
         """Only on a lattice without neighbours, since every neighbourhood holds the four nearest sites."""
         return grid.size == 1
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """One colour."""
-        return Plan(Sublattice(1, 0, 1), 1)
+        return LatticeColoring(Sublattice(1, 0, 1), 1)
 
 
 class Raster(Partition):
@@ -179,10 +176,10 @@ class Raster(Partition):
         """Always."""
         return True
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """Return a colour for each site."""
         (*_, rows, cols), size = grid.whole.shape, grid.whole.size
-        return Plan(Sublattice(size // cols, 0, cols, layers=rows), size)
+        return LatticeColoring(Sublattice(size // cols, 0, cols, layers=rows), size)
 
 
 class Block(Partition):
@@ -209,8 +206,8 @@ class Block(Partition):
         assert self.tile is not None
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
-    def plan(self, grid: Grid, order: int, seed: int) -> Plan:
+    def plan(self, grid: Grid, order: int, seed: int) -> LatticeColoring:
         """Return the place of each site within its tile."""
         assert self.tile is not None
         rows, cols = (min(tile, n) for tile, n in zip(self.tile, grid.whole.shape, strict=True))
-        return Plan(Sublattice(rows, 0, cols), rows * cols)
+        return LatticeColoring(Sublattice(rows, 0, cols), rows * cols)

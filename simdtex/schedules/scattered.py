@@ -15,7 +15,7 @@ from simdtex.schedules.schedule import Active, Info, Setting
 from simdtex.schedules.sites import luby
 
 
-class State(NamedTuple):
+class ScatteredState(NamedTuple):
     """The state of a random choice.
 
     ``steps``, the number of choices, which keys the next; ``left``, the relaxations left in the current sweep.
@@ -36,16 +36,16 @@ class Scattered:
         """Return the numbers of the chosen sites; at least one site is active."""
         raise NotImplementedError
 
-    def init(self, setting: Setting) -> State:
+    def init(self, setting: Setting) -> ScatteredState:
         """Return the state before any choice."""
-        return State()
+        return ScatteredState()
 
-    def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
+    def step(self, setting: Setting, state: ScatteredState, active: Active) -> tuple[ScatteredState, Info]:
         """Return the chosen sites; the sweep ends after as many relaxations as sites were active at its start."""
         wanting, steps = active.numbers().size, state.steps + 1
         chosen = self.choose(setting, steps, active) if wanting else active.numbers()
         left = max(0, (state.left or wanting) - chosen.size) if wanting else 0
-        return State(steps, left), Info(chosen.astype(np.int32), steps, not left)
+        return ScatteredState(steps, left), Info(chosen.astype(np.int32), steps, not left)
 
 
 class Luby(Scattered):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -47,23 +46,10 @@ class Active(Protocol):
         ...
 
     def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
-        """Return the active sites of a list of numbers, group after group.
+        """Return the active sites of a list, in its order, and the first index of each group, and the end of the last.
 
-        Parameters
-        ----------
-        sites : (S,) array
-            Numbers of sites; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
-        starts : (groups + 1,) array
-            The first index of each group in ``sites``, and the end of the last.
-        machine : Machine, optional
-            The machine whose array ``sites`` is. None: it is an array of NumPy.
-
-        Returns
-        -------
-        (active,) int32 array, of NumPy or of the machine
-            The active sites, in the order of ``sites``.
-        (groups + 1,) array
-            The first index of each group in them, and the end of the last.
+        ``sites`` (S,) are numbers, group after group, an array of NumPy or of ``machine``, which may keep its own copy;
+        ``starts`` (groups + 1,) the first index of each group, and the end of the last.
         """
         ...
 
@@ -73,18 +59,15 @@ class Masked:
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._mask = np.ones(grid.shape, bool) if mask is None else mask
+        self._numbers = np.flatnonzero(self._mask)
         self.kept: dict[Any, Any] = {}
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the given mask."""
         return self._mask
 
-    @cached_property
-    def _numbers(self) -> NDArray[np.int64]:
-        return np.flatnonzero(self._mask)
-
     def numbers(self) -> NDArray[np.int64]:
-        """Return the numbers of the active sites, which are computed once."""
+        """Return the numbers of the active sites."""
         return self._numbers
 
     def among(self, sites: Array, starts: NDArray[np.int64], machine: Machine | None = None) -> Lists:
@@ -192,12 +175,7 @@ def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int3
 
 
 class Watched:
-    """A wrapper of a schedule, with its claims, states and steps; a subclass examines them.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    """
+    """A wrapper of a schedule, with its claims, states and steps; a subclass examines them."""
 
     def __init__(self, schedule: Schedule) -> None:
         self.schedule = schedule
@@ -219,12 +197,6 @@ class Watched:
 class Checked(Watched):
     """A wrapper that checks the claims of a schedule at every step.
 
-    Parameters
-    ----------
-    schedule : Schedule
-
-    Notes
-    -----
     `step` raises RuntimeError if a step has a site twice or one outside of the lattice, or if the schedule claims
     independence and two sites of a step are neighbours. Cost: O(sites x neighbours) per step, on the host.
     """
@@ -233,12 +205,12 @@ class Checked(Watched):
         """Return the schedule's own step; raise RuntimeError if it violates a claim of the schedule."""
         state, info = super().step(setting, state, active)
         grid, offsets = setting.grid, setting.offsets
-        for one in info.apart(setting.machine):
-            if np.unique(one.sites).size != one.sites.size:
+        for sites, *_ in info.apart(setting.machine):
+            if np.unique(sites).size != sites.size:
                 raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
-            if ((one.sites < 0) | (one.sites >= grid.size)).any():
+            if ((sites < 0) | (sites >= grid.size)).any():
                 raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
-            met = neighbours_in(grid, offsets, one.sites) if self.independent(grid, offsets) else None
+            met = neighbours_in(grid, offsets, sites) if self.independent(grid, offsets) else None
             if met:
                 here, there = (divmod(site, grid.cols) for site in met)
                 raise RuntimeError(

@@ -45,11 +45,7 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
 
 
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Return the stretches, of at most `CHUNK` sites, of the groups of a list, which begin at ``starts``.
-
-    The first result is the position of each stretch's first site, and the end of the list, (stretches + 1,); the second
-    is the number of the first stretch of each group, and the number of stretches, (groups + 1,).
-    """
+    """Return the bounds of the stretches, of at most `CHUNK` sites, of groups, and the number of each group's first."""
     pieces = -(-np.diff(starts) // CHUNK)
     firsts = np.concatenate([[0], np.cumsum(pieces)])
     within = np.arange(firsts[-1]) - np.repeat(firsts[:-1], pieces)
@@ -83,8 +79,6 @@ def among(
     return sites, before[firsts]
 
 
-UNCOLORED = -1
-
 VAST = 2**17
 """Rows plus columns beyond which a pattern that fits is used, if any, without a greedy colouring of the seam.
 
@@ -97,7 +91,7 @@ NEIGHBOURS_AT_ONCE = 2**20
 NOTHING: NDArray[Any] = np.zeros(0, np.int64)
 
 
-class Plan(NamedTuple):
+class LatticeColoring(NamedTuple):
     """The colouring of a lattice.
 
     ``pattern``, the sublattice whose cosets are the colours; ``colors``, the number of used colours; ``seam`` (n,)
@@ -113,18 +107,18 @@ class Plan(NamedTuple):
 
 
 @Operation
-def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
+def coloring(machine: Launcher | None, grid: Grid, plan: LatticeColoring) -> Array:
     """Return the colours of a lattice, or of a window of it: an int32 array with the grid's shape, on the machine.
 
     A window's sites have their colours in the whole. Cost: O(sites log seam).
     """
     if machine is None:
         *layer, row, col = np.ix_(*grid.lines())
-        found = plan.pattern.coset(row, col, *layer)
-        found = plan.names[found] if plan.names.size else found
-        number = row * grid.whole.cols + col
-        at = np.searchsorted(plan.seam, number)
-        return np.where(np.append(plan.seam, -1)[at] == number, np.append(plan.own, 0)[at], found).astype(np.int32)
+        coset = plan.pattern.coset(row, col, *layer)
+        color = plan.names[coset] if plan.names.size else coset
+        site = row * grid.whole.cols + col
+        at = np.searchsorted(plan.seam, site)
+        return np.where(np.append(plan.seam, -1)[at] == site, np.append(plan.own, 0)[at], color).astype(np.int32)
     colors, (names, seam, own) = (
         machine.empty(grid.shape, np.int32),
         map(machine.put, (plan.names, plan.seam, plan.own)),
@@ -136,11 +130,9 @@ def coloring(machine: Launcher | None, grid: Grid, plan: Plan) -> Array:
 
 @Operation
 def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return the sites colour by colour, and the bounds of the colours among them.
+    """Return the sites (S,) int32 colour by colour, row by row within each, and the bounds of the colours among them.
 
-    The result is the sites' numbers (S,) int32, row by row within a colour, on the machine, and (count + 1,) int64, the
-    first index of each colour in them, and the end of the last. Raises ValueError if a colour is not one of 0 to
-    ``count`` - 1. Cost: O(sites + count).
+    Raises ValueError if a colour is not one of 0 to ``count`` - 1. Cost: O(sites + count).
     """
     if machine is None:
         sites: Array = np.argsort(colors, None, kind="stable").astype(np.int32)
@@ -159,7 +151,7 @@ def by_color(machine: Launcher | None, colors: Array, count: int) -> tuple[Array
 
 
 @lru_cache(maxsize=32)
-def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
+def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> LatticeColoring:
     """Return the colouring of a picture's whole lattice, for equation (14).
 
     It is the best lattice colouring of the plane if its size admits that without a seam. Otherwise it is either a
@@ -188,18 +180,13 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Pl
     else:
         used[best.coset(*np.divmod(np.delete(np.arange(rows * cols), seam), cols))] = True
     names = (np.cumsum(used) - 1).astype(np.int32)
-    return Plan(best, int(used.sum()), seam, names[own], names)
-
-
-def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
-    """Return the sites with neighbours before them across the seam, in ascending order."""
-    row, col = np.arange(rows)[:, None] * cols, np.arange(cols)
-    return np.union1d(row[-radius:] + col, row + col[(col < radius) | (col >= cols - radius)])
+    return LatticeColoring(best, int(used.sum()), seam, names[own], names)
 
 
 def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
     """Return the later site of each pair of neighbours across the seam in one coset."""
-    site = _along(rows, cols, int(offsets.max()))
+    radius, first, col = int(offsets.max()), np.arange(rows)[:, None] * cols, np.arange(cols)
+    site = np.union1d(first[-radius:] + col, first + col[(col < radius) | (col >= cols - radius)])
     clash = [np.zeros(0, bool)]
     for here in _pieces(site, len(offsets)):
         row, col = np.divmod(here, cols)
@@ -208,8 +195,7 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
         k, m, own = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
         met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
-    found: NDArray[np.int64] = site[np.concatenate(clash)]
-    return found
+    return np.compress(np.concatenate(clash), site)
 
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
@@ -248,7 +234,7 @@ def _greedy(
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
     rank = np.append(rank, -1)  # the last, n in `near`, is that of no neighbour
-    colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
+    colors, left = np.full(n, -1, np.int32), np.arange(n)
     while left.size:
         now = left[(rank[near[:, left]] < rank[left]).all(0)]
         colors[now] = taken[now].argmin(1)
@@ -257,7 +243,7 @@ def _greedy(
         those = near[:, now]
         taken[those[those < n], np.broadcast_to(colors[now], those.shape)[those < n]] = True
         rank[now] = -1
-        left = left[colors[left] == UNCOLORED]
+        left = left[colors[left] < 0]
     return colors
 
 
@@ -271,10 +257,9 @@ ROUNDS = 4
 def luby(
     machine: Launcher | None, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
 ) -> NDArray[np.uint8]:
-    """Return the members of the set, (rows, cols) uint8, on the host, where a schedule needs them.
+    """Return the members of the set among ``active`` sites, (rows, cols) uint8, on the host: the greedy choice.
 
-    ``active`` (rows, cols) uint8 is 1 at sites that may be members. The set is the greedy choice in the order of
-    priorities, so it does not depend on the rounds. Cost: O(rows cols N) per round, some 5 to 10 rounds.
+    Cost: O(rows cols N) per round, some 5 to 10 rounds.
     """
     grid, sites, begin = replace(grid, tile=None), grid.size, grid.key[0]
     if machine is None:

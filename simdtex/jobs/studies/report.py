@@ -19,7 +19,7 @@ from simdtex.figures.page import INK, Figure, Part, Section, legend, new_figure,
 from simdtex.figures.sheet import common_scale, contact_sheet
 from simdtex.figures.tables import Table, number_text, settings_table
 from simdtex.io.image import to_display
-from simdtex.jobs.studies.comparison import Comparison, Entry, Run, Spread
+from simdtex.jobs.studies.comparison import Comparison, Entry, ScheduleRun, Spread
 from simdtex.jobs.studies.ising import ENOUGH, LEVEL, Chains, Finding, Spins
 
 PERCENT = ("utilisation", "changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free")
@@ -234,7 +234,9 @@ Points = tuple[list[float], list[float], list[int]]
 """The x and y of a curve, and which of its points have a marker."""
 
 
-def _curves(comparison: Comparison, points: Callable[[Run], Points], title: str, x: str, y: str) -> tuple[Plot, Axes]:
+def _curves(
+    comparison: Comparison, points: Callable[[ScheduleRun], Points], title: str, x: str, y: str
+) -> tuple[Plot, Axes]:
     """Plot a curve for each run, those of the first seed on top and labelled."""
     entries = comparison.entries
     plot = new_figure(9.2, 4.4)
@@ -252,7 +254,7 @@ def _curves(comparison: Comparison, points: Callable[[Run], Points], title: str,
 def _temperature(comparison: Comparison) -> Plot:
     """Plot the temperature left at the finest level against its steps, until equilibrium."""
 
-    def points(run: Run) -> Points:
+    def points(run: ScheduleRun) -> Points:
         sweeps = [sweep for sweep in run.finest if sweep.phase == "relax"]
         x = [0.0, *(float(sweep.steps) for sweep in sweeps)]
         return x, [sweep.before for sweep in sweeps[:1]] + [sweep.left for sweep in sweeps], list(range(len(x)))
@@ -268,7 +270,7 @@ def _temperature(comparison: Comparison) -> Plot:
 def _oscillation(comparison: Comparison) -> Plot:
     """Plot the share of the finest level's pixels that return to their value before last, against its sweeps."""
 
-    def points(run: Run) -> Points:
+    def points(run: ScheduleRun) -> Points:
         known = [(sweep, sweep.returned) for sweep in run.finest if sweep.returned is not None]
         free = [place for place, (sweep, _) in enumerate(known) if sweep.phase == "free"]
         return [float(sweep.sweep) for sweep, _ in known], [100 * share for _, share in known], free

@@ -173,12 +173,12 @@ class Synthesis:
             plan = mrf.plan(self.pictures, self.shape, self.options, self.given, self.guide)
             return replace(plan, remedy=self.remedy)
         if self.method == "multires":  # each loads what the others do not need
-            from simdtex.methods.multires.algorithm import Plan as Multires
+            from simdtex.methods.multires.algorithm import MultiresPlan
 
-            return Multires(self.pictures.pixels[0], self.shape, self.options)
-        from simdtex.methods.pyramid.algorithm import Plan as Pyramid
+            return MultiresPlan(self.pictures.pixels[0], self.shape, self.options)
+        from simdtex.methods.pyramid.algorithm import PyramidPlan
 
-        return Pyramid(self.pictures.pixels[0], self.shape, self.options)
+        return PyramidPlan(self.pictures.pixels[0], self.shape, self.options)
 
     def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing

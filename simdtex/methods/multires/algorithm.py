@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Multiresolution sampling: the procedure of De Bonet (1997).
 
-`analyse` (analysis.py) is the first phase; `Run` is the second, the paper's SynthesizePyramid and CollapsePyramid level
-by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
+`analyse` (analysis.py) is the first phase; `MultiresRun` is the second, the paper's SynthesizePyramid and
+CollapsePyramid level by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ VALUES = 4
 
 
 @dataclass(frozen=True)
-class Plan:
+class MultiresPlan:
     """A run of the method ``multires`` before it has a machine and a seed.
 
     Attributes
@@ -58,16 +58,16 @@ class Plan:
     options: Options
     analysis: Analysis | None = None
 
-    def on(self, machine: Machine, seed: int) -> Run:
+    def on(self, machine: Machine, seed: int) -> MultiresRun:
         """Return the run on a machine after the first phase of the paper; raise if the memory does not suffice."""
         channels, size = self.sample.shape[-1], self.sample.dtype.itemsize
         within_32_bits(self.shape, max(VALUES, channels))  # before any work
         memory.require_host(_on_host(self.shape, channels, size))
         analysis = self.analysis or analyse(machine, self.sample, self.options)
-        return Run(machine, analysis, self.shape, self.options, seed)
+        return MultiresRun(machine, analysis, self.shape, self.options, seed)
 
 
-class State(NamedTuple):
+class MultiresState(NamedTuple):
     """The state between two launches.
 
     ``level``, the current level; ``done``, its number of sampled pixels; ``source`` and ``counts`` of all levels, as in
@@ -85,7 +85,7 @@ End = tuple[Stage, NDArray[np.int32]]
 """The end of a level: its stage, and the numbers (rows, cols, 2) of candidates and of nodes compared."""
 
 
-class Run:
+class MultiresRun:
     """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
 
     No pixel depends on another of its level; a step samples some pixels of a level, or collapses the level. Cost: for
@@ -101,30 +101,27 @@ class Run:
         within_32_bits(shape, max(VALUES, channels))
         self.machine, self.analysis, self.options, self.seed = machine, analysis, options, seed
         self.shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-        on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
+        held = 4 * (pixels(analysis.shapes) * channels + prod(analysis.features.shape))
+        on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + held
         memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
         self._lattice = machine.put(lattice(self.shapes, 0))
+        self._structure = structure_of(machine, analysis, options)
         self._launches: Iterator[tuple[int, int]] = iter(())
 
-    def begin(self) -> State:
+    def begin(self) -> MultiresState:
         """Return the first state, whose top level is that of the sample, copied and repeated."""
         top = self.analysis.levels - 1
         sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
-        return self._prepared(State(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
+        return self._entered(MultiresState(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
 
-    def _prepared(self, state: State) -> State:
-        """Return the state, after preparing the input of launches."""
-        self._structure = structure_of(self.machine, self.analysis, self.options)
-        return self._entered(state)
-
-    def _entered(self, state: State) -> State:
+    def _entered(self, state: MultiresState) -> MultiresState:
         """Return the state, after planning the launches of its level."""
         if 0 <= state.level < self.analysis.levels - 1:
             count, least = pixels([self.shapes[state.level]]), first_launch(self.analysis, state.level)
             self._launches = paced(count, least, state.done)
         return state
 
-    def step(self, state: State, watch: Any = None) -> tuple[State, End | None]:
+    def step(self, state: MultiresState, watch: Any = None) -> tuple[MultiresState, End | None]:
         """Sample some pixels of the level, (9) to (12), or collapse it if all are sampled."""
         level, sampled = state.level, Sampled(state.source, state.counts, self._lattice)
         if state.done < pixels([self.shapes[level]]):  # Loop x', y'
@@ -137,8 +134,8 @@ class Run:
         source, counts = read_sources(self.machine, sampled, self.shapes, level)
         picture = self._collapsed(level, source, state.picture)  # CollapsePyramid
         image = analysis.sample.picture(self.machine.get(picture), source if level == 0 else None)
-        given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
-        place = places(given, analysis.shapes[level][1])
+        pixel = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
+        place = places(pixel, analysis.shapes[level][1])
         stage = Stage(level, image, place, np.ascontiguousarray(counts[..., 0]))
         after = state._replace(level=level - 1, done=0, picture=picture)  # Loop i from top level downto 0
         return self._entered(after), (stage, counts)
@@ -152,11 +149,11 @@ class Run:
         blend = self.options.seams == "blend"
         return laplacian_collapse(self.machine, band, self.machine.put(source), coarse, self.analysis.torus, blend)
 
-    def ended(self, state: State) -> bool:
+    def ended(self, state: MultiresState) -> bool:
         """Return whether all levels are collapsed."""
         return state.level < 0
 
-    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+    def result(self, state: MultiresState, observer: MultiresRecord) -> tuple[NDArray[Any], Output]:
         """Return the finest level's picture, with its source map, stages and statistics."""
         finest = observer.stages[-1]
         assert finest.source is not None
@@ -167,29 +164,29 @@ class Run:
         }
         return finest.image, OutputWithSource(finest.source, None, observer.stages, statistics)
 
-    def save(self, state: State) -> dict[str, Any]:
+    def save(self, state: MultiresState) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
         get = self.machine.get
         picture = None if state.picture is None else get(state.picture)
         return state._replace(source=get(state.source), counts=get(state.counts), picture=picture)._asdict()
 
-    def load(self, saved: dict[str, Any]) -> State:
+    def load(self, saved: dict[str, Any]) -> MultiresState:
         """Return the state that `save` copied, on this machine."""
-        state, put = State(**saved), self.machine.put
+        state, put = MultiresState(**saved), self.machine.put
         picture = None if state.picture is None else put(state.picture)
-        return self._prepared(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
+        return self._entered(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
 
-    def observer(self, callback: Callback | None) -> Record:
+    def observer(self, callback: Callback | None) -> MultiresRecord:
         """Return the observer of this run."""
-        return Record(self, callback)
+        return MultiresRecord(self, callback)
 
 
-class Record(Observer):
+class MultiresRecord(Observer):
     """The observer of a run: it reports every launch, and keeps the stage of every level."""
 
-    _run: Run
+    _run: MultiresRun
 
-    def step(self, state: State, end: End | None) -> None:
+    def step(self, state: MultiresState, end: End | None) -> None:
         """Report the sampled pixels; at the end of a level, keep its stage and report it."""
         if end:
             stage, counts = end
@@ -216,11 +213,7 @@ class Record(Observer):
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
-    """Return rows and columns of a level of the output: whole tiles and the beginning of one more.
-
-    ``shape`` and ``sample`` are the sides of the output and of the sample, ``own`` those of the sample's level, and
-    ``spacing`` is 2**level.
-    """
+    """Return rows and columns of a level of the output: tiles like the sample's level, and the beginning of one."""
     rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
     return rows, cols
 
@@ -228,8 +221,3 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
 def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:
     """Return the bytes on the host of an output with its stages."""
     return prod(shape) * (66 + channels * (4 + itemsize))
-
-
-def _held(analysis: Analysis) -> int:
-    """Return the bytes of an analysis on the device."""
-    return 4 * (pixels(analysis.shapes) * len(analysis.sample.planes) + int(prod(analysis.features.shape)))

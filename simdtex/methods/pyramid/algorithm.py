@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pyramid matching: the procedure of Heeger and Bergen (1995).
 
-`Run` is their Match-texture, `Matcher` (matcher.py) their Match-Histogram, `Transform` (pyramids.py) their Make-Pyramid
-and Collapse-Pyramid. Solid textures (solid.py) and mixtures (mixtures.py) are the same program with another pyramid and
-with other histograms.
+`PyramidRun` is their Match-texture, `Matcher` (matcher.py) their Match-Histogram, `Transform` (pyramids.py) their
+Make-Pyramid and Collapse-Pyramid. Solid textures (solid.py) and mixtures (mixtures.py) are the same program with
+another pyramid and with other histograms.
 """
 
 from __future__ import annotations
@@ -96,29 +96,21 @@ def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A run of the method ``pyramid`` before it has a machine and a seed.
-
-    Attributes
-    ----------
-    sample : (rows, cols, channels) array
-    shape : (int, int)
-        Rows and columns of the output.
-    options : Options
-    """
+class PyramidPlan:
+    """A run of the method ``pyramid`` before it has a machine and a seed, of a sample (rows, cols, channels)."""
 
     sample: NDArray[Any]
     shape: tuple[int, int]
     options: Options
 
-    def on(self, machine: Machine, seed: int) -> Run:
+    def on(self, machine: Machine, seed: int) -> PyramidRun:
         """Return the run on a machine, with the sample analysed; raise if the memory does not suffice."""
         levels = number_of_levels(self.options, *self.shape, *self.sample.shape[:2])
         pyramid = transform(machine, self.options, levels, self.options.edges == "wrap")
         return picture_run(machine, analyse(machine, self.sample, self.options, pyramid), self, levels, seed)
 
 
-def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed: int) -> Run:
+def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed: int) -> PyramidRun:
     """Return the run that matches a picture of ``plan.shape`` with a texture, by ``plan.options``."""
     shape, options = plan.shape, plan.options
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
@@ -130,7 +122,7 @@ def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed
         matched = match_subbands(matcher, pyramid.names, synthesis_pyr, wanted)
         return pyramid.collapse(matched)  # Collapse-Pyramid(synthesis-pyr)
 
-    return Run(machine, texture, shape, turn, options, levels, seed)
+    return PyramidRun(machine, texture, shape, turn, options, levels, seed)
 
 
 def check_memory(machine: Machine, shape: tuple[int, ...], texture: Texture, on_device: int) -> None:
@@ -152,7 +144,7 @@ Turn = Callable[[Array, list[Wanted], Matcher, Callable[[float], None]], Array]
 """One turn of the loop without the pixels: the pyramid of the picture is made, matched and collapsed."""
 
 
-class State(NamedTuple):
+class PyramidState(NamedTuple):
     """The state between two channels' turns.
 
     ``turns``, the number of turns done, over all channels and iterations; ``pictures`` (1, 1, ...) int32 arrays of the
@@ -165,7 +157,7 @@ class State(NamedTuple):
     moved: tuple[Any, ...] = ()
 
 
-class Run:
+class PyramidRun:
     """Match-texture of the paper, for each of the decorrelated channels; a step is one channel's turn.
 
     ``shape`` is (rows, cols) or (depth, rows, cols) of the output, and ``turn`` makes, matches and collapses the
@@ -191,15 +183,17 @@ class Run:
         self._pixels = [self.matcher.wanted(found[c].pixels) for c in self.busy]
         self._subbands = [[self.matcher.wanted(band) for band in found[c].subbands] for c in self.busy]
 
-    def begin(self) -> State:
+    def begin(self) -> PyramidState:
         """Return noise with the histograms of the sample's pixels: Match-Histogram(noise, texture)."""
         begun = _begin(self.machine, self.texture, self.shape, self.options, self.seed)
         pairs = zip(self.busy, self._pixels, strict=True)
         pictures = tuple(self.matcher.match("pixels", begun(c), pixels) for c, pixels in pairs)
         self.matcher.moved.clear()  # those of the noise
-        return State(0, pictures)
+        return PyramidState(0, pictures)
 
-    def step(self, state: State, watch: Callable[[State, float], None]) -> tuple[State, dict[str, float] | None]:
+    def step(
+        self, state: PyramidState, watch: Callable[[PyramidState, float], None]
+    ) -> tuple[PyramidState, dict[str, float] | None]:
         """Match the subbands and the pixels of the next channel: the body of Loop for several iterations.
 
         The description of the step is None or, at the end of an iteration, the histograms' distances by subband.
@@ -213,9 +207,9 @@ class Run:
         self.machine.sync()
         pictures = (*state.pictures[:c], picture, *state.pictures[c + 1 :])
         distances = matcher.distances() if c == len(self.busy) - 1 else None
-        return State(state.turns + 1, pictures, tuple(matcher.moved)), distances
+        return PyramidState(state.turns + 1, pictures, tuple(matcher.moved)), distances
 
-    def ended(self, state: State) -> bool:
+    def ended(self, state: PyramidState) -> bool:
         """Return whether all iterations are done."""
         return state.turns >= self.options.iterations * max(1, len(self.busy))
 
@@ -229,7 +223,7 @@ class Run:
             ]
         )
 
-    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+    def result(self, state: PyramidState, observer: PyramidRecord) -> tuple[NDArray[Any], Output]:
         """Return the image (*shape, channels) in the sample's type, and the statistics."""
         own, machine = self.texture.own, self.machine
         if own is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
@@ -242,21 +236,21 @@ class Run:
         statistics = {"options": options | {"levels": self.levels}, "iterations": observer.reports}
         return image, Output(None, None, [], statistics)
 
-    def save(self, state: State) -> dict[str, Any]:
+    def save(self, state: PyramidState) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
         get = self.machine.get
         moved = [(name, get(array), scale) for name, array, scale in state.moved]
-        return State(state.turns, tuple(map(get, state.pictures)), tuple(moved))._asdict()
+        return PyramidState(state.turns, tuple(map(get, state.pictures)), tuple(moved))._asdict()
 
-    def load(self, saved: dict[str, Any]) -> State:
+    def load(self, saved: dict[str, Any]) -> PyramidState:
         """Return the state that `save` copied, on this machine."""
         put = self.machine.put
         moved = tuple((name, put(array), scale) for name, array, scale in saved["moved"])
-        return State(saved["turns"], tuple(map(put, saved["pictures"])), moved)
+        return PyramidState(saved["turns"], tuple(map(put, saved["pictures"])), moved)
 
-    def observer(self, callback: Callback | None) -> Record:
+    def observer(self, callback: Callback | None) -> PyramidRecord:
         """Return the observer of this run."""
-        return Record(self, callback)
+        return PyramidRecord(self, callback)
 
 
 def _begin(
@@ -272,34 +266,28 @@ def _begin(
     if start.shape != (*shape, channels):
         size = " x ".join(str(n) for n in shape)
         raise ValueError(f"start has shape {start.shape}; give one of {size} pixels, grey or with {channels} channels")
-    own = _own_channels(start)
-    return lambda c: machine.put(own[c][None, None])
-
-
-def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
-    """Return the decorrelated channels (C, ...) of an image (..., C), in 2**-14 standard deviations."""
-    planes = Stretched(image.reshape(-1, 1, image.shape[-1])).planes
+    planes = Stretched(start.reshape(-1, 1, channels)).planes
     normal = palette([planes], [1.0]).decorrelated(planes)
-    channels = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)
-    return channels.reshape(-1, *image.shape[:-1])
+    own = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)  # in 2**-14 standard deviations
+    return lambda c: machine.put(own[c].reshape(1, 1, *shape))
 
 
-class Record(Observer):
+class PyramidRecord(Observer):
     """The observer of a run: it reports every channel's turn, every part of a solid's, and iterations."""
 
-    _run: Run
+    _run: PyramidRun
 
-    def part(self, state: State, share: float) -> None:
+    def part(self, state: PyramidState, share: float) -> None:
         """Report a share of the current channel's turn."""
         self._tell(state, state.turns + share, ended=False)
 
-    def step(self, state: State, distances: dict[str, float] | None) -> None:
+    def step(self, state: PyramidState, distances: dict[str, float] | None) -> None:
         """Report a channel's turn, and keep the distances of an iteration."""
         self._tell(state, state.turns, ended=distances is not None)
         if distances is not None:
             self.report(iteration=len(self.reports) + 1, distances=distances)
 
-    def _tell(self, state: State, done: float, ended: bool) -> None:
+    def _tell(self, state: PyramidState, done: float, ended: bool) -> None:
         """Report ``done`` turns of channels."""
         if self._callback:
             turns, iterations = done / max(1, len(self._run.busy)), self._run.options.iterations

@@ -33,7 +33,7 @@ class Mixture:
     sides: tuple[int, int, int | None] | None
     palette: int | None
 
-    def on(self, machine: Machine, seed: int) -> pyramid.Run:
+    def on(self, machine: Machine, seed: int) -> pyramid.PyramidRun:
         """Return the run on a machine, with the samples analysed on one scale.
 
         Blended samples are decorrelated together, so that their channels have the same meaning.

@@ -28,14 +28,8 @@ FLAT = 2.0**-12
 class Palette:
     """The decorrelating transform of one or more pictures.
 
-    Attributes
-    ----------
-    mean : (C,) int64 array
-        The mean on the stretched scale.
-    axes : (C, C) int64 array
-        U' in 2**-14: a row for each channel, the largest variance first.
-    deviations : (C,) float64 array
-        S: the standard deviation along each axis, in 2**-14 of the stretched scale; 0 where there is none.
+    ``mean`` (C,) is on the stretched scale; ``axes`` (C, C) are U' in 2**-14, a row for each channel, the largest
+    variance first; ``deviations`` (C,) are S, the standard deviation along each axis in 2**-14, or 0.
     """
 
     mean: NDArray[np.int64]
@@ -110,14 +104,9 @@ def _moments(picture: NDArray[np.int32], about: NDArray[np.int64]) -> tuple[NDAr
 
 @dataclass(frozen=True)
 class Decorrelated:
-    """Pictures as decorrelated channels in integers.
+    """Pictures as decorrelated ``channels`` (C, rows, cols) in integers, whose largest value is 2**20, or 0 if flat.
 
-    Attributes
-    ----------
-    channels : list of (C, rows, cols) int32 arrays
-        One array per picture. The largest absolute value in any of them is 2**20, or 0 in a flat channel.
-    spans : (C,) float64 array
-        The standard deviations that 2**20 represents.
+    ``spans`` (C,) are the standard deviations that 2**20 represents.
     """
 
     channels: list[NDArray[np.int32]]
@@ -130,7 +119,7 @@ class Decorrelated:
 
 def decorrelated(pictures: Sequence[NDArray[np.int32]], palettes: Sequence[Palette]) -> Decorrelated:
     """Return pictures (C, rows, cols) under one palette each, on one scale."""
-    normal = [own.decorrelated(picture) for own, picture in zip(palettes, pictures, strict=True)]
-    spans = np.array([max(float(np.abs(one[c]).max()) for one in normal) for c in range(len(normal[0]))])
+    normal = [palette.decorrelated(picture) for palette, picture in zip(palettes, pictures, strict=True)]
+    spans = np.array([np.abs(channels).max((1, 2)) for channels in normal]).max(0)
     scale = np.where(spans == 0, 0.0, TOP / np.where(spans == 0, 1.0, spans)).reshape(-1, 1, 1)
-    return Decorrelated([np.rint(one * scale).astype(np.int32) for one in normal], spans)
+    return Decorrelated([np.rint(channels * scale).astype(np.int32) for channels in normal], spans)

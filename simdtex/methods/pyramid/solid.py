@@ -21,7 +21,7 @@ from simdtex.machine.interface import Array
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid.algorithm import (
     VALUES,
-    Run,
+    PyramidRun,
     analyse,
     check_memory,
     match_subbands,
@@ -64,18 +64,16 @@ class Options(pyramid.Options):
 
 
 @dataclass(frozen=True)
-class Plan:
+class SolidPlan:
     """A solid texture, (depth, rows, cols), before it has a machine and a seed."""
 
     sample: NDArray[Any]
     shape: tuple[int, int, int]
     options: Options
 
-    def on(self, machine: Machine, seed: int) -> Run:
+    def on(self, machine: Machine, seed: int) -> PyramidRun:
         """Return the run on a machine, with the sample analysed; raise if the memory does not suffice.
 
-        Notes
-        -----
         Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
         """
         sample, shape, options = self.sample, self.shape, self.options
@@ -104,7 +102,7 @@ class Plan:
                     del solids[0]
             return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
 
-        return Run(machine, texture, shape, turn, options, levels, seed)
+        return PyramidRun(machine, texture, shape, turn, options, levels, seed)
 
 
 def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:

@@ -199,7 +199,7 @@ def filters(orientations: int) -> Filters:
     """
     if orientations not in ORIENTATIONS:
         raise ValueError(f"orientations is {orientations}; give one of {', '.join(map(str, ORIENTATIONS))}")
-    high, low, down, *bands = (_numbers(text) for text in _BANKS[orientations])
+    high, low, down, *bands = (np.array(text.split(), float) / 1e6 for text in _BANKS[orientations])
     if orientations == 1:
         upright = [_even(bands[0])]
     else:  # the second half is the first half turned by 90 degrees
@@ -212,11 +212,6 @@ def filters(orientations: int) -> Filters:
     for a in single:
         a.flags.writeable = False
     return Filters(*single)
-
-
-def _numbers(text: str) -> NDArray[np.float64]:
-    """Return the numbers of a text in millionths."""
-    return np.array([float(number) for number in text.split()]) / 1e6
 
 
 def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:

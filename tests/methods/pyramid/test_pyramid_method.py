@@ -1,12 +1,11 @@
 """The method ``pyramid`` against a plain Match-texture, and mixtures of textures."""
 
-from itertools import product
 from math import prod
 
 import numpy as np
 import plain_pyramid as plain
 import pytest
-from cases import REFERENCE, assert_same_bits, slow_but, texture
+from cases import REFERENCE, assert_same_bits, texture
 from scipy.stats import wasserstein_distance
 from skimage import data
 from subbands import decompose
@@ -18,7 +17,7 @@ from simdtex.methods.pyramid.laplacian import noise
 
 # -- The method ``pyramid``: against a plain float64 Match-texture, and what Heeger and Bergen's method promises.
 
-TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int64, np.float16, np.float32, np.float64]
+TYPES = [np.bool_, np.uint8, np.int64, np.float16, np.float64]
 
 
 def synthesize(sample, shape, **options):
@@ -36,7 +35,7 @@ def first_noise(shape, seed, channel=0):
 
 @pytest.mark.parametrize(
     ("kind", "orientations", "shape"),
-    [("steerable", 4, (60, 84)), ("steerable", 2, (64, 64)), ("laplacian", 4, (48, 72))],
+    [("steerable", 4, (60, 84)), ("laplacian", 4, (48, 72))],
 )
 def test_it_is_match_texture_of_the_paper(kind, orientations, shape):
     """Pixel by pixel, but where a rounding changes the order of two values: the more iterations, the more often."""
@@ -70,45 +69,40 @@ def test_a_multiple_of_the_sample_has_exactly_its_pixels(dtype):
     assert_same_bits(np.sort(made, axis=None), np.sort(np.tile(sample, (2, 3)), axis=None))
 
 
-@pytest.mark.parametrize(("dtype", "shape"), [(np.uint8, (9, 9)), (np.float64, (17, 13)), (np.uint8, (1, 7))], ids=str)
-def test_another_size_has_the_samples_quantiles(shape, dtype):
-    sample = texture((12, 10), None, dtype)
-    made = synthesize(sample, shape)
-    assert_same_bits(np.sort(made, axis=None), plain.quantiles(sample, prod(shape)))
+def test_another_size_has_the_samples_quantiles():
+    for dtype, shape in ((np.uint8, (9, 9)), (np.float64, (17, 13)), (np.uint8, (1, 7))):
+        sample = texture((12, 10), None, dtype)
+        made = synthesize(sample, shape)
+        assert_same_bits(np.sort(made, axis=None), plain.quantiles(sample, prod(shape)))
 
 
-@pytest.mark.parametrize(("kind", "shape"), [("steerable", (97, 74)), ("laplacian", (96, 96))])
-def test_a_torus_has_no_seam(kind, shape):
+def test_a_torus_has_no_seam():
     """The gradient across the seam is that inside: the mean of some pictures, as a seam is short."""
     sample = data.gravel()[:96, :96]
-    ratios = [seam(synthesize(sample, shape, rng=seed, pyramid=kind, iterations=3)) for seed in range(6)]
+    ratios = [seam(synthesize(sample, (97, 74), rng=seed, iterations=3)) for seed in range(6)]
     assert abs(np.mean(ratios) - 1) <= SEAM
 
 
 def test_a_flat_start_gives_no_gradient():
     """Equal values come in a random order, not in that of the rows."""
     sample, shape = gravel(), (64, 64)
-    made = [synthesize(sample, shape, rng=seed, start=np.full(shape, 3.0)).astype(float) for seed in range(4)]
-    for half, other in (((slice(None, 32),), (slice(32, None),)), ((..., slice(None, 32)), (..., slice(32, None)))):
-        differences = [(m[half].mean() - m[other].mean()) / sample.std() for m in made]
-        assert abs(np.mean(differences)) <= HALVES
+    made = [synthesize(sample, shape, rng=seed, start=np.full(shape, 3.0), levels=2) for seed in range(4)]
+    for m in (np.array(made, float), np.swapaxes(made, 1, 2).astype(float)):
+        assert abs(m[:, :32].mean() - m[:, 32:].mean()) <= HALVES * sample.std()
     assert len({m.tobytes() for m in made}) == 4
-
-
-def test_the_sample_as_start_is_nearly_kept():
-    sample = gravel()
-    made, output = synthesize(sample, sample.shape, start=sample, edges="wrap", full_output=True)
-    assert np.corrcoef(made.ravel(), sample.ravel())[0, 1] >= KEPT
-    assert max(output.statistics["iterations"][0]["distances"].values()) < 0.05
-    assert (synthesize(sample, sample.shape, start=sample, iterations=0) == sample).all()
 
 
 def test_a_start_shows_in_the_result_and_its_contrast_does_not():
     sample = gravel()
+    kept = {"start": sample, "edges": "wrap"}
+    made, output = synthesize(sample, sample.shape, full_output=True, **kept)
+    assert np.corrcoef(made.ravel(), sample.ravel())[0, 1] >= KEPT
+    assert max(output.statistics["iterations"][0]["distances"].values()) < 0.05
+    assert (synthesize(sample, sample.shape, iterations=0, **kept) == sample).all()
     stripes = np.indices((64, 64))[1] // 16 % 2
     made = synthesize(sample, (64, 64), start=stripes, iterations=1)
     assert np.corrcoef(made.ravel(), stripes.ravel())[0, 1] > 0.3
-    for same in (stripes.astype(np.uint8) * 255, stripes[..., None] * 1e-200, stripes * -1e9 * -1 + 7):
+    for same in (stripes[..., None] * 1e-200, stripes * -1e9 * -1 + 7):
         assert_same_bits(synthesize(sample, (64, 64), start=same, iterations=1), made)
 
 
@@ -123,39 +117,16 @@ def test_a_start_may_be_grey_or_have_the_samples_channels():
     assert synthesize(first, (10, 12), start=grey, channel_axis=0).shape == (3, 10, 12)
 
 
-@pytest.mark.parametrize(
-    ("start", "error", "words"),
-    [
-        (np.zeros((3, 3)), ValueError, r"start has shape \(3, 3\); give one of 8 x 9 pixels"),
-        (np.zeros((8, 9, 2)), ValueError, r"start has shape \(8, 9, 2\); give one of 8 x 9 pixels"),
-        (np.full((8, 9), np.nan), ValueError, "start|finite"),
-    ],
-    ids=["small", "channels", "nan"],
-)
-def test_a_wrong_start_is_one_sentence(start, error, words):
-    with pytest.raises(error, match=words) as found:
-        synthesize(texture((9, 9)), (8, 9), start=start)
-    assert "\n" not in str(found.value)
+def test_a_flat_channel_stays_flat():
+    for dtype, color in ((np.uint8, "decorrelate"), (np.float64, "channels")):
+        sample = texture((16, 16), 3, dtype)
+        sample[..., 1] = 1
+        made = synthesize(sample, (20, 18), channel_axis=-1, color=color)
+        assert np.ptp(made[..., 1]) == 0 < np.ptp(made[..., 0])
+        assert made[0, 0, 1] == pytest.approx(1, abs=1e-5)
 
 
-@pytest.mark.parametrize("color", ["decorrelate", "channels"])
-@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
-def test_a_flat_channel_stays_flat(color, dtype):
-    sample = texture((16, 16), 3, dtype)
-    sample[..., 1] = 1
-    made = synthesize(sample, (20, 18), channel_axis=-1, color=color)
-    assert np.ptp(made[..., 1]) == 0
-    assert made[0, 0, 1] == pytest.approx(1, abs=1e-5)
-    assert np.ptp(made[..., 0]) > 0
-
-
-@pytest.mark.parametrize(
-    ("channels", "color"),
-    slow_but(
-        [(1, "decorrelate"), (3, "decorrelate"), (2, "channels"), (5, "channels")],
-        product((1, 2, 3, 5), ("decorrelate", "channels")),
-    ),
-)
+@pytest.mark.parametrize(("channels", "color"), [(3, "decorrelate"), (5, "channels")])
 def test_any_number_of_channels_keeps_means_and_covariance(channels, color):
     sample = texture((32, 32), channels, np.float64)
     made = synthesize(sample, (32, 32), channel_axis=-1, color=color)
@@ -164,76 +135,43 @@ def test_any_number_of_channels_keeps_means_and_covariance(channels, color):
     assert flat.std(0) == pytest.approx(own.std(0), rel=SPREAD[color])
 
 
-@pytest.mark.parametrize("scale", [1e300, 1e-300, 5e-324 * 2**30])
-def test_a_huge_or_a_tiny_range_makes_no_difference(scale):
+def test_a_huge_or_a_tiny_range_makes_no_difference():
     sample = np.rint(texture((12, 12), None, np.float64) * 1000)
-    ours, theirs = synthesize(sample * scale, (15, 14)), synthesize(sample, (15, 14))
-    assert_same_bits(ours, theirs * scale)
-    colour = texture((12, 12), 3, np.float64) * scale
-    made = synthesize(colour, (15, 14), channel_axis=-1)
-    assert np.isfinite(made).all()
-    assert colour.min() <= made.min() < made.max() <= colour.max()
-
-
-def test_whole_numbers_of_64_bits_keep_their_range():
+    for scale in (1e300, 5e-324 * 2**30):
+        assert_same_bits(synthesize(sample * scale, (15, 14)), synthesize(sample, (15, 14)) * scale)
+        colour = texture((12, 12), 3, np.float64) * scale
+        made = synthesize(colour, (15, 14), channel_axis=-1)
+        assert colour.min() <= made.min() < made.max() <= colour.max()
     ends = np.iinfo(np.int64)
     sample = np.array([[ends.min, ends.max, 0, 5]] * 4, np.int64)
     assert set(np.unique(synthesize(sample, (8, 8)))) == {ends.min, ends.max, 0, 5}
 
 
-@pytest.mark.parametrize("sample", [(1, 1), (1, 7), (5, 3)], ids=str)
-@pytest.mark.parametrize("shape", [(1, 1), (8, 1), (6, 7)], ids=str)
 @pytest.mark.parametrize("kind", ["steerable", "laplacian"])
-def test_tiny_samples_and_outputs_work(kind, shape, sample):
-    pixels = texture(sample)
-    for options in ({}, {"match": "lookup", "edges": "wrap"}):
-        made = synthesize(pixels, shape, pyramid=kind, **options)
-        assert made.shape == shape
-        assert pixels.min() <= made.min() <= made.max() <= pixels.max()
-
-
-def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
-    assert synthesize(gravel(), (9, 11)).shape == (9, 11)
-    for kind in ("steerable", "laplacian"):
-        sample = texture((16, 16))
-        made = synthesize(sample, (16, 16), levels=0, pyramid=kind)
-        assert (np.sort(made, axis=None) == np.sort(sample, axis=None)).all()
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "words"),
-    [
-        ({"levels": 4}, ValueError, "levels=4 is too many for a side of 8 pixels; give at most 3"),
-        ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
-        ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
-    ],
-    ids=lambda value: str(value) if isinstance(value, dict) else "",
-)
-def test_a_wrong_option_is_one_sentence(options, error, words):
-    with pytest.raises(error, match=words):
-        synthesize(texture((12, 11)), (8, 9), **options)
+def test_tiny_samples_and_outputs_and_no_levels_work(kind):
+    for shape in ((1, 1), (1, 7), (5, 3)):
+        pixels = texture(shape)
+        for options in ({}, {"match": "lookup", "edges": "wrap"}):
+            made = synthesize(pixels, (6, 7), pyramid=kind, **options)
+            assert pixels.min() <= made.min() <= made.max() <= pixels.max()
+        assert synthesize(texture((7, 9)), shape, pyramid=kind).shape == shape
+    assert (np.sort(synthesize(pixels, (5, 3), levels=0, pyramid=kind), None) == np.sort(pixels, None)).all()
 
 
 def test_a_callback_sees_every_channel_of_every_iteration():
     seen = []
 
     def callback(progress):
-        seen.append((progress.iteration, progress.iterations, progress.fraction, progress.stage))
-        assert progress.image().shape == (3, 10, 9)
-        assert progress.image().dtype == np.uint8
-        assert progress.doing == f"iteration {progress.iteration} of 2"
-        pictures.append(progress.image())
+        assert progress.doing == f"iteration {progress.iteration} of {progress.iterations}"
+        seen.append((progress.iteration, progress.fraction, progress.stage, progress.image()))
 
-    pictures = []
     sample = np.moveaxis(texture((12, 11), 3), -1, 0)
     made = synthesize(sample, (10, 9), channel_axis=0, iterations=2, callback=callback)
-    assert [(i, n, end) for i, n, _, end in seen] == [
-        (i, 2, f"iteration0{i}" if c == 2 else None) for i in (1, 2) for c in range(3)
-    ]
-    assert [f for _, _, f, _ in seen] == pytest.approx([k / 6 for k in range(1, 7)])
-    assert_same_bits(pictures[-1], made)
-    alone = synthesize(sample, (10, 9), channel_axis=0, iterations=1)
-    assert_same_bits(pictures[2], alone)
+    ends = [(i, f"iteration0{i}" if c == 2 else None) for i in (1, 2) for c in range(3)]
+    assert [(i, end) for i, _, end, _ in seen] == ends
+    assert [fraction for _, fraction, *_ in seen] == pytest.approx([k / 6 for k in range(1, 7)])
+    assert_same_bits(seen[-1][-1], made)
+    assert_same_bits(seen[2][-1], synthesize(sample, (10, 9), channel_axis=0, iterations=1))
 
 
 def test_statistics_say_what_was_done():
@@ -253,23 +191,14 @@ def test_a_distance_is_that_of_two_histograms():
     """With a Laplacian pyramid of no levels, the residue's distance is that of the pixels before."""
     sample = texture((16, 16), None, np.float64)
     begun = np.exp(np.linspace(0, 3, 256)).reshape(16, 16)
-    states = []
-    _, output = synthesize(
-        sample,
-        (16, 16),
-        start=begun,
-        pyramid="laplacian",
-        levels=1,
-        iterations=2,
-        full_output=True,
-        callback=lambda progress: states.append(progress.image()),
-    )
+    options = {"start": begun, "pyramid": "laplacian", "levels": 1, "iterations": 1}
+    made, output = synthesize(sample, (16, 16), full_output=True, **options)
     matched = plain.match_histogram(begun, sample)
     bands, own = (plain.Laplacian(p, 1, 1, torus).subbands for p, torus in ((matched, True), (sample, False)))
     for name, known in ((0, "level 0"), ("low", "low")):
         moved = abs(np.sort(bands[name], axis=None) - np.sort(own[name], axis=None)).mean() / own[name].std()
         assert output.statistics["iterations"][0]["distances"][known] == pytest.approx(moved, rel=1e-4)
-    assert histogram_distance(sample, states[0]) == pytest.approx(0, abs=1e-6)
+    assert histogram_distance(sample, made) == pytest.approx(0, abs=1e-6)
 
 
 # -- Mixtures of textures: colours of one with the pattern of another, averages, low and high frequencies.
@@ -277,10 +206,6 @@ def test_a_distance_is_that_of_two_histograms():
 
 def mix(samples, shape, **options):
     return simdtex.mix(samples, shape, **({"rng": 4, "device": REFERENCE} | options))
-
-
-def synthesize_mixtures(sample, shape, **options):
-    return simdtex.synthesize(sample, shape, **({"method": "pyramid", "rng": 4, "device": REFERENCE} | options))
 
 
 def colours(hue, seed, shape=(48, 40)):
@@ -302,25 +227,19 @@ def moments(picture):
 
 def distances(sample, made, levels=3):
     """By subband, finest first: the Wasserstein distance from the sample's in its standard deviations."""
-    pairs = zip(
-        decompose(sample - sample.mean(), levels=levels, device=REFERENCE).subbands,
-        decompose(made - made.mean(), levels=levels, boundary="torus", device=REFERENCE).subbands,
-        strict=True,
-    )
-    return [
-        np.mean(
-            [
-                wasserstein_distance(a.ravel() - a.mean(), b.ravel() - b.mean()) / a.std()
-                for a, b in zip(*pair, strict=True)
-            ]
-        )
-        for pair in pairs
+    bands = [
+        decompose(p - p.mean(), levels=levels, boundary=boundary, device=REFERENCE).subbands
+        for p, boundary in ((sample, "open"), (made, "torus"))
     ]
 
+    def apart(a, b):
+        return wasserstein_distance(a.ravel() - a.mean(), b.ravel() - b.mean()) / a.std()
 
-@pytest.mark.parametrize(("palette", "pattern"), [(0, 1), (1, 0)])
-def test_a_mixture_has_the_colours_of_its_palette(palette, pattern):
-    samples = [WARM, COLD]
+    return [np.mean([*map(apart, *pair)]) for pair in zip(*bands, strict=True)]
+
+
+def test_a_mixture_has_the_colours_of_its_palette():
+    samples, palette, pattern = [WARM, COLD], 0, 1
     made = mix(samples, (64, 64), palette=palette, pattern=pattern, channel_axis=-1)
     (mean, covariance), (known, wanted), (other, _) = map(moments, (made, samples[palette], samples[pattern]))
     assert abs(mean - known).max() <= PALETTE * np.sqrt(np.diag(wanted)).max()
@@ -328,26 +247,16 @@ def test_a_mixture_has_the_colours_of_its_palette(palette, pattern):
     assert abs(covariance - wanted).max() <= 2 * PALETTE * wanted.max()
 
 
-def test_grey_mixtures_have_the_pixels_of_one_and_the_bands_of_the_other():
-    a, b = GREYS
-    made = mix([a, b], (96, 96), palette=0, pattern=1)
-    assert wasserstein_distance(made.ravel(), a.ravel()) <= 1, "a grey level, as all channels are rounded"
-    unlike, like = distances(a, made), distances(b * (a.std() / b.std()), made)
-    assert np.mean(like) < 0.6 * np.mean(unlike)
-
-
-@pytest.mark.slow
 def test_one_sample_for_all_is_the_texture_itself():
-    for sample, axis in ((GREYS[0], None), (WARM, -1)):
-        plain = synthesize_mixtures(sample, (40, 48), channel_axis=axis)
-        for samples, options in (
-            ([sample], {}),
-            ([sample], {"palette": 0, "pattern": 0}),
-            ([sample], {"average": [3.0]}),
-            ([sample, sample], {}),
-            ([sample, sample], {"low": 0, "high": 1}),
-        ):
-            assert_same_bits(mix(samples, (40, 48), channel_axis=axis, **options), plain)
+    sample = WARM[:20, :16]
+    expected = synthesize(sample, (17, 20), channel_axis=-1, rng=4)
+    for samples, options in (
+        ([sample], {"palette": 0, "pattern": 0}),
+        ([sample], {"average": [3.0]}),
+        ([sample, sample], {}),
+        ([sample, sample], {"low": 0, "high": 1}),
+    ):
+        assert_same_bits(mix(samples, (17, 20), channel_axis=-1, **options), expected)
 
 
 def test_the_average_of_pixels_is_between_them():
@@ -359,67 +268,45 @@ def test_the_average_of_pixels_is_between_them():
 
 def test_low_and_high_frequencies_come_from_where_they_should():
     a, b = GREYS
-    one = mix([a, b], (96, 96), low=0, high=1, split=1, levels=3)
-    other = mix([a, b], (96, 96), low=1, high=0, split=1, levels=3)
-    for made, low, high in ((one, a, b), (other, b, a)):
-        finest = distances(high, made)[:2]
-        coarse = distances(low, made)[2:]
-        assert max(finest + coarse) <= MIXED_BANDS
-    assert np.mean(distances(a, other)[:2]) < np.mean(distances(a, one)[:2])
-    assert np.mean(distances(a, one)[2:]) < np.mean(distances(a, other)[2:])
+    for low, high in ((a, b), (b, a)):
+        made = mix([low, high], (96, 96), low=0, high=1, split=1, levels=3)
+        assert max(distances(high, made)[:2] + distances(low, made)[2:]) <= MIXED_BANDS
+        assert np.mean(distances(low, made)[:2]) > np.mean(distances(high, made)[:2])
 
 
-def test_a_start_and_a_callback_are_those_of_the_method():
-    seen = []
-    start = np.indices((40, 40))[0] // 10 % 2
-    made, output = mix(
-        [WARM, COLD], (40, 40), start=start, channel_axis=-1, iterations=1, full_output=True, callback=seen.append
-    )
-    assert [one.fraction for one in seen] == pytest.approx([1 / 3, 2 / 3, 1])
-    assert_same_bits(seen[-1].image(), made)
-    assert np.corrcoef(made[..., 0].ravel(), start.ravel())[0, 1] ** 2 > 0.05
-    assert output.statistics["seed"] == 4
+WRONG = [
+    ({"palette": 2}, ValueError, "palette is 2; give the number of a sample, 0 to 1"),
+    ({"pattern": -1}, ValueError, "pattern is -1; give the number"),
+    ({"patern": 0}, TypeError, "unknown option 'patern' of the method 'pyramid' .did you mean 'pattern'"),
+    ({"low": 0}, ValueError, "low and high go together; give both, or neither"),
+    ({"pattern": 0, "average": [1, 1]}, ValueError, "a mixture has one pattern; give pattern, average, or low and"),
+    ({"average": [1]}, ValueError, "average has 1 weights for 2 samples; give one for each"),
+    ({"average": [0, 0]}, ValueError, "all weights of average are 0; give one above 0"),
+    ({"average": [-1, 2]}, ValueError, "a weight of average is -1"),
+    ({"average": ["a", 2]}, TypeError, "a weight of average must be a number"),
+    ({"average": 5}, TypeError, "average"),
+    ({"split": 1}, ValueError, "split parts low from high; give these two, or leave split out"),
+    ({"low": 0, "high": 1, "split": 5}, ValueError, "split is 5 and the pyramids have 1 levels"),
+    ({"levels": 9}, ValueError, "levels=9 is too many for a side of 16 pixels; give at most 4"),
+    ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
+    ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
+    ({"start": np.zeros((17, 17))}, ValueError, r"start has shape \(17, 17\); give one of 17 x 16 pixels"),
+    ({"start": np.zeros((17, 16, 2))}, ValueError, r"start has shape \(17, 16, 2\); give one of 17 x 16 pixels"),
+    ({"start": np.full((17, 16), np.nan)}, ValueError, "start|finite"),
+]
+NO_SAMPLES = [
+    ([], None, ValueError, "there is no sample; give one or more"),
+    (np.zeros((2, 8, 8)), None, TypeError, "samples is a single array; give a list of samples"),
+    ([np.zeros((8, 8)), np.zeros((8, 8), int)], None, TypeError, "sample 1 is of int64 and the first of float64"),
+    ([np.zeros((8, 8, 2)), np.zeros((8, 8, 3))], -1, ValueError, "sample 0 has 2 channels and another 3"),
+    ([np.zeros((8, 8, 3))], None, ValueError, "3-dimensional"),
+]
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "words"),
-    [
-        ({"palette": 2}, ValueError, "palette is 2; give the number of a sample, 0 to 1"),
-        ({"palette": True}, ValueError, "palette is True; give the number"),
-        ({"pattern": -1}, ValueError, "pattern is -1; give the number"),
-        ({"patern": 0}, TypeError, "unknown option 'patern' of the method 'pyramid' .did you mean 'pattern'"),
-        ({"low": 0}, ValueError, "low and high go together; give both, or neither"),
-        ({"low": 0, "high": 9}, ValueError, "high is 9; give the number"),
-        ({"pattern": 0, "average": [1, 1]}, ValueError, "a mixture has one pattern; give pattern, average, or low and"),
-        ({"average": [1]}, ValueError, "average has 1 weights for 2 samples; give one for each"),
-        ({"average": [0, 0]}, ValueError, "all weights of average are 0; give one above 0"),
-        ({"average": [-1, 2]}, ValueError, "a weight of average is -1"),
-        ({"average": [np.nan, 2]}, ValueError, "a weight of average is nan"),
-        ({"average": ["a", 2]}, TypeError, "a weight of average must be a number"),
-        ({"average": 5}, TypeError, "average"),
-        ({"split": 1}, ValueError, "split parts low from high; give these two, or leave split out"),
-        ({"low": 0, "high": 1, "split": 5}, ValueError, "split is 5 and the pyramids have 1 levels"),
-        ({"low": 0, "high": 1, "split": -1}, ValueError, "split is -1; give 0 or more"),
-        ({"levels": 9}, ValueError, "levels=9 is too many for a side of 16 pixels; give at most 4"),
-    ],
-    ids=lambda value: str(value) if isinstance(value, dict) else "",
-)
-def test_a_wrong_option_of_a_mixture_is_one_sentence(options, error, words):
-    with pytest.raises(error, match=words):
-        mix([texture((16, 18)), texture((19, 16))], (17, 16), **options)
-
-
-@pytest.mark.parametrize(
-    ("samples", "axis", "error", "words"),
-    [
-        ([], None, ValueError, "there is no sample; give one or more"),
-        (np.zeros((2, 8, 8)), None, TypeError, "samples is a single array; give a list of samples"),
-        (None, None, TypeError, "samples"),
-        ([np.zeros((8, 8)), np.zeros((8, 8), int)], None, TypeError, "sample 1 is of int64 and the first of float64"),
-        ([np.zeros((8, 8, 2)), np.zeros((8, 8, 3))], -1, ValueError, "sample 0 has 2 channels and another 3"),
-        ([np.zeros((8, 8, 3))], None, ValueError, "3-dimensional"),
-    ],
-)
-def test_wrong_samples_are_one_sentence(samples, axis, error, words):
-    with pytest.raises(error, match=words):
-        mix(samples, (9, 9), channel_axis=axis)
+def test_a_wrong_mixture_is_one_sentence():
+    for options, error, words in WRONG:
+        with pytest.raises(error, match=words):
+            mix([texture((16, 18)), texture((19, 16))], (17, 16), **options)
+    for samples, axis, error, words in NO_SAMPLES:
+        with pytest.raises(error, match=words):
+            mix(samples, (9, 9), channel_axis=axis)

@@ -1,7 +1,5 @@
 """Pyramids in integers: noise, folding, the steerable pyramid, the transform that methods use, and solids."""
 
-from itertools import product
-
 import numpy as np
 import plain_multires as plain_solid
 import plain_pyramid as plain
@@ -9,10 +7,9 @@ import pytest
 from cases import REFERENCE, assert_same_bits, host, opencl, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyrtools.pyramids import SteerablePyramidSpace
 from pyrtools.pyramids.filters import parse_filter
 from subbands import decompose
-from tolerances import HALF, PYRTOOLS, RECONSTRUCTION, UNIT32
+from tolerances import HALF, RECONSTRUCTION, UNIT32
 
 from simdtex import random
 from simdtex.methods.pyramid import operations_solid as solid
@@ -28,20 +25,12 @@ from simdtex.methods.pyramid.operations_solid import (
 from simdtex.methods.pyramid.pyramids import most_levels
 from simdtex.methods.pyramid.steerable import ORIENTATIONS, UNIT, filters, steerable_join, steerable_split
 
-# -- Pyramids in integers: noise, folding, the steerable pyramid, and the transform that methods use.
-
 # -- White noise: uniform 32-bit words, a function of seed, level, plane and site alone.
-seeds = st.integers(0, 2**64 - 1)
-levels = st.integers(0, 30)
 
 
-def run(machine, *args):
-    return np.asarray(machine.get(noise(machine, *args)))
-
-
-@given(st.integers(1, 9), st.sampled_from([1, 2, 13]), seeds, levels)
+@given(st.integers(1, 9), st.sampled_from([1, 2, 13]), st.integers(0, 2**64 - 1), st.integers(0, 30))
 def test_the_reference_is_a_word_of_each_sites_draw(planes, n, seed, level):
-    values = run(REFERENCE, planes, n, seed, level)
+    values = noise(REFERENCE, planes, n, seed, level)
     assert (values.dtype, values.shape) == (np.int32, (planes, n))
     for p, s in np.ndindex(planes, n):
         word = int(random.draw4(seed, level, p // 4, s, 5, 0)[p % 4])
@@ -49,39 +38,19 @@ def test_the_reference_is_a_word_of_each_sites_draw(planes, n, seed, level):
 
 
 # -- Every second pixel of a torus of any size, and back.
-SHAPES = [(1, 1), (1, 2), (2, 1), (3, 3), (4, 6), (5, 4), (4, 5), (7, 9), (8, 1)]
 
 
-def picture(shape, planes=2):
-    return np.random.default_rng(3).integers(-(2**20), 2**20, (planes, *shape)).astype(np.int32)
-
-
-def folded(machine, x):
-    return np.asarray(machine.get(fold(machine, machine.put(x))))
-
-
-def unfolded(machine, x, shape):
-    return np.asarray(machine.get(unfold(machine, machine.put(x), shape)))
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_every_second_pixel_around_the_torus(shape):
-    x = picture(shape)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (3, 3), (4, 6), (5, 4), (4, 5)])
+def test_every_second_pixel_around_the_torus_and_back(shape):
+    """Unfolding is the transpose: <fold x, y> = <x, unfold y>; and folding what was unfolded gives it back."""
+    x = noise_steerable((2, *shape))
+    y = fold(REFERENCE, x)
     rows, cols = (n if n % 2 else n // 2 for n in shape)
     expected = [[[x[p, 2 * i % shape[0], 2 * j % shape[1]] for j in range(cols)] for i in range(rows)] for p in (0, 1)]
-    assert_same_bits(folded(REFERENCE, x), np.array(expected, np.int32))
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_back_is_the_transpose(shape):
-    """<fold x, y> = <x, unfold y>, and folding what was unfolded gives it back."""
-    x = picture(shape)
-    y = folded(REFERENCE, x)
-    back = unfolded(REFERENCE, y, shape)
-    assert_same_bits(folded(REFERENCE, back), y)
-    other = picture(y.shape[1:])
-    left = (y.astype(np.int64) * other).sum()
-    assert left == (x.astype(np.int64) * unfolded(REFERENCE, other, shape)).sum()
+    assert_same_bits(y, np.array(expected, np.int32))
+    assert_same_bits(fold(REFERENCE, unfold(REFERENCE, y, shape)), y)
+    other = noise_steerable(y.shape, 1).astype(np.int64)
+    assert (y * other).sum() == (x * unfold(REFERENCE, other.astype(np.int32), shape).astype(np.int64)).sum()
 
 
 # -- The steerable pyramid in integers: its filters, its two operations, and pyramids made with them.
@@ -114,10 +83,9 @@ def half(shape):
 
 
 def float32_error(terms):
-    """How far a sum of products in float32 may be from the exact one, given each product's largest taps and values."""
-    count = sum(taps.size for _, taps, _ in terms)
+    """How far a sum of products in float32 may be from the exact one."""
     total = sum(abs(taps).sum(dtype=float) * max(1, abs(values).max()) for values, taps, _ in terms)
-    return HALF + (count + 1) * UNIT32 * total
+    return HALF + (sum(taps.size for _, taps, _ in terms) + 1) * UNIT32 * total
 
 
 @BANKS
@@ -134,12 +102,8 @@ def test_the_filters_are_those_of_pyrtools(orientations):
         assert (found == np.rint(known * UNIT) / UNIT).all()
         assert found.shape == known.shape
         assert not found.flags.writeable
-
-
-@pytest.mark.parametrize("orientations", [0, 3, 5, 8, -1])
-def test_other_orientations_are_refused(orientations):
-    with pytest.raises(ValueError, match=rf"orientations is {orientations}; give one of 1, 2, 4, 6"):
-        filters(orientations)
+    with pytest.raises(ValueError, match="orientations is 3; give one of 1, 2, 4, 6"):
+        filters(3)
 
 
 @st.composite
@@ -187,7 +151,7 @@ def test_the_reference_joins_by_the_rule(case):
         assert abs(picture - plain.join(single, shape, torus)).max() <= bound
 
 
-@pytest.mark.parametrize(("scratch", "bound"), [(2**12, 2**12), (2**17, 2**17), (1, 10 * 48 * 4)])
+@pytest.mark.parametrize(("scratch", "bound"), [(2**12, 2**12), (1, 10 * 48 * 4)])
 def test_scratch_memory_is_bounded(any_device, scratch, bound):
     """What is laid out at a time fits in it, or is the rows of one work-item; all launches use the same."""
     machine, sizes = opencl(any_device, scratch=scratch), []
@@ -205,7 +169,6 @@ def test_scratch_memory_is_bounded(any_device, scratch, bound):
 # -- Pyramids of pictures in their own unit, and the transform that methods use.
 KINDS = pytest.mark.parametrize("kind", ["steerable", "laplacian"])
 BORDERS_PYRAMIDS = pytest.mark.parametrize("boundary", ["open", "torus"])
-BANKS_PYRAMIDS = pytest.mark.parametrize("orientations", [1, 2, 4, 6])
 
 
 def white(shape, seed=0):
@@ -238,66 +201,25 @@ def test_a_laplacian_pyramid_is_exact_to_half_a_unit(shape, boundary, dtype, lev
     assert abs(back[..., 0] - picture.astype(float)).max() <= (HALF + (boundary == "torus") * odd) * pyramid.unit
 
 
-@pytest.mark.parametrize("shape", [(64, 64), (65, 97), (70, 50), (33, 64)])
-@BANKS_PYRAMIDS
-def test_a_steerable_pyramid_loses_little_on_a_torus_of_any_size(orientations, shape):
+@BANKS
+def test_a_steerable_pyramid_loses_little_on_a_torus_of_any_size(orientations):
     """Whatever the mean: half as many rows of an odd number would leave a seam, which a mean makes worse."""
-    for levels in (1, 3):
-        picture = white(shape, levels)
-        pyramid = made(picture, orientations=orientations, levels=levels, boundary="torus")
+    for shape in ((65, 97), (33, 64)):
+        picture = white(shape)
+        pyramid = made(picture, orientations=orientations, levels=3, boundary="torus")
         assert lost(picture, pyramid) <= RECONSTRUCTION[orientations]
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (5, 3), (2, 2)])
 @KINDS
 @BORDERS_PYRAMIDS
-def test_tiny_pictures_have_a_pyramid_of_every_height(shape, kind, boundary):
-    picture = texture(shape, None, np.float64)
-    for levels in range(most_levels(*shape) + 1):
-        pyramid = made(picture, kind=kind, levels=levels, boundary=boundary)
-        assert len(pyramid.subbands) == levels + (2 if kind == "steerable" else 1)
-        back = pyramid.collapse(device=REFERENCE)
-        assert np.isfinite(back).all()
-        assert pyramid.subbands[0].shape == (1, 1, *shape)
-
-
-@pytest.mark.parametrize("boundary", ["open", "torus"])
-@BANKS_PYRAMIDS
-def test_a_steerable_pyramid_is_that_of_pyrtools_in_the_pictures_unit(orientations, boundary):
-    picture = white((72, 96))
-    pyramid = made(picture, orientations=orientations, levels=3, boundary=boundary)
-    edges = {"open": "reflect1", "torus": "circular"}[boundary]
-    theirs = SteerablePyramidSpace(picture, height=3, order=orientations - 1, edge_type=edges).pyr_coeffs
-    # What is left of a constant: bands have none, and the residue has that of what was taken away.
-    high, *bands, low = pyramid.subbands
-    low = 8 * low[0, 0]
-    known = theirs["residual_lowpass"]
-    constant = (known - low).mean() / pyramid.offset
-    assert constant == pytest.approx(8, rel=1e-3)
-    close = [(high[0, 0], theirs["residual_highpass"]), (low + constant * pyramid.offset, known)]
-    close += [
-        (2.0**level * own[i, 0], theirs[level, i]) for level, own in enumerate(bands) for i in range(orientations)
-    ]
-    for found, band in close:
-        assert found.shape == band.shape
-        assert abs(found - band).max() <= PYRTOOLS * max(abs(band).max(), np.ptp(picture))
-
-
-@pytest.mark.parametrize("shape", [(24, 20), (23, 17)])
-def test_a_laplacian_pyramid_is_that_of_the_plain_sums(shape):
-    picture = white(shape)
-    pyramid = made(picture, kind="laplacian", levels=3)
-    theirs = list(plain.Laplacian(picture - pyramid.offset, 3, 1, False).subbands.values())
-    for found, band in zip(pyramid.subbands, theirs, strict=True):
-        assert abs(found[0, 0] - band).max() <= 4 * pyramid.unit, "rounded once a level"
-
-
-@KINDS
-def test_a_constant_is_all_offset(kind):
-    pyramid = made(np.full((9, 9), 7.5), kind=kind, levels=2)
-    assert not any(band.any() for band in pyramid.subbands)
-    assert pyramid.offset == 7.5
-    assert (pyramid.collapse(device=REFERENCE) == 7.5).all()
+def test_tiny_pictures_have_a_pyramid_of_every_height(kind, boundary):
+    for shape, most in (((1, 1), 0), ((1, 7), 0), ((5, 3), 1)):
+        assert most_levels(*shape) == most
+        for levels in range(most + 1):
+            pyramid = made(texture(shape, None, np.float64), kind=kind, levels=levels, boundary=boundary)
+            assert len(pyramid.subbands) == levels + (2 if kind == "steerable" else 1)
+            assert np.isfinite(pyramid.collapse(device=REFERENCE)).all()
+            assert pyramid.subbands[0].shape == (1, 1, *shape)
 
 
 @KINDS
@@ -313,7 +235,6 @@ def test_a_device_has_the_references_bits_of_pyramids(machine, kind, boundary):
 # -- Blocks of solid textures: the 3-D Laplacian pyramid and its inverse, slices the other ways, means of blocks.
 
 MOST = 2**22
-LIMITS = [1, 100, MOST]
 sides = st.integers(1, 5)
 shapes = st.tuples(sides, sides, sides)
 
@@ -322,67 +243,27 @@ def block(shape, limit=MOST, seed=0):
     return np.random.default_rng(seed).integers(-limit, limit, shape, np.int32, endpoint=True)
 
 
-@st.composite
-def blocks(draw):
-    return block(draw(shapes), draw(st.sampled_from(LIMITS)), draw(st.integers(0, 2**16)))
+def blurred(voxels):
+    """The block under the Gaussian of 16 in each direction, around the torus."""
+    for axis in range(3):
+        voxels = sum(weight * np.roll(voxels, -offset, axis) for offset, weight in plain_solid.GAUSS.items())
+    return voxels
+
+
+def coarser(shape):
+    """The places on the level below of the voxels of the next."""
+    return np.ix_(*(2 * np.arange(n if n % 2 else n // 2) % n for n in shape))
 
 
 def plain_reduced(fine):
-    """Every second voxel of the block under the Gaussian, one after the other."""
-    coarse = np.zeros([n if n % 2 else n // 2 for n in fine.shape], np.int32)
-    for at in np.ndindex(coarse.shape):
-        total = 0
-        for offset in product(plain_solid.GAUSS, repeat=3):
-            where = ((2 * k + o) % n for k, o, n in zip(at, offset, fine.shape, strict=True))
-            total += (
-                plain_solid.GAUSS[offset[0]]
-                * plain_solid.GAUSS[offset[1]]
-                * plain_solid.GAUSS[offset[2]]
-                * int(fine[tuple(where)])
-            )
-        coarse[at] = plain_solid.rounded(total, 16**3)
-    return coarse
+    return plain_solid.rounded(blurred(fine.astype(np.int64))[coarser(fine.shape)], 16**3).astype(np.int32)
 
 
 def plain_expanded(coarse, shape):
-    """Zeros between the voxels, then the Gaussian, twice as high in each direction; no zeros where a side is folded."""
-    if any(n % 2 for n in shape):
-        return plain_unfolded(coarse, shape)
-    fine = np.zeros(shape, np.int32)
-    for at in np.ndindex(shape):
-        total = 0
-        for offset in product(plain_solid.GAUSS, repeat=3):
-            place = [k + o for k, o in zip(at, offset, strict=True)]
-            if all(p % 2 == 0 for p in place):
-                where = (p // 2 % n for p, n in zip(place, coarse.shape, strict=True))
-                total += (
-                    plain_solid.GAUSS[offset[0]]
-                    * plain_solid.GAUSS[offset[1]]
-                    * plain_solid.GAUSS[offset[2]]
-                    * int(coarse[tuple(where)])
-                )
-        fine[at] = plain_solid.rounded(total, 8**3)
-    return fine
-
-
-def plain_unfolded(coarse, shape):
-    """On a torus with an odd side: voxels back at their places 2 k, then the Gaussian."""
-    spread = np.zeros(shape, object)
-    for at in np.ndindex(coarse.shape):
-        spread[tuple(2 * k % n for k, n in zip(at, shape, strict=True))] = int(coarse[at])
-    fine, half = np.zeros(shape, np.int32), sum(n % 2 == 0 for n in shape)
-    for at in np.ndindex(shape):
-        total = 0
-        for offset in product(plain_solid.GAUSS, repeat=3):
-            place = tuple((k + o) % n for k, o, n in zip(at, offset, shape, strict=True))
-            total += (
-                plain_solid.GAUSS[offset[0]]
-                * plain_solid.GAUSS[offset[1]]
-                * plain_solid.GAUSS[offset[2]]
-                * spread[place]
-            )
-        fine[at] = plain_solid.rounded(total * 2**half, 16**3)
-    return fine
+    """Voxels back at their places, and the Gaussian, twice as high in each direction where zeros are between."""
+    spread = np.zeros(shape, np.int64)
+    spread[coarser(shape)] = coarse
+    return plain_solid.rounded(blurred(spread) << sum(n % 2 == 0 for n in shape), 16**3).astype(np.int32)
 
 
 def steps(machine, g):
@@ -393,9 +274,10 @@ def steps(machine, g):
     return host(machine, [coarse, band, solid_collapse(machine, band, coarse)])
 
 
-@given(blocks())
+@given(shapes, st.sampled_from([1, 100, MOST]), st.integers(0, 2**16))
 @settings(max_examples=40)
-def test_the_reference_is_the_rule(g):
+def test_the_reference_is_the_rule(shape, limit, seed):
+    g = block(shape, limit, seed)
     coarse, band, back = steps(REFERENCE, g)
     assert coarse.shape == above(g.shape)
     assert_same_bits(coarse, plain_reduced(g))
@@ -415,26 +297,17 @@ def test_the_reference_collapses_any_two_blocks_by_the_rule(shape, limit, seed):
 def test_slices_lie_the_other_ways():
     g = block((3, 4, 5))
     x_z, y_z = solid_turn(REFERENCE, g, (1, 0, 2)), solid_turn(REFERENCE, g, (2, 0, 1))
-    assert all((x_z[y] == g[:, y]).all() for y in range(4))
-    assert all((y_z[x] == g[:, :, x]).all() for x in range(5))
+    assert all((x_z[y] == g[:, y]).all() for y in range(4)) and all((y_z[x] == g[:, :, x]).all() for x in range(5))
     assert x_z.flags.c_contiguous and y_z.flags.c_contiguous
 
 
-@given(st.integers(1, 4), st.sampled_from([2, MOST, 2**31 - 1]), st.integers(0, 2**16))
-def test_the_mean_is_the_rule(count, limit, seed):
-    parts = [block((2, 3, 4), limit, seed + k) for k in range(count)]
-    expected = [
-        plain_solid.rounded(sum(map(int, values)), count) for values in zip(*(p.flat for p in parts), strict=True)
-    ]
-    assert_same_bits(solid_mean(REFERENCE, parts), np.array(expected, np.int32).reshape(2, 3, 4))
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
-def test_a_device_has_the_references_mean(machine, count):
+def test_the_mean_is_the_rule(machine, count):
     for limit in (2, 2**31 - 1):
         parts = [block((3, 5, 7), limit, k) for k in range(count)]
-        mean = np.asarray(machine.get(solid_mean(machine, [machine.put(p) for p in parts])))
-        assert_same_bits(mean, solid_mean(REFERENCE, parts))
+        expected = plain_solid.rounded(np.sum(parts, 0, dtype=np.int64), count).astype(np.int32)
+        for m in (REFERENCE, machine):
+            assert_same_bits(np.asarray(m.get(solid_mean(m, [m.put(p) for p in parts]))), expected)
 
 
 def test_the_shape_of_a_launch_and_launches_in_parts_change_no_bit(cl_device, monkeypatch):
@@ -448,14 +321,12 @@ def test_the_shape_of_a_launch_and_launches_in_parts_change_no_bit(cl_device, mo
     assert_same_bits(turned, solid_turn(REFERENCE, g, (2, 0, 1)))
 
 
-@pytest.mark.parametrize("shape", [(3, 4, 5), (2, 4, 6)], ids=str)
-@pytest.mark.parametrize("sign", [1, -1])
-def test_nothing_overflows_at_the_limits(machine, sign, shape):
+def test_nothing_overflows_at_the_limits(machine):
     """What is promised: 2**23 exclusive for what is reduced, 2**25 exclusive for what is expanded."""
-    g = np.full(shape, sign * (2**23 - 1), np.int32)
-    coarse, band, _ = steps(machine, g)
-    assert (coarse == g.flat[0]).all()
-    assert not band.any()
-    most = np.full(above(shape), sign * (2**25 - 1), np.int32)
-    arrays = [machine.put(a) for a in (np.zeros_like(g), most)]
-    assert (np.asarray(machine.get(solid_collapse(machine, *arrays))) == most.flat[0]).all()
+    for shape, sign in (((3, 4, 5), 1), ((2, 4, 6), -1)):
+        g, most = (np.full(of, sign * (2**bits - 1), np.int32) for of, bits in ((shape, 23), (above(shape), 25)))
+        coarse, band, _ = steps(machine, g)
+        assert (coarse == g.flat[0]).all() and not band.any()
+        assert_same_bits(steps(REFERENCE, g)[0], coarse)
+        arrays = [machine.put(a) for a in (np.zeros_like(g), most)]
+        assert (np.asarray(machine.get(solid_collapse(machine, *arrays))) == most.flat[0]).all()
