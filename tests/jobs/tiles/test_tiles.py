@@ -46,10 +46,10 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     options = Options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
     outputs = Outputs(True, False, {})
-    layout = planned(plan, seed, 10, outputs)
-    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, outputs, layout, light={"light": "keep"})
+    tiles = planned(plan, seed, 10, outputs)
+    store = Store.create(str(tmp_path / "s.zarr"), tiles, light={"light": "keep"})
     work = store.work
-    assert (work.plan.options, work.seed, work.outputs, work.layout) == (plan.options, seed, outputs, layout)
+    assert (work.plan.options, work.seed, work.outputs, work.layout) == (plan.options, seed, outputs, tiles.layout)
     assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
     assert_same_bits(work.plan.sample.working, plan.sample.working)
     assert json.dumps(store.about)
@@ -62,8 +62,8 @@ class Stop(Exception):
 def created(tmp_path, name="s.zarr", **options):
     options, outputs = Options(order=1, levels=2, xi=-8.0, **options), Outputs(False, False, {})
     plan, where = planned_run(Pictures((SAMPLE[..., None],)), (14, 15), options), str(tmp_path / name)
-    layout = planned(plan, 11, 8, outputs)
-    return Store.create(where, plan, 11, outputs, layout, command=None, light={"light": "keep"}), where
+    tiles = planned(plan, 11, 8, outputs)
+    return Store.create(where, tiles, command=None, light={"light": "keep"}), where
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +177,7 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     from simdtex.schedules.schedule import Trimmed
 
     plan = planned_run(Pictures((SAMPLE[..., None],)), (120, 120), Options(order=2, levels=1))
-    level = planned(plan, 1, 40, Outputs(False, False, {})).levels[0]
+    level = planned(plan, 1, 40, Outputs(False, False, {})).layout.levels[0]
     run = Run(plan, REFERENCE, 1)
     sites = 0
     for tile in map(level.tile, range(level.count)):
