@@ -280,10 +280,7 @@ def check_cells(
     options: dict[str, Any],
     source: bool = False,
 ) -> Cells:
-    """Return the cells of an output, whose options are taken out; rows of tables become coordinates.
-
-    Raises ValueError if places differ, or the output cannot hold the place.
-    """
+    """Return the cells of an output, whose options are taken out; rows of tables become coordinates."""
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.hard_data import HardData
     from simdtex.io.volume import check_realisations_path

@@ -23,16 +23,8 @@ from simdtex.driver import Device, Kept, Seed, drive, run
 from simdtex.inputs import check_inputs, check_known
 from simdtex.io.hard_data import HardData
 from simdtex.io.places import Place
-from simdtex.jobs.simulation.maps import (
-    Cells,
-    Maps,
-    check_region,
-    digests,
-    georeferenced,
-    grid_axes,
-    missing_value,
-    plan_cells,
-)
+from simdtex.jobs.simulation import maps
+from simdtex.jobs.simulation.maps import Cells, digests, georeferenced, grid_axes, plan_cells
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data
@@ -202,45 +194,42 @@ def plan_simulation(
     true_or_false("source", source)
     if jobs is not None:
         whole("jobs", jobs, 1)
-    own, size, given = cells.training, cells.size, cells.given
-    maps = Maps(*(given[name] for name in Maps._fields))
-    inputs = check_inputs(own, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
+    pictures, size, given = cells.training, cells.size, cells.given
+    inputs = check_inputs(pictures, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
     missing: Any = None
-    if maps.region is not None:
-        inputs, missing = check_region(maps.region, size, inputs), missing_value(own.pixels)
+    if given["region"] is not None:
+        inputs, missing = maps.check_region(given["region"], size, inputs), maps.missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
-    copies, training, guide = maps.of_images(own, size), own, inputs.guide
+    copies, training, guide = maps.copies_of(given, pictures, size), pictures, inputs.guide
     if copies:
         if chosen.shares:
             raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
-        training = copies.pictures(own)
-        guide = guide and (tuple(one.of(guide[0]) for one in copies.copies), guide[1])
+        training = copies.pictures(pictures)
+        guide = guide and (tuple(copy.of(guide[0]) for copy in copies.copies), guide[1])
     kinds = chosen.of(training)
     cells.check_several(kinds)
     categories = kinds.categories(0)
-    soft = Soft(maps.of_categories(categories, size, cells.put), copies.probability if copies else None)
-    told = chosen.proportions or guide or maps.probabilities is not None
-    alone = own.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
+    probabilities = maps.of_categories(given["probabilities"], categories, size, cells.put)
+    soft = Soft(probabilities, copies.probability if copies else None)
+    told = chosen.proportions or guide or probabilities is not None
+    alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     if categories is not None and alone and not told:
         images = replace(kinds, shares=soft.shares) if copies else kinds
         chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
-    found = digests(own, inputs.given)
+    shas = digests(pictures, inputs.given)
     if inputs.guide:
-        found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
-    if own.usable:
-        found["mask"] = digest(*own.usable)
+        shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])
+    if pictures.usable:
+        shas["mask"] = digest(*pictures.usable)
     parts = (training, inputs.given, guide, soft, copies, source, chosen)
     axis = None if cells.channel_axis is None else -1
-    return Simulation(maps.digests(), n, first, size, *parts, cells._replace(given={}), found, missing, jobs, axis)
+    of_maps = maps.digests_of_maps(given)
+    return Simulation(of_maps, n, first, size, *parts, cells._replace(given={}), shas, missing, jobs, axis)
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """The job of `simulate`: a run of one plan for each realisation.
-
-    ``maps`` are digests. ``training`` and ``guide`` have the ``copies`` of training images, if these are turned or
-    scaled, and ``soft`` their probabilities. ``missing`` is the value outside of the region.
-    """
+    """The job of `simulate`: a run of one plan for each realisation; ``training`` and ``guide`` have the ``copies``."""
 
     maps: dict[str, str]
     n: int
@@ -343,10 +332,7 @@ class Simulation:
 
 
 class Batch:
-    """The realisations of a run, of which those of the numbers ``finished`` are made; threads make one each at a time.
-
-    ``free`` are the machines that make none.
-    """
+    """The realisations of a run; threads make one each at a time on the ``free`` machines."""
 
     def __init__(self, job: Simulation, seed: int, callback: Callback | None, checkpointing: Checkpointing) -> None:
         self.job, self.seed, self.callback, self.checkpointing = job, seed, callback, checkpointing

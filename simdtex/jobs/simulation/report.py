@@ -428,11 +428,7 @@ def _copies(images: Array, own: Array, found: Summary) -> list[Part]:
 
 
 def _index_map(places: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
-    """Return the position of each pixel of a copied window in a training image with ``cols`` columns; -1 elsewhere.
-
-    ``places`` (rows, cols) are those of the windows. A pixel in several windows belongs to the one in whose middle it
-    is.
-    """
+    """Return the position of each pixel of copied windows in a training image with ``cols`` columns; -1 elsewhere."""
     rows, wide = places.shape
     index = np.full((rows + WINDOW - 1, wide + WINDOW - 1), -1, np.int32)
     middle = (WINDOW - 1) / 2
@@ -459,12 +455,7 @@ def write_volumes(
     command: str = "",
     data: Floats | None = None,
 ) -> None:
-    """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
-
-    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols), or that of
-    `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
-    row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
-    """
+    """Write the report of realisations of a volume; ``data`` (m, 4) are hard data: column, row, layer and value."""
     made = uncertainty.named(ensemble, "realisation", *AXES)
     names = np.unique(training) if categorical else np.zeros(0, training.dtype)
     images, drawn = [*made.values, training], names[-1] if categorical else None
