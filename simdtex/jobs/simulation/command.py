@@ -179,7 +179,7 @@ def simulate(
         f"{number} realisation{'s' * (number != 1)} of {size_of(cells)}",
         str(output),
         [lambda made, run: write_realisations(output, made)],
-        more=lambda made, _: _say_shares(made.attrs),
+        more=_say_shares,
         report=lambda folder, made, run: _report(folder, material, made, cells),
     )
 
@@ -219,10 +219,8 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     cells = check_cells(material, output, size, data, options)
     plan = plan_estimation(cells, **given(options))
 
-    summary = f"maps of {size_of(cells)}"
-    return Task(
-        partial(make, "estimate", plan), summary, str(output), [lambda made, run: write_realisations(output, made)]
-    )
+    writers: list[Any] = [lambda made, _: write_realisations(output, made)]
+    return Task(partial(make, "estimate", plan), f"maps of {size_of(cells)}", str(output), writers)
 
 
 def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -273,12 +271,7 @@ def read_map(
 
 
 def check_cells(
-    material: Material,
-    output: Path,
-    size: str | None,
-    data: dict[str, Any],
-    options: dict[str, Any],
-    source: bool = False,
+    material: Material, output: Path, size: str | None, data: dict[str, Any], options: Any, source: bool = False
 ) -> Cells:
     """Return the cells of an output, whose options are taken out; rows of tables become coordinates."""
     from simdtex.io.grids import SUFFIXES, check_grid
@@ -312,10 +305,10 @@ def described(material: Material) -> Any:
     return [placed, *others] if others else placed
 
 
-def _say_shares(attributes: dict[str, Any]) -> None:
+def _say_shares(made: Any, _: Output) -> None:
     """Print the shares of categories that were asked and those reached."""
-    if "shares_asked" in attributes:
-        click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**attributes))
+    if "shares_asked" in made.attrs:
+        click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**made.attrs))
 
 
 def _report(folder: Path, material: Material, made: Any, cells: Cells) -> None:

@@ -80,12 +80,9 @@ def simulate(
     mask : (rows, cols) bool array, or a list of such, optional
         True for pixels of the training image that may be taken; all other pixels are still neighbours.
     known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
-        Conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN for
-        unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some variables
-        (channels) of a pixel may be known and others not.
+        Conditioning data as in `simdtex.synthesize`: values of the output, which do not change by a bit.
     origin : (x, y) or (x, y, z), optional
-        The centre of the first cell of a realisation, in the units of the table and of the result's coordinates.
-        None: see `like`, else 0.
+        The centre of the first cell, in the units of the table and of the result. None: see `like`, else 0.
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.
     like : array or dataset of xarray, optional
@@ -93,14 +90,12 @@ def simulate(
         number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to
         lie at one place; else `origin` and `cell`; else those of such a training image.
     several : {"refuse", "mean", "most"}
-        Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent
-        value (most). There is no mean of categories. See `simdtex.place_hard_data`.
+        Of different data of a table in one cell take none, but raise; their mean, if they are no categories; or the
+        most frequent. See `simdtex.place_hard_data`.
     outside : {"refuse", "skip"}
         Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).
     guide : (array, array), optional
-        Two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the training image's size and of the
-        output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
-        guide. With several training images, the first is a list of pictures.
+        Two pictures or volumes, of the training image's size and of the output's, as in `simdtex.synthesize`.
     first : int, 0 or more
         Start with the realisation of this number.
     shape : (int, int) or (int, int, int), optional
@@ -141,19 +136,17 @@ def simulate(
         cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
         realisation: `simdtex.synthesize` with it and the ``options`` returns the same map, unless `region` or a later
         parameter is used.
-        Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
-        ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
-        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. With `probabilities` or ``proportions``,
-        by default those of the training image if there is one variable and no guide, the shares of all realisations are
-        ``shares_asked`` and ``shares_reached``. All are texts and numbers, so that ``to_netcdf`` and ``to_zarr`` of
-        xarray write them; ``units`` and ``long_name`` are those of a training image of xarray. With `region` there is a
-        coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``. ``plot(number=8)`` draws
-        the first realisations.
+        Attributes, texts and numbers that xarray can write: ``seed``, ``options`` (a JSON text), ``version``,
+        ``device``; SHA-256 digests of ``training_image``, ``hard_data``, ``guide``, ``mask`` and the maps from `region`
+        to `scale`; with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``; ``units`` and ``long_name`` of
+        a training image of xarray. With `probabilities` or ``proportions``, by default those of the training image if
+        there is one variable and no guide, the shares of all realisations are ``shares_asked`` and ``shares_reached``.
+        With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``.
+        ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
-        With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
-        x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume
-        adds ``source_layer``, and several training images add ``source_image``, the number of the training image. Cells
-        without a source, such as data, have -1. The dataset has the attributes, too.
+        With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column``, of a volume also
+        ``source_layer``, int32, are where in the training image each cell is from, counted from 0, and
+        ``source_image`` is the number of several training images. Cells without a source, such as data, have -1.
 
     Raises
     ------
