@@ -56,10 +56,7 @@ def test_connectivity_of_a_broken_bar():
     # at a distance of 3 there are 5 + 7 pairs within the pieces, and 7 - 8, 6 - 9 ... across: columns 7 to 10
     assert found.function[1, 3] == pytest.approx(12 / 13)
     assert found.function[1, 1] == 1 and found.largest == pytest.approx(10 / 18)
-
-
-def test_pixels_are_connected_by_their_sides():
-    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2).components == pytest.approx(6e4 / 36)
+    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2).components == pytest.approx(6e4 / 36), "by their sides"
 
 
 def lines(*ends, width=8, shape=(100, 120)):
@@ -83,13 +80,11 @@ MIDDLE = (50, 60)
 LEFT, UP, DOWN = (50, -20), (-30, 140), (130, 140)
 DRAWN = {
     "across": (lines((LEFT, (50, 140))), 0),
-    "aslant": (lines(((-20, -20), (120, 140))), 0),
     "inside": (lines((LEFT, (50, 70))), 1),
     "free": (lines(((50, 30), (50, 90))), 2),
     "Y that leaves": (lines((LEFT, MIDDLE), (MIDDLE, UP), (MIDDLE, DOWN)), 0),
     "Y with one end": (lines((LEFT, MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, DOWN)), 1),
     "Y with three ends": (lines(((50, 20), MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, (85, 90))), 3),
-    "disc": (lines((MIDDLE, (50, 61)), width=40), 0),
     "blob": (lines((MIDDLE, (50, 70)), width=24), 0),
     "wide across": (lines((LEFT, (50, 140)), width=30), 0),
     "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
@@ -97,7 +92,6 @@ DRAWN = {
     "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
     "dash": (lines((LEFT, (50, 140))) | box(20, 21, 50, 58), 0),
     "near the border": (lines((LEFT, (50, 118))), 0),
-    "thin": (lines((LEFT, (50, 70)), width=1), 1),
     "nothing": (lines(), 0),
     "everything": (lines() + 1, 0),
 }
@@ -153,16 +147,13 @@ def test_distances_against_their_definition():
     np.testing.assert_allclose(found.by_level[:, 0], [table[0, 1] for table in tables])
 
 
-def test_continuous_values_are_cut_by_the_quantiles_of_the_training_image():
-    training = np.random.default_rng(8).normal(size=(40, 40))
-    same = ensemble.anodi(np.exp(training)[np.newaxis], np.exp(training))  # only ranks matter
-    assert same.likeness == 0 and np.isnan(same.ratio) and np.isnan(same.variety)
-
-
-def test_frequent_values_are_classes_of_their_own():
+def test_continuous_values_are_cut_by_quantiles_and_frequent_ones_are_classes_of_their_own():
     for frequent in (0.0, 1.0):
         training = np.where((np.indices((12, 12)) % 3).any(0), frequent, 1 - frequent)  # one in nine is the other
         assert ensemble.anodi(np.full((1, 12, 12), frequent), training).likeness == pytest.approx(1)
+    training = np.random.default_rng(8).normal(size=(40, 40))
+    same = ensemble.anodi(np.exp(training)[np.newaxis], np.exp(training))  # only ranks matter
+    assert same.likeness == 0 and np.isnan(same.ratio) and np.isnan(same.variety)
 
 
 def test_summary_puts_everything_together():
@@ -223,7 +214,6 @@ IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
         (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
         (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
         (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
-        (lambda: ensemble.anodi(FEW, IMAGE + 1), "the ensemble holds 0, which is no category"),
         (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
         (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
         (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),

@@ -109,10 +109,9 @@ def test_tables_ground_masks_and_several_training_images(tmp_path):
     rows = np.full(SHAPE, np.nan)
     rows[2, 3], rows[3, 4] = 4, 8
     assert_same_bits(found.probability.values, simdtex.estimate(TRAINING, known=rows, **options).probability.values)
-    two = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, **options)
-    usable = [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
-    one = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, mask=usable, **options)
-    assert not np.array_equal(two.probability, one.probability)
+    pictures, usable = [TRAINING, TRAINING[:12]], [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
+    two, masked = (simdtex.estimate(pictures, known=rows, mask=mask, **options) for mask in (None, usable))
+    assert not np.array_equal(two.probability, masked.probability)
     assert set(found.attrs) == {
         *("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data", "cell_x", "cell_y")
     }
@@ -147,12 +146,8 @@ def test_the_callback_sees_the_share_and_the_maps(monkeypatch):
     seen = []
     known = np.full((4, 6), np.nan)
     known[2, 1] = 1
-    found = simdtex.estimate(
-        np.tile([0.0, 0, 0, 1], (32, 8)),
-        known=known,
-        device="reference",
-        callback=lambda p: seen.append((p, p.image())),
-    )
+    training, look = np.tile([0.0, 0, 0, 1], (32, 8)), lambda progress: seen.append((progress, progress.image()))
+    found = simdtex.estimate(training, known=known, device="reference", callback=look)
     shares = [progress.fraction for progress, _ in seen]
     assert shares == sorted(set(shares)) and len(shares) > 3 and shares[-1] == 1
     assert [np.isfinite(maps[..., 0]).mean() for _, maps in seen] == shares
