@@ -58,23 +58,6 @@ def test_a_worker_is_killed_and_another_joins_late(tmp_path, whole):
 
 
 @pytest.mark.slow
-def test_a_client_that_ends_leaves_a_store_to_go_on_with(tmp_path, whole):
-    class Stop(Exception):
-        pass
-
-    def stop(progress):
-        if progress.phase == "sweep" and progress.level == 0 and progress.tile == 2:
-            raise Stop
-
-    path = tmp_path / "out.zarr"
-    with pytest.raises(Stop):
-        given = {"device": "reference", "callback": stop}
-        simdtex.synthesize(SAMPLE, (90, 101), store=TileStore(path, 40), **given, **OPTIONS)
-    ours = TileStore(path, workers=1).resume("reference")
-    assert_same_bits(ours.compute(), whole)
-
-
-@pytest.mark.slow
 def test_a_run_without_workers_says_what_it_waits_for(tmp_path, whole, monkeypatch):
     monkeypatch.setattr("simdtex.jobs.tiles.cluster.WAIT", 0.5)
     said = []
@@ -126,7 +109,7 @@ def test_a_scheduler_that_ends_is_said(tmp_path, whole):
         finally:
             scheduler.kill()
             worker.kill()
-    ours = TileStore(store.path).resume("reference")
+    ours = TileStore(store.path, workers=1).resume("reference")
     assert_same_bits(ours.compute(), whole)
 
 
