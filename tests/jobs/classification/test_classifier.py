@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import tolerances
 from cases import REFERENCE, assert_same_bits, opencl, texture
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import softmax
 from scipy.stats import multivariate_normal
@@ -39,51 +37,32 @@ def run(machine, levels, sites, offsets, contrast):
     return machine.get(features(machine, *map(machine.put, arrays), contrast))
 
 
-def mirrored(i, n):
-    while not 0 <= i < n:
-        i = -i if i < 0 else 2 * n - 2 - i
-        if n == 1:
-            i = 0
-    return i
-
-
 def plain(levels, sites, offsets, contrast):
-    """One neighbourhood after another, in float64."""
-    bands, rows, cols = levels.shape
-    found = []
-    for site in sites:
-        i, j = divmod(int(site), cols)
-        values = np.array(
-            [[levels[b, mirrored(i + y, rows), mirrored(j + x, cols)] / 16 for y, x in offsets] for b in range(bands)]
+    """Neighbourhoods in float64, (B * N, S), mirrored beyond the border."""
+    pad = np.pad(levels, ((0, 0), (8, 8), (8, 8)), "reflect") / 16
+    row, col = np.divmod(sites, levels.shape[2])
+    values = np.stack([pad[:, 8 + row + y, 8 + col + x] for y, x in offsets], 1)
+    if contrast:
+        z = values - values.mean(1, keepdims=True)
+        size = np.sqrt((z * z).sum((0, 1)))
+        # below 1 the size is taken for its square
+        shown, inverse = np.where(size > 1, (size, 1 / np.maximum(size, 1)), (size * size, size * 0 + 1))
+        values = z * 40 * np.log1p(shown / 5) * inverse
+    return values.reshape(-1, len(sites))
+
+
+@pytest.mark.parametrize("contrast", [False, True])
+def test_the_reference_is_the_formula(contrast):
+    rng = np.random.default_rng(1)
+    for bands, rows, cols, spread in ((1, 1, 1, 8), (3, 7, 5, TOP), (2, 2, 7, 300), (1, 6, 1, 1), (2, 5, 6, 8)):
+        levels = rng.integers(0, TOP - spread, endpoint=True) + rng.integers(
+            0, spread, (bands, rows, cols), endpoint=True
         )
-        if contrast:
-            z = values - values.mean(1, keepdims=True)
-            size = np.sqrt((z * z).sum())
-            # below 1 the size is taken for its square
-            shown, inverse = (size, 1 / size) if size > 1 else (size * size, 1)
-            values = z * 40 * np.log1p(shown / 5) * inverse
-        found.append(values.ravel())
-    return np.array(found).T
-
-
-@st.composite
-def cases(draw):
-    bands, rows, cols = draw(st.integers(1, 3)), draw(st.integers(1, 7)), draw(st.integers(1, 7))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    spread = draw(st.sampled_from([1, 8, 300, TOP]))
-    levels = rng.integers(0, spread, (bands, rows, cols), endpoint=True) + rng.integers(0, TOP - spread, endpoint=True)
-    sites = rng.integers(0, rows * cols, draw(st.integers(1, 40)))
-    offsets = np.concatenate([[[0, 0]], rng.integers(-4, 4, (draw(st.integers(1, 12)), 2), endpoint=True)])
-    return levels, sites, offsets
-
-
-@given(cases(), st.booleans())
-@settings(max_examples=60)
-def test_the_reference_is_the_formula(case, contrast):
-    found, exact = run(REFERENCE, *case, contrast), plain(*case, contrast)
-    assert found.dtype == np.float32
-    assert (found == np.rint(found)).all()
-    assert abs(found - exact).max() <= tolerances.HALF + tolerances.GAIN
+        sites = rng.integers(0, rows * cols, 40)
+        offsets = np.concatenate([[[0, 0]], rng.integers(-4, 4, (9, 2), endpoint=True)])
+        found, exact = run(REFERENCE, levels, sites, offsets, contrast), plain(levels, sites, offsets, contrast)
+        assert found.dtype == np.float32 and (found == np.rint(found)).all()
+        assert abs(found - exact).max() <= tolerances.HALF + tolerances.GAIN
 
 
 # -- The least squared distance of a neighbourhood to the exemplars of each class.
@@ -94,25 +73,16 @@ def run_exemplars(machine, features, classes):
     return machine.get(exemplars(machine, machine.put(np.asarray(features, np.float32)), known))
 
 
-@st.composite
-def cases_exemplars(draw):
-    count, sites = draw(st.integers(1, 40)), draw(st.integers(1, 70))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    low, high = draw(st.sampled_from([(0, 255), (-180, 180), (0, 3)]))
-    sizes = draw(st.lists(st.integers(1, 11), min_size=1, max_size=4))
-    features = rng.integers(low, high, (count, sites), endpoint=True)
-    return features, [rng.integers(low, high, (size, count), endpoint=True) for size in sizes]
-
-
-@given(cases_exemplars())
-@settings(max_examples=60)
-def test_the_reference_is_the_least_of_all_distances(case):
-    features, classes = case
-    found = run_exemplars(REFERENCE, *case)
-    assert (found.dtype, found.shape) == (np.uint16, (len(classes), features.shape[1]))
-    for logs, known in zip(found, classes, strict=True):
-        squared = ((features.T[:, None] - known[None]) ** 2).sum(-1).min(1)
-        assert abs(logs - 256 * np.log1p(squared)).max() <= 0.501
+def test_the_reference_is_the_least_of_all_distances():
+    rng = np.random.default_rng(2)
+    for count, sites, low, high, sizes in ((1, 1, 0, 3, [1]), (40, 70, -180, 180, [11, 2, 4]), (9, 33, 0, 255, [5, 8])):
+        features = rng.integers(low, high, (count, sites), endpoint=True)
+        classes = [rng.integers(low, high, (size, count), endpoint=True) for size in sizes]
+        found = run_exemplars(REFERENCE, features, classes)
+        assert (found.dtype, found.shape) == (np.uint16, (len(classes), sites))
+        for logs, known in zip(found, classes, strict=True):
+            squared = ((features.T[:, None] - known[None]) ** 2).sum(-1).min(1)
+            assert abs(logs - 256 * np.log1p(squared)).max() <= 0.501
 
 
 @pytest.mark.parametrize("vector", [1, 4])
@@ -149,27 +119,19 @@ def run_window(machine, labels, owner, taps, values=None):
     return machine.get(window(machine, *map(machine.put, arrays), *more))
 
 
-@st.composite
-def cases_window(draw):
-    rows, cols, planes = draw(st.integers(1, 9)), draw(st.integers(1, 20)), draw(st.integers(1, 4))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    reach = draw(st.integers(1, 5))
-    taps = np.diff(np.sort(np.concatenate([[0], rng.integers(0, TAPS, 2 * reach, endpoint=True), [TAPS]])))
-    values = rng.integers(0, 2**13, (planes, rows, cols)) if draw(st.booleans()) else None
-    return rng.integers(0, 3, (rows, cols)), rng.integers(0, 3, planes), taps, values
-
-
-@given(cases_window())
-@settings(max_examples=60)
-def test_the_reference_is_a_correlation(case):
-    labels, owner, taps, values = case
-    found = run_window(REFERENCE, *case)
-    assert found.dtype == np.uint32
-    for p, own in enumerate(owner):
-        here = (labels == own) * (1 if values is None else values[p])
-        for axis in (0, 1):
-            here = ndimage.correlate1d(here.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
-        assert (found[p] == here).all()
+def test_the_reference_is_a_correlation():
+    rng = np.random.default_rng(3)
+    for rows, cols, reach, valued in ((9, 20, 5, True), (1, 7, 2, False), (4, 1, 1, True)):
+        ends = np.sort(rng.integers(0, TAPS, 2 * reach, endpoint=True))
+        labels, owner, taps = rng.integers(0, 3, (rows, cols)), [0, 2, 1], np.diff([0, *ends, TAPS])
+        values = rng.integers(0, 2**13, (3, rows, cols)) if valued else None
+        found = run_window(REFERENCE, labels, owner, taps, values)
+        assert found.dtype == np.uint32
+        for p, label in enumerate(owner):
+            here = (labels == label) * (1 if values is None else values[p])
+            for axis in (0, 1):
+                here = ndimage.correlate1d(here.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
+            assert (found[p] == here).all()
 
 
 def test_the_largest_sums_fit_32_bits(machine):
@@ -203,32 +165,19 @@ def run_potts(machine, sites, evidence, votes, weight, labels):
     return machine.get(potts(machine, *arrays, weight, put(np.asarray(labels, np.uint8))))
 
 
-@st.composite
-def cases_potts(draw):
-    classes, rows, cols = draw(st.integers(1, 5)), draw(st.integers(1, 6)), draw(st.integers(1, 6))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    scale = draw(st.sampled_from([2, 2**18, 2**24]))  # of the smallest, many are equal
-    evidence = rng.integers(-scale, scale, (classes, rows, cols))
-    votes = rng.integers(0, min(scale, 2**18), (classes, rows, cols), endpoint=True)
-    sites = rng.permutation(rows * cols)[: draw(st.integers(1, rows * cols))]
-    return sites, evidence, votes, draw(st.sampled_from([0, 1, 112, 1600])), rng.integers(0, classes, (rows, cols))
-
-
-@given(case=cases_potts())
-@settings(max_examples=25)
-def test_a_device_has_the_references_bits_of_potts(machine, case):
-    assert_same_bits(run_potts(machine, *case), run_potts(REFERENCE, *case))
-
-
-@given(cases_potts())
-@settings(max_examples=60)
-def test_the_reference_takes_the_first_of_the_greatest_energies(case):
-    sites, evidence, votes, weight, labels = case
-    found = run_potts(REFERENCE, *case)
-    for site in range(labels.size):
-        at = np.unravel_index(site, labels.shape)
-        energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
-        assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
+@pytest.mark.parametrize("scale", [2, 2**18, 2**24])  # of the smallest, many are equal
+def test_sites_take_the_first_of_the_greatest_energies(machine, scale):
+    rng = np.random.default_rng(scale)
+    for classes, weight in ((1, 0), (3, 1), (5, 112), (4, 1600)):
+        evidence = rng.integers(-scale, scale, (classes, 6, 5))
+        votes = rng.integers(0, min(scale, 2**18), (classes, 6, 5), endpoint=True)
+        sites, labels = rng.permutation(30)[:20], rng.integers(0, classes, (6, 5))
+        found = run_potts(REFERENCE, sites, evidence, votes, weight, labels)
+        for site in range(30):
+            at = np.unravel_index(site, (6, 5))
+            energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
+            assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
+        assert_same_bits(run_potts(machine, sites, evidence, votes, weight, labels), found)
 
 
 # -- The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown.
@@ -278,23 +227,15 @@ def test_every_level_has_two_experts_whose_weights_add_up():
 def distances(picture, known, expert):
     """Of every site to the nearest of all whole neighbourhoods of a picture, by formula."""
 
-    def neighbourhoods(one):
-        rows, cols = one.shape
-        values = one * 16.0
+    def neighbourhoods(image):
+        values = image * 16.0
         if expert.level:
             for axis in (0, 1):
                 taps = gaussian(model.SMOOTHING[expert.level]) / 512
                 values = ndimage.correlate1d(values, taps, axis, mode="mirror")
             values = np.floor(values + 0.5)
-        pad = np.pad(values, expert.reach, "reflect") / 16
-        y, x = expert.offsets.T + expert.reach
-        found = np.stack([pad[i : i + rows, j : j + cols] for i, j in zip(y, x, strict=True)], -1)
-        if expert.contrast:
-            z = found - found.mean(-1, keepdims=True)
-            size = np.sqrt((z * z).sum(-1, keepdims=True))
-            found = z * 40 * np.log1p(size / 5) / np.maximum(size, 1e-9)
-            return np.rint(found)
-        return np.floor(found + 0.5)
+        features = plain(values[None], np.arange(image.size), expert.offsets, expert.contrast)
+        return np.floor(features.T + 0.5).reshape(*image.shape, -1)
 
     inside = (slice(expert.reach, -expert.reach),) * 2
     mine, theirs = neighbourhoods(picture), neighbourhoods(known)[inside].reshape(-1, len(expert.offsets))
@@ -327,16 +268,6 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoo
     clear = abs(gap) > 0.05  # logarithms are rounded to 1/256, and divided by the temperature
     assert clear.mean() > 0.8
     assert (labels == np.where(gap > 0, 2, 1))[clear].all()
-
-
-def test_two_textures_are_told_apart_up_to_their_border():
-    picture, truth = halves()
-    labels, output = run_classifier(picture, unknown=0.0)
-    assert (labels == truth).mean() > 0.97
-    assert output.probability.shape == output.fit.shape == (*picture.shape, 2)
-    assert abs(output.probability.sum(-1) - 1).max() < 1e-6
-    assert (output.probability.argmax(-1) + 1 == labels).mean() > 0.99
-    assert output.fit.min() >= 0 and output.fit.max() <= 1
 
 
 def test_a_texture_that_was_not_shown_is_unknown():
