@@ -129,7 +129,7 @@ class Connectivity(NamedTuple):
 
 
 def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
-    """Return the connectivity functions of a category, its components, and the share of the largest.
+    """Return the `Connectivity` of a category: its functions, components, and the share of the largest.
 
     Parameters
     ----------
@@ -138,10 +138,6 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
         The value of the pixels that are meant.
     max_lag : int
         The largest distance, pixels, less than a side of the image.
-
-    Returns
-    -------
-    Connectivity
 
     Notes
     -----
@@ -335,7 +331,7 @@ class Anodi(NamedTuple):
 
 
 def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int] | None = None) -> Anodi:
-    """Return the variety of an ensemble and its likeness to the training image.
+    """Return the variety of an ensemble and its likeness to the training image, an `Anodi`.
 
     The distance of two images is the mean over three levels :math:`g = 0, 1, 2` with weights :math:`2^{-g}` of the
     Jensen-Shannon distance (to base 2) between their histograms of patterns. A pattern of level g is a square of pixels
@@ -350,10 +346,6 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
     categories : sequence of int, optional
         As in `categories_of`; those of the training image by default. Continuous values are cut into three classes, by
         quantiles of the training image. A value that is frequent enough to be such a quantile is a class of its own.
-
-    Returns
-    -------
-    Anodi
 
     Notes
     -----
@@ -490,7 +482,7 @@ def summary(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
 ) -> Summary:
-    """Return all figures of an ensemble; about 8 s for 50 realisations of 250 x 250 pixels in two categories.
+    """Return all figures of an ensemble, a `Summary`; about 8 s for 50 realisations of 250 x 250 pixels.
 
     Parameters
     ----------
@@ -501,10 +493,6 @@ def summary(
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
         As in `categories_of`: the training image's own by default, none for continuous values.
-
-    Returns
-    -------
-    Summary
     """
     array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     known = categories_of(image, categories)

@@ -86,9 +86,9 @@ def simulate(
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.
     like : array or dataset of xarray, optional
-        An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and
-        number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to
-        lie at one place; else `origin` and `cell`; else those of such a training image.
+        An array with coordinates y and x: the output has its origin, cells and coordinate reference system. None: those
+        of `known` and the maps that are arrays of xarray, which have to lie at one place; else `origin` and `cell`;
+        else those of such a training image.
     several : {"refuse", "mean", "most"}
         Of different data of a table in one cell take none, but raise; their mean, if they are no categories; or the
         most frequent. See `simdtex.place_hard_data`.
