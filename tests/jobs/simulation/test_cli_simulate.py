@@ -39,7 +39,7 @@ def folder(tmp_path, monkeypatch):
     }
     for name, one in pictures.items():
         image.write(name, one)
-    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n", "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n"}
+    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n"}
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
     for suffix in (".gslib", ".sgems"):
@@ -157,7 +157,6 @@ GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
-    "a text for a number": ([*GREY, "--categories", "sand=x"], "--categories sand=x must be NAME=NUMBER,..."),
     "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),

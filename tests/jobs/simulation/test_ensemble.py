@@ -70,12 +70,6 @@ def lines(*ends, width=8, shape=(100, 120)):
     return image
 
 
-def box(top, bottom, left, right, shape=(100, 120)):
-    image = np.zeros(shape, np.uint8)
-    image[top:bottom, left:right] = 1
-    return image
-
-
 MIDDLE = (50, 60)
 LEFT, UP, DOWN = (50, -20), (-30, 140), (130, 140)
 DRAWN = {
@@ -90,7 +84,7 @@ DRAWN = {
     "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
     "stub": (lines((LEFT, (50, 140)), (MIDDLE, (30, 60))), 1),
     "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
-    "dash": (lines((LEFT, (50, 140))) | box(20, 21, 50, 58), 0),
+    "dash": (lines((LEFT, (50, 140))) | lines(((20, 50), (20, 57)), width=1), 0),
     "near the border": (lines((LEFT, (50, 118))), 0),
     "nothing": (lines(), 0),
     "everything": (lines() + 1, 0),

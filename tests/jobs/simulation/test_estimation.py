@@ -100,21 +100,16 @@ def test_a_device_has_the_references_bits(cl_device):
             assert_same_bits(both[1][name].values, both[0][name].values)
 
 
-def test_tables_ground_masks_and_several_training_images(tmp_path):
-    path = tmp_path / "wells.csv"
-    path.write_text("x,y,value\n1035,2025,4\n1045,2035,8\n")
-    options = {"shape": SHAPE, "categorical": True, "device": "reference"}
-    found = simdtex.estimate(TRAINING, known=path, origin=(1005, 2005), cell=(10, 10), **options)
-    assert found.probability.sel(category=4, x=1035, y=2025) == 1
-    rows = np.full(SHAPE, np.nan)
-    rows[2, 3], rows[3, 4] = 4, 8
-    assert_same_bits(found.probability.values, simdtex.estimate(TRAINING, known=rows, **options).probability.values)
+def test_masks_of_several_training_images_and_attributes():
+    options, known = {"shape": SHAPE, "categorical": True, "device": "reference"}, np.full(SHAPE, np.nan)
+    known[2, 3], known[3, 4] = 4, 8
     pictures, usable = [TRAINING, TRAINING[:12]], [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
-    two, masked = (simdtex.estimate(pictures, known=rows, mask=mask, **options) for mask in (None, usable))
+    two, masked = (simdtex.estimate(pictures, known=known, mask=mask, **options) for mask in (None, usable))
     assert not np.array_equal(two.probability, masked.probability)
-    assert set(found.attrs) == {
-        *("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data", "cell_x", "cell_y")
-    }
+    names = ("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data")
+    assert {*two.attrs} == {*names}
+    placed = simdtex.estimate(pictures, known=known, origin=(5, 6), cell=(10, 20), **options)
+    assert {*placed.attrs} == {*names, "cell_x", "cell_y"} and placed.x[1] == 15
 
 
 BAD = {
