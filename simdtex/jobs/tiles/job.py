@@ -137,7 +137,7 @@ class TileStore:
         """
         store = self._opened()
         from simdtex.jobs.tiles.cluster import across, check_workers, connected, here
-        from simdtex.jobs.tiles.turns import Tiles
+        from simdtex.jobs.tiles.turns import Turns
 
         check_workers(self.workers, device)
         with exclusive(self.path):
@@ -148,7 +148,7 @@ class TileStore:
                 with connected(self.workers) as client, _mending(store):
                     each = here(store, device) if client is None else across(client, store, device, self.note)
                     about = store.about
-                    image, output = drive(Tiles(store, each), Reference(), about["seed"], callback)
+                    image, output = drive(Turns(store, each), Reference(), about["seed"], callback)
                     for name in ("device", "device_seconds"):  # of the leading process
                         del output.statistics[name]
                     output.statistics["light"] = about["light"]

@@ -19,7 +19,7 @@ from simdtex.jobs.tiles import store as store_module
 from simdtex.jobs.tiles.layout import Outputs, planned
 from simdtex.jobs.tiles.store import Store
 from simdtex.jobs.tiles.tasks import do
-from simdtex.jobs.tiles.turns import Tiles
+from simdtex.jobs.tiles.turns import Turns
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.plan import plan as planned_run
@@ -71,7 +71,7 @@ def test_the_tiles_of_a_turn_are_done_in_any_order(tmp_path, whole):
         for number in order.permutation(tasks).tolist():
             yield do(store.where, store.about["name"], REFERENCE, turn, number)
 
-    drive(Tiles(store, execute), REFERENCE, 0)
+    drive(Turns(store, execute), REFERENCE, 0)
     store.clean()
     assert_same_bits(store.root["image"][...], whole)
 
