@@ -32,9 +32,10 @@ from simdtex.model.scale import Scale
 TOP = 4080
 
 
-def run(machine, levels, sites, offsets, contrast):
-    arrays = [np.asarray(levels, np.uint16), np.asarray(sites, np.int32), np.asarray(offsets, np.int32)]
-    return machine.get(features(machine, *map(machine.put, arrays), contrast))
+def made(machine, operation, *values):
+    """The result of an operation, whose arrays are put on the machine."""
+    values = (machine.put(one) if isinstance(one, np.ndarray) else one for one in values)
+    return machine.get(operation(machine, *values))
 
 
 def plain(levels, sites, offsets, contrast):
@@ -55,14 +56,13 @@ def plain(levels, sites, offsets, contrast):
 def test_the_reference_is_the_formula(contrast):
     rng = np.random.default_rng(1)
     for bands, rows, cols, spread in ((1, 1, 1, 8), (3, 7, 5, TOP), (2, 2, 7, 300), (1, 6, 1, 1), (2, 5, 6, 8)):
-        levels = rng.integers(0, TOP - spread, endpoint=True) + rng.integers(
-            0, spread, (bands, rows, cols), endpoint=True
-        )
-        sites = rng.integers(0, rows * cols, 40)
-        offsets = np.concatenate([[[0, 0]], rng.integers(-4, 4, (9, 2), endpoint=True)])
-        found, exact = run(REFERENCE, levels, sites, offsets, contrast), plain(levels, sites, offsets, contrast)
+        levels = rng.integers(0, spread, (bands, rows, cols), np.uint16, True)
+        levels += rng.integers(0, TOP - spread, (), np.uint16, True)
+        sites = rng.integers(0, rows * cols, 40, np.int32)
+        offsets = np.concatenate([np.zeros((1, 2), np.int32), rng.integers(-4, 4, (9, 2), np.int32, True)])
+        found = made(REFERENCE, features, levels, sites, offsets, contrast)
         assert found.dtype == np.float32 and (found == np.rint(found)).all()
-        assert abs(found - exact).max() <= tolerances.HALF + tolerances.GAIN
+        assert abs(found - plain(levels, sites, offsets, contrast)).max() <= tolerances.HALF + tolerances.GAIN
 
 
 # -- The least squared distance of a neighbourhood to the exemplars of each class.
@@ -70,7 +70,7 @@ def test_the_reference_is_the_formula(contrast):
 
 def run_exemplars(machine, features, classes):
     known = stacked([np.asarray(one, np.float32) for one in classes]).on(machine)
-    return machine.get(exemplars(machine, machine.put(np.asarray(features, np.float32)), known))
+    return made(machine, exemplars, features.astype(np.float32), known)
 
 
 def test_the_reference_is_the_least_of_all_distances():
@@ -113,19 +113,13 @@ def test_classes_are_filled_up_by_their_own_last_exemplar():
 # -- Sums over a Gaussian window around each site, of the sites with one label alone.
 
 
-def run_window(machine, labels, owner, taps, values=None):
-    arrays = [np.asarray(labels, np.uint8), np.asarray(owner, np.int32), np.asarray(taps, np.uint32)]
-    more = [] if values is None else [machine.put(np.asarray(values, np.uint16))]
-    return machine.get(window(machine, *map(machine.put, arrays), *more))
-
-
 def test_the_reference_is_a_correlation():
     rng = np.random.default_rng(3)
     for rows, cols, reach, valued in ((9, 20, 5, True), (1, 7, 2, False), (4, 1, 1, True)):
-        ends = np.sort(rng.integers(0, TAPS, 2 * reach, endpoint=True))
-        labels, owner, taps = rng.integers(0, 3, (rows, cols)), [0, 2, 1], np.diff([0, *ends, TAPS])
-        values = rng.integers(0, 2**13, (3, rows, cols)) if valued else None
-        found = run_window(REFERENCE, labels, owner, taps, values)
+        taps = np.diff([0, *np.sort(rng.integers(0, TAPS, 2 * reach, endpoint=True)), TAPS]).astype(np.uint32)
+        labels, owner = rng.integers(0, 3, (rows, cols), np.uint8), np.array([0, 2, 1], np.int32)
+        values = rng.integers(0, 2**13, (3, rows, cols), np.uint16) if valued else None
+        found = made(REFERENCE, window, labels, owner, taps, values)
         assert found.dtype == np.uint32
         for p, label in enumerate(owner):
             here = (labels == label) * (1 if values is None else values[p])
@@ -135,14 +129,15 @@ def test_the_reference_is_a_correlation():
 
 
 def test_the_largest_sums_fit_32_bits(machine):
-    labels, taps = np.zeros((40, 40)), gaussian(6.0)
-    values = np.full((1, 40, 40), 2**13 - 1)
+    labels, owner, taps = np.zeros((40, 40), np.uint8), np.zeros(1, np.int32), gaussian(6.0)
+    values = np.full((1, 40, 40), 2**13 - 1, np.uint16)
     for m in (REFERENCE, machine):
-        assert (run_window(m, labels, [0], taps, values) == (2**13 - 1) * TAPS**2).all()
-        assert (run_window(m, labels, [0], taps) == TAPS**2).all()
+        assert (made(m, window, labels, owner, taps, values) == (2**13 - 1) * TAPS**2).all()
+        assert (made(m, window, labels, owner, taps) == TAPS**2).all()
     draw = np.random.default_rng(1)  # columns of a vector, and those that are left
-    case = draw.integers(0, 2, (9, 40)), [0, 1], taps, draw.integers(0, 2**13, (2, 9, 40))
-    assert np.array_equal(run_window(machine, *case), run_window(REFERENCE, *case))
+    case = draw.integers(0, 2, (9, 40), np.uint8), np.arange(2, dtype=np.int32), taps
+    values = draw.integers(0, 2**13, (2, 9, 40), np.uint16)
+    assert np.array_equal(*(made(m, window, *case, values) for m in (machine, REFERENCE)))
 
 
 @pytest.mark.parametrize("sd", [0.5, 1.8, 33.3])
@@ -159,25 +154,19 @@ def test_taps_are_a_gaussian_in_whole_numbers(sd):
 # -- Iterated conditional modes of a Potts field.
 
 
-def run_potts(machine, sites, evidence, votes, weight, labels):
-    put = machine.put
-    arrays = put(np.asarray(sites, np.int32)), put(np.asarray(evidence, np.int32)), put(np.asarray(votes, np.uint32))
-    return machine.get(potts(machine, *arrays, weight, put(np.asarray(labels, np.uint8))))
-
-
 @pytest.mark.parametrize("scale", [2, 2**18, 2**24])  # of the smallest, many are equal
 def test_sites_take_the_first_of_the_greatest_energies(machine, scale):
     rng = np.random.default_rng(scale)
     for classes, weight in ((1, 0), (3, 1), (5, 112), (4, 1600)):
-        evidence = rng.integers(-scale, scale, (classes, 6, 5))
-        votes = rng.integers(0, min(scale, 2**18), (classes, 6, 5), endpoint=True)
-        sites, labels = rng.permutation(30)[:20], rng.integers(0, classes, (6, 5))
-        found = run_potts(REFERENCE, sites, evidence, votes, weight, labels)
+        evidence = rng.integers(-scale, scale, (classes, 6, 5), np.int32)
+        votes = rng.integers(0, min(scale, 2**18), (classes, 6, 5), np.uint32, True)
+        sites, labels = rng.permutation(30)[:20].astype(np.int32), rng.integers(0, classes, (6, 5), np.uint8)
+        found = made(REFERENCE, potts, sites, evidence, votes, weight, labels.copy())
         for site in range(30):
             at = np.unravel_index(site, (6, 5))
             energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
             assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
-        assert_same_bits(run_potts(machine, sites, evidence, votes, weight, labels), found)
+        assert_same_bits(made(machine, potts, sites, evidence, votes, weight, labels), found)
 
 
 # -- The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown.
