@@ -343,35 +343,32 @@ def test_a_table_of_probabilities(tmp_path):
 
 
 NOTHING = np.full(SHAPE, np.nan)
-THIRDS = np.full((3, *SHAPE), 1 / 3)
+THIRDS, LEFT = np.full((3, *SHAPE), 1 / 3), np.arange(14) < np.full((12, 1), 3)
 NAMED = {"training": CATEGORIES, "categorical": True}
 BAD = {
-    "no categories": ({"probabilities": THIRDS}, ValueError, "are of categories; give categorical=True"),
-    "too few": (NAMED | {"probabilities": THIRDS[:2]}, ValueError, "2x12x14 .* the 3 categories 0, 3, 7; give"),
-    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, ValueError, "is 3x5x14 and has to be 3x12x14"),
-    "no sum": (NAMED | {"probabilities": THIRDS * 2}, ValueError, "row 0, column 0 are 0.6.*add up to 1"),
-    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, ValueError, "of 0 or more that add up"),
-    "scale": ({"scale": np.full(SHAPE, 3.0)}, ValueError, "scale has 3 to 3; give factors of 0.5 to 2"),
-    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, ValueError, "rotation has infinite values"),
-    "no such image": ({"image_map": np.ones(SHAPE)}, ValueError, "image_map has 1 and there is 1 training image;"),
-    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, ValueError, "weights below 0, or 0 alone"),
-    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, ValueError, "leave shares out"),
-    "no region": ({"region": np.zeros(SHAPE, bool)}, ValueError, "region is False everywhere"),
-    "data outside": (
-        {"region": np.arange(14) < np.full((12, 1), 3), "known": np.where(NOTHING < 0, 0, 20 + 0 * np.indices(SHAPE)[0])
-         * np.where(np.indices(SHAPE)[1] == 5, 1, np.nan)}, ValueError, "row 0, column 5, outside region; leave"),
-    "no missing value": (
-        {"training": TRAINING > 90, "region": np.arange(14) < np.full((12, 1), 3)}, ValueError, "as int16"),
-    "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
-    "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
-    "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),
-}  # fmt: skip
+    "no categories": ({"probabilities": THIRDS}, "are of categories; give categorical=True"),
+    "too few": (NAMED | {"probabilities": THIRDS[:2]}, "2x12x14 .* the 3 categories 0, 3, 7; give"),
+    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, "is 3x5x14 and has to be 3x12x14"),
+    "no sum": (NAMED | {"probabilities": THIRDS * 2}, "row 0, column 0 are 0.6.*add up to 1"),
+    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, "of 0 or more that add up"),
+    "scale": ({"scale": np.full(SHAPE, 3.0)}, "scale has 3 to 3; give factors of 0.5 to 2"),
+    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, "rotation has infinite values"),
+    "no such image": ({"image_map": np.ones(SHAPE)}, "image_map has 1 and there is 1 training image;"),
+    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, "weights below 0, or 0 alone"),
+    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, "leave shares out"),
+    "no region": ({"region": np.zeros(SHAPE, bool)}, "region is False everywhere"),
+    "data outside": ({"region": LEFT, "known": with_value(NOTHING, 20, (0, 5))}, "row 0, column 5, outside region;"),
+    "no missing value": ({"training": TRAINING > 90, "region": LEFT}, "as int16"),
+    "none": ({"n": 0}, "n is 0; give 1 or more"),
+    "first": ({"first": -1}, "first is -1; give 0 or more"),
+    "jobs": ({"jobs": 0}, "jobs is 0; give 1 or more"),
+}
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_refused_with_a_remedy(case):
-    change, error, words = BAD[case]
-    with pytest.raises(error, match=words):
+    change, words = BAD[case]
+    with pytest.raises(ValueError, match=words):
         simulate(**change)
 
 
