@@ -194,33 +194,6 @@ def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(script):
         make_channels((20, 99), 1)
 
 
-IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: ensemble.summary(IMAGE, IMAGE), r"the ensemble has the shape \(20, 20\)"),
-        (lambda: ensemble.summary(FEW, IMAGE, categories=[1]), "holds 0, which is no category"),
-        (lambda: ensemble.categories_of(IMAGE, [[0]]), "there are no categories"),
-        (lambda: ensemble.categories_of(IMAGE, [0, 0]), "named twice"),
-        (lambda: ensemble.connectivity(IMAGE, 1, 20), "max_lag is 20: give 1 to 19"),
-        (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
-        (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
-        (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
-        (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
-        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
-        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
-        (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
-        (lambda: ensemble.summary(FEW, IMAGE - 1e200), "values beyond 1e.100: give them in a larger unit"),
-        (lambda: ensemble.summary(np.ones((1, 2, 2), complex), IMAGE), "holds complex128"),
-    ],
-)
-def test_bad_input_is_refused_in_a_sentence(call, words):
-    with pytest.raises((TypeError, ValueError), match=words):
-        call()
-
-
 @pytest.mark.parametrize("side", [2, 5])
 def test_copies_against_plain_loops(side):
     training, made = noise(5, (1, 14, 17), 3)[0], noise(6, (2, 12, 15), 4)  # 3 is nowhere in the training image
@@ -322,9 +295,26 @@ def test_plots_of_xarray_have_names_units_and_north_up():
     plt.close("all")
 
 
+IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
+        (lambda: ensemble.summary(IMAGE, IMAGE), r"the ensemble has the shape \(20, 20\)"),
+        (lambda: ensemble.summary(FEW, IMAGE, categories=[1]), "holds 0, which is no category"),
+        (lambda: ensemble.categories_of(IMAGE, [[0]]), "there are no categories"),
+        (lambda: ensemble.categories_of(IMAGE, [0, 0]), "named twice"),
+        (lambda: ensemble.connectivity(IMAGE, 1, 20), "max_lag is 20: give 1 to 19"),
+        (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
+        (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
+        (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
+        (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
+        (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
+        (lambda: ensemble.summary(FEW, IMAGE - 1e200), "values beyond 1e.100: give them in a larger unit"),
+        (lambda: ensemble.summary(np.ones((1, 2, 2), complex), IMAGE), "holds complex128"),
         (lambda: ensemble.probability(np.zeros((2, 3, 3)), 1), "with the dimension realisation"),
         (lambda: ensemble.e_type(reservoir().assign_attrs(options='{"categorical": true}')), "are of categories"),
         (lambda: ensemble.connected_volume(reservoir(), 3, (90, 5)), "outside"),
@@ -334,6 +324,6 @@ def test_plots_of_xarray_have_names_units_and_north_up():
         (lambda: ensemble.connected_volume(reservoir()[..., ::-1], 3, (100, 5)), "evenly spaced in ascending order"),
     ],
 )
-def test_what_has_no_uncertainty_is_refused(call, words):
+def test_bad_input_is_refused_in_a_sentence(call, words):
     with pytest.raises((TypeError, ValueError), match=words):
         call()

@@ -95,12 +95,6 @@ def test_a_scheduler_that_ends_is_said(tmp_path, whole):
     assert_same_bits(ours.compute(), whole)
 
 
-def test_an_open_machine_is_refused_for_workers(tmp_path):
-    with pytest.raises(TypeError, match="each worker opens its own device"):
-        store, device = TileStore(tmp_path / "a.zarr", workers=1), simdtex.open_machine("reference")
-        simdtex.synthesize(SAMPLE, (20, 20), store=store, device=device, channel_axis=-1)
-
-
 def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
     """A client that failed to connect would else be the default one, on which the next `compute` waits for ever."""
     with pytest.raises(ValueError, match="no scheduler answers at nonsense://a") as caught:
@@ -109,6 +103,9 @@ def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
     assert caught.value.__cause__ is not None  # which holds the client
     with pytest.raises(ValueError, match="No clients found"):
         dask_distributed.default_client()
+    with pytest.raises(TypeError, match="each worker opens its own device"):
+        store, device = TileStore(tmp_path / "a.zarr", workers=1), simdtex.open_machine("reference")
+        simdtex.synthesize(SAMPLE, (20, 20), store=store, device=device, channel_axis=-1)
 
 
 PEAK = """
