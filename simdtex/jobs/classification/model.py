@@ -161,7 +161,7 @@ def learn(
     machine: Machine, classes: Sequence[Sequence[Region]], names: Sequence[str], options: Options, seed: int
 ) -> Model:
     """Return the model of classes, each given by regions of pictures; raise if one has too few neighbourhoods."""
-    regions = [region for one in classes for region in one]
+    regions = [region for several in classes for region in several]
     bands = regions[0].pixels.shape[-1]
     if (values := bands * len(experts_of(options, 1)[0].offsets)) > VALUES:
         few = f"give a smaller order, so that there are {VALUES} at most"
@@ -170,10 +170,10 @@ def learn(
     levels = _levels_of(options, classes, names)
     experts = experts_of(options, levels)
     taught = [_Class(machine, scale, experts, options, seed, c, one) for c, one in enumerate(classes)]
-    drawn = [[one.draw(expert) for expert in experts] for one in taught]
-    selves = [one.judge() for one in taught]
-    own = np.array([one.mean for one in selves])
-    counts = [min(map(len, one)) for one in drawn]
+    drawn = [[known.draw(expert) for expert in experts] for known in taught]
+    selves = [known.judge() for known in taught]
+    own = np.array([distances.mean for distances in selves])
+    counts = [min(map(len, exemplars_of)) for exemplars_of in drawn]
     offsets = []
     for c, count in enumerate(counts):
         typical = sum(expert.factor * options.typical * own[c, e] * LOGS for e, expert in enumerate(experts))
@@ -181,14 +181,14 @@ def learn(
         shift = sum(expert.factor * fewer / (len(expert.offsets) * bands) for expert in experts)
         offsets.append(round(typical - shift))
     nulls, freedom = _nulls(selves)
-    pooled = [stacked([one[e] for one in drawn]) for e in range(len(experts))]
+    pooled = [stacked([exemplars_of[e] for exemplars_of in drawn]) for e in range(len(experts))]
     discriminant = Discriminant.of([one.patterns for one in selves], [one.parts[:, len(experts) :] for one in selves])
     return Model(scale, experts, pooled, np.array(offsets, np.int64), discriminant, nulls, freedom, own, counts)
 
 
 def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
     """Return the number of levels at which all classes have enough sites; raise if it is 0."""
-    regions = [region for one in classes for region in one]
+    regions = [region for several in classes for region in several]
     side = min(min(region.sites.shape) for region in regions)
     most = max(1, sum(side >= LEAST_SAMPLE_SIDE << level for level in range(options.levels)))
     for levels in range(most, 0, -1):
@@ -258,13 +258,13 @@ class _Class:
         if len(sites) > most:
             words = random.draw4(self._seed, expert.level, self._number, sites, random.SEARCH)[0]
             sites = np.sort(sites[np.argsort(words, kind="stable")[:most]])
-        found, first = [], 0
+        drawn, first = [], 0
         for place, mask in enumerate(masks):
-            own = sites[(sites >= first) & (sites < first + mask.size)] - first
+            here = sites[(sites >= first) & (sites < first + mask.size)] - first
             first += mask.size
-            if own.size:
-                found.append(self._features(place, expert, own).T)
-        return np.concatenate(found)
+            if here.size:
+                drawn.append(self._features(place, expert, here).T)
+        return np.concatenate(drawn)
 
     def _features(self, place: int, expert: Expert, sites: NDArray[np.intp]) -> NDArray[np.float32]:
         """Return the neighbourhoods of sites of a region, (K, S)."""
@@ -304,7 +304,7 @@ def _quarters(sites: Mask) -> list[Mask]:
     """Return sites in four nearly equal parts, divided by a row and by columns: above and below, left and right."""
     row, col = np.nonzero(sites)
     middle = np.median(row)
-    found = []
+    parts = []
     for half in (row <= middle, row > middle):
         if not half.any():
             continue
@@ -313,17 +313,17 @@ def _quarters(sites: Mask) -> list[Mask]:
             if side.any():
                 part = np.zeros_like(sites)
                 part[row[side], col[side]] = True
-                found.append(part)
-    return found
+                parts.append(part)
+    return parts
 
 
 def _boxed(sites: Mask) -> Mask:
     """Return the sites within a box of `BOX` x `BOX` pixels around their middle."""
     row, col = np.nonzero(sites)
     top, left = (max(0, int(np.median(axis)) - BOX // 2) for axis in (row, col))
-    found = np.zeros_like(sites)
-    found[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
-    return found
+    boxed = np.zeros_like(sites)
+    boxed[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
+    return boxed
 
 
 def windowed(

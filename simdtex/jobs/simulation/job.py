@@ -268,8 +268,8 @@ class Simulation:
         together = min(self.jobs or usual, self.n)
         # each has a queue, but a profile is of a single machine
         info: Any = machine if machine.seconds is not None else getattr(machine, "info", "reference")
-        for one in (machine, *(open_machine(info) for _ in range(together - 1))):
-            batch.free.put(one)
+        for free in (machine, *(open_machine(info) for _ in range(together - 1))):
+            batch.free.put(free)
         try:
             with ThreadPoolExecutor(together) as workers:
                 list(workers.map(batch.make, left))  # the first error cancels those that wait
@@ -292,7 +292,7 @@ class Simulation:
         if not made.size:
             return {}
         asked = np.array(self.options.proportions or p[:, there].sum(1))
-        reached = np.array([(made == one).sum() for one in categories])
+        reached = np.array([(made == category).sum() for category in categories])
         both = {"shares_asked": asked, "shares_reached": reached}
         return {name: " ".join(f"{one:.3f}" for one in those / those.sum()) for name, those in both.items()}
 
@@ -477,7 +477,7 @@ def plan_estimation(
     real("bandwidth", bandwidth, 0, above=True)
     options = mrf.Options(categorical=categorical)
     training = options.of(cells.training)
-    least = min(min(one.shape[-3:-1]) for one in training.pixels)
+    least = min(min(picture.shape[-3:-1]) for picture in training.pixels)
     reach = least // 8 if reach is None else reach
     whole("reach", reach, 0, least - 1)
     if cells.given["known"] is None:
@@ -541,7 +541,7 @@ class Estimation:
             variables: dict[str, Any] = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
             along["category"] = output.statistics["names"]
         else:
-            units = [{"units": one} if self.units else {} for one in (self.units, f"({self.units})\u00b2")]
+            units = [{"units": unit} if self.units else {} for unit in (self.units, f"({self.units})\u00b2")]
             variables = {"mean": (dims, maps[0], units[0]), "variance": (dims, maps[1], units[1])}
         attributes = {"version": version("simdtex"), "device": output.statistics["device"], **self.attributes, **sides}
         return georeferenced(Results(variables, along, attributes), self.place)

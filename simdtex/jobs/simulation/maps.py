@@ -141,9 +141,9 @@ def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
     if dtype.kind == "f":
         return dtype.type(np.nan)
     if dtype.kind in "iu":
-        for number in (np.iinfo(dtype).max, np.iinfo(dtype).min):
-            if not any((one == number).any() for one in pixels):
-                return dtype.type(number)
+        for value in (np.iinfo(dtype).max, np.iinfo(dtype).min):
+            if not any((picture == value).any() for picture in pixels):
+                return dtype.type(value)
     raise ValueError(f"{dtype} has no number that says that a cell is outside region; give the training image as int16")
 
 
@@ -152,12 +152,12 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
     array = as_array(name, values)
     check_real(name, array)
     if array.shape != shape:
-        sides = ["x".join(map(str, one)) for one in (array.shape, shape)]
+        sides = ["x".join(map(str, size)) for size in (array.shape, shape)]
         raise ValueError(f"{name} is {sides[0]} and has to be {sides[1]}, as the output; give one size")
-    found = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
-    if np.isinf(found).any():
+    field = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
+    if np.isinf(field).any():
         raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
-    return found
+    return field
 
 
 class Cells(NamedTuple):
@@ -231,7 +231,7 @@ def _size(shape: Any, given: dict[str, Any], place: Place | None, axes: int, cha
     if isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
         return known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
     shapes = (getattr(given.get(name), "shape", ())[-axes:] for name in MAP_NAMES)
-    return next((one for one in shapes if len(one) == axes), None)
+    return next((size for size in shapes if len(size) == axes), None)
 
 
 def grid_axes(size: tuple[int, ...], place: Place | None) -> tuple[dict[str, Any], dict[str, float]]:
@@ -258,8 +258,8 @@ def georeferenced(made: Any, place: Place | None) -> Any:
             if axis in found.coords:
                 named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
                 found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
-    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
+    for field in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+        field.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
     return found
 
 

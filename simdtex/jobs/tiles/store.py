@@ -323,7 +323,7 @@ class Store:
     def samples(self) -> list[NDArray[Any]]:
         """Return the pictures of the sample, with a channel axis if the image has one."""
         pixels = self.work.plan.sample.pictures.pixels
-        return [one if self.work.outputs.channels else one[..., 0] for one in pixels]
+        return [picture if self.work.outputs.channels else picture[..., 0] for picture in pixels]
 
     def finish(self) -> None:
         """Note that the output is complete, with its description."""
@@ -438,7 +438,7 @@ class Store:
         """Return the position of the checksums of an output tile, and the checksums in its chunks."""
         sides = self._at("image").chunks
         rows, cols = (
-            slice(one.start // side, -(-one.stop // side)) for one, side in zip(spans(tile), sides, strict=False)
+            slice(span.start // side, -(-span.stop // side)) for span, side in zip(spans(tile), sides, strict=False)
         )
         places = [(row, col) for row in range(rows.start, rows.stop) for col in range(cols.start, cols.stop)]
         found = np.array([[self._checksum(name, *place) for place in places] for name in names], np.uint32)
@@ -469,11 +469,11 @@ class Store:
     def _cut(self, name: str, number: int, window: Tile) -> NDArray[Any]:
         """Return a window of an array (..., rows, cols) over the sites of a level, which may cross the seam."""
         array, level = self._at(name), self.work.layout.levels[number]
-        found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
+        plane = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
         for rows, down in _parts(window.top, window.rows, level.rows):
             for cols, right in _parts(window.left, window.cols, level.cols):
-                found[..., down, right] = array[..., rows, cols]
-        return found
+                plane[..., down, right] = array[..., rows, cols]
+        return plane
 
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
