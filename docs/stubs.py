@@ -36,8 +36,12 @@ SOURCE, OUTPUT = ALSO.format("OutputWithSource"), ALSO.format("Output")
 OF_MRF = ("mask", "known", "known_source", "guide", "store")
 """The parameters of `synthesize` that only the method ``mrf`` has."""
 
+WHOLE = {"method": "Literal['mrf'] = ...", "store": "None = ..."}
+TILED = {**WHOLE, "store": "TileStore", "checkpoint": "None = ...", "full_output": "Literal[False] = ..."}
+
 FUNCTIONS = (
-    ("synthesize", "MrfOptions", {"method": "Literal['mrf'] = ..."}, "full_output", SOURCE, PICTURE),
+    ("synthesize", "MrfOptions", WHOLE, "full_output", SOURCE, PICTURE),
+    ("synthesize", "MrfOptions", TILED, "", "", "dask.array.Array"),
     ("synthesize", "MultiresOptions", {"method": "Literal['multires']"}, "full_output", SOURCE, PICTURE),
     ("synthesize", "PyramidOptions", {"method": "Literal['pyramid']"}, "full_output", OUTPUT, PICTURE),
     ("synthesize_solid", "SolidOptions", {}, "full_output", OUTPUT, PICTURE),
@@ -62,6 +66,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack, overload
 
+import dask.array
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
@@ -122,7 +127,7 @@ def overloads(function, options, types, switch, with_it, without):
     before, after = parameters(function, options, types, switch)
     ways = [([f"{switch}: Literal[True]"], with_it), ([f"{switch}: Literal[False] = ..."], without)]
     for more, found in ways if switch else [([], without)]:
-        if switch:
+        if switch or types is TILED:
             yield "@overload"
         yield f"def {function}({', '.join([*before, '*', *more, *after])}) -> {found}: ..."
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict, Unpack, overload
 
+import dask.array
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
@@ -117,9 +118,11 @@ class ClassificationOptions(TypedDict, total=False):
     window: float
 
 @overload
-def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: TileStore | None = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: None = ..., **options: Unpack[MrfOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload
-def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: TileStore | None = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[False] = ..., method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., store: None = ..., **options: Unpack[MrfOptions]) -> NDArray[Any]: ...
+@overload
+def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, method: Literal["mrf"] = ..., mask: ArrayLike | Sequence[ArrayLike] | None = ..., known: ArrayLike | HardData | str | os.PathLike[str] | None = ..., known_source: ArrayLike | None = ..., guide: tuple[Any, Any] | None = ..., light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: None = ..., store: TileStore, full_output: Literal[False] = ..., **options: Unpack[MrfOptions]) -> dask.array.Array: ...
 @overload
 def synthesize(sample: ArrayLike | Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], method: Literal["multires"], light: Literal["keep", "even"] = ..., channel_axis: int | None = ..., rng: Seed = ..., device: Device = ..., callback: Callback | None = ..., checkpoint: Kept = ..., **options: Unpack[MultiresOptions]) -> tuple[NDArray[Any], OutputWithSource]: ...
 @overload

@@ -57,11 +57,7 @@ STEPS = 64
 
 @dataclass(frozen=True)
 class Classification(SingleRun):
-    """The job of `classify`: a classification before it has a machine and a seed.
-
-    ``image`` (rows, cols, B) has no value at the pixels ``unknown`` (rows, cols), which get the label 0. ``classes``
-    are the regions of each class, or a model that is trained on them, and ``names`` those of the labels, 1 to 254.
-    """
+    """The job of `classify`; ``classes`` are regions of each class or a trained model, ``names`` those of labels."""
 
     image: NDArray[Any]
     unknown: Mask
@@ -70,8 +66,8 @@ class Classification(SingleRun):
     options: Options
     channel_axis = None  # of labels
 
-    def on(self, machine: Machine, seed: int) -> Run:
-        """Return the run on a machine, with trained classes; raise if the memory does not suffice."""
+    def on(self, machine: Machine, seed: int) -> ClassificationRun:
+        """Return the run on a machine, with trained classes."""
         shape, count, bands = self.image.shape[:2], len(self.names), self.image.shape[-1]
         within_32_bits(shape, count)
         sites, experts = prod(shape), 2 * self.options.levels
@@ -86,30 +82,21 @@ class Classification(SingleRun):
         model = self.classes
         if not isinstance(model, Model):
             model = learn(machine, model, list(self.names.values()), self.options, seed)
-        return Run(machine, self, model, seed)
+        return ClassificationRun(machine, self, model, seed)
 
 
-class State(NamedTuple):
-    """The state between two steps.
-
-    ``done``, the number of compared rows; ``logs`` (E + 1, classes, rows, cols) uint16, logarithms of distances, and
-    minus those of probabilities by binary patterns; ``labels`` (rows, cols) uint8, 0 the first class; ``schedule``, its
-    state; ``changed``, the number of labels that each sweep changed. The next step writes into the arrays.
-    """
+class ClassificationState(NamedTuple):
+    """The state between two steps: ``done`` rows are compared; the next step writes into the arrays."""
 
     done: int
-    logs: NDArray[np.uint16]
-    labels: NDArray[np.uint8]
+    logs: NDArray[np.uint16]  # (E + 1, classes, rows, cols), of distances and, last, of probabilities by patterns
+    labels: NDArray[np.uint8]  # (rows, cols), 0 the first class
     schedule: Any
-    changed: tuple[int, ...] = ()
+    changed: tuple[int, ...] = ()  # labels, of each sweep
 
 
 class _Segment(NamedTuple):
-    """The sites of a label in a strip of the picture, cut to the part that their windows reach.
-
-    ``part``: its rows and columns; ``own``: all of the sites; ``inner``: those whose neighbours have the label, too;
-    ``at``: those whose fit is computed.
-    """
+    """The sites of a label in a strip, cut to the ``part`` that windows reach: all, those inside, and the tested."""
 
     part: tuple[slice, ...]
     own: Mask
@@ -117,7 +104,7 @@ class _Segment(NamedTuple):
     at: Mask
 
 
-class Run:
+class ClassificationRun:
     """A classification on a machine: rows are compared with the classes, then labels are relaxed, sweep by sweep."""
 
     def __init__(self, machine: Machine, plan: Classification, model: Model, seed: int) -> None:
@@ -127,7 +114,12 @@ class Run:
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
         self._everywhere = schedules.Masked(self.grid)
-        self._check_schedule()
+        _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), self._everywhere)
+        if info.sites.size / len(info.ranges) * STEPS < self.grid.size:
+            raise ValueError(
+                f"the schedule {self.schedule.name} takes more than {STEPS} steps to a sweep, and each takes a pass "
+                "over the picture; choose synchronous, checkerboard, coloring or random-subset"
+            )
         self._taps, self._coupling = gaussian(plan.options.window), machine.put(gaussian(plan.options.coupling))
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
@@ -136,31 +128,23 @@ class Run:
         self._exemplars = [known.on(machine) for known in model.exemplars]
         self._classes = machine.put(np.arange(len(plan.names), dtype=np.int32))
 
-    def _check_schedule(self) -> None:
-        _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), self._everywhere)
-        if info.sites.size / len(info.ranges) * STEPS < self.grid.size:
-            raise ValueError(
-                f"the schedule {self.schedule.name} takes more than {STEPS} steps to a sweep, and each takes a pass "
-                "over the picture; choose synchronous, checkerboard, coloring or random-subset"
-            )
-
-    def begin(self) -> State:
+    def begin(self) -> ClassificationState:
         """Return the state before any comparison."""
         shape = self.plan.image.shape[:2]
         logs = np.zeros((len(self.model.experts) + 1, len(self.plan.names), *shape), np.uint16)
-        return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
+        return ClassificationState(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
 
-    def step(self, state: State, watch: Callable[..., None]) -> tuple[State, None]:
+    def step(self, state: ClassificationState, watch: Callable[..., None]) -> tuple[ClassificationState, None]:
         """Compare the next rows with the exemplars of every class or, after the last row, relax labels in a sweep."""
         return (self._compared(state) if state.done < self.grid.rows else self._swept(state)), None
 
-    def shown(self, state: State) -> NDArray[np.uint8]:
+    def shown(self, state: ClassificationState) -> NDArray[np.uint8]:
         """Return the labels so far, (rows, cols, 1), 0 where pixels are not yet compared."""
         labels: NDArray[np.uint8] = self.labels[state.labels + np.uint8(1)]
         labels[state.done :] = 0
         return labels[..., None]
 
-    def _compared(self, state: State) -> State:
+    def _compared(self, state: ClassificationState) -> ClassificationState:
         machine, cols = self.machine, self.grid.cols
         each = sum(known.doubled.size for known in self._exemplars)
         end = min(self.grid.rows, state.done + max(1, WORK // (each * cols)))
@@ -207,7 +191,7 @@ class Run:
         """Return the votes of the labels around each site for every class."""
         return window(self.machine, labels, self._classes, self._coupling)
 
-    def _swept(self, state: State) -> State:
+    def _swept(self, state: ClassificationState) -> ClassificationState:
         machine = self.machine
         evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
         for after, chosen in schedules.decisions(self.schedule, self._setting, state.schedule, self._everywhere):
@@ -218,14 +202,14 @@ class Run:
                     labels = potts(machine, sites, evidence, self._votes(labels), self._weight, labels)
         found = machine.get(labels)
         changed = int(np.count_nonzero(found != state.labels))
-        return State(state.done, state.logs, found, memory, (*state.changed, changed))
+        return ClassificationState(state.done, state.logs, found, memory, (*state.changed, changed))
 
-    def ended(self, state: State) -> bool:
+    def ended(self, state: ClassificationState) -> bool:
         """Return whether all rows are compared, and the last sweep changed no label or no sweep is left."""
         settled = len(state.changed) >= self.options.sweeps or 0 in state.changed[-1:]
         return state.done == self.grid.rows and settled
 
-    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+    def result(self, state: ClassificationState, observer: ClassificationRecord) -> tuple[NDArray[Any], Output]:
         """Return labels (rows, cols, 1) uint8, 0 unknown; fits and probabilities."""
         fit, rejected = self._fits(state)
         found = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
@@ -237,36 +221,26 @@ class Run:
         chance /= chance.sum(0)
         names = {0: "unknown"} | self.plan.names
         shares = np.bincount(found.ravel(), minlength=len(names)) / found.size
+        options = vars(self.options) | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name}
         statistics: dict[str, Any] = {
-            "options": vars(self.options)
-            | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name},
+            "options": options,
             "classes": [
                 {"label": label, "name": name, "share": float(share)}
                 for (label, name), share in zip(names.items(), shares, strict=True)
             ],
             "changed": list(state.changed),
         }
-        for c, one in enumerate(statistics["classes"][1:]):
-            one |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
-        return self.labels[found][..., None], Output(
-            None,
-            statistics=statistics,
-            fit=np.moveaxis(fit, 0, -1),
-            probability=np.moveaxis(chance, 0, -1),
-        )
+        for c, about in enumerate(statistics["classes"][1:]):
+            about |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
+        more = {"fit": np.moveaxis(fit, 0, -1), "probability": np.moveaxis(chance, 0, -1)}
+        return self.labels[found][..., None], Output(None, statistics=statistics, **more)
 
-    def _fits(self, state: State) -> tuple[NDArray[np.float32], Mask]:
-        """Return the fit of each class at each site, (classes, rows, cols), and a mask of sites with a rejected class.
-
-        The fit is the probability that a texture of the class differs as much from its exemplars and in its patterns,
-        on average over the window within the site's segment. Copies of the samples are excluded, since their distance
-        is 0, and fit.
-        """
+    def _fits(self, state: ClassificationState) -> tuple[NDArray[np.float32], Mask]:
+        """Return the fit of each class at each site, (classes, rows, cols), and a mask of sites of a rejected class."""
         from scipy.special import fdtrc, fdtri
 
         _, classes, rows, cols = state.logs.shape
-        fit = np.zeros((classes, rows, cols), np.float32)
-        rejected = np.zeros((rows, cols), bool)
+        fit, rejected = np.zeros((classes, rows, cols), np.float32), np.zeros((rows, cols), bool)
         freedom, size = self.model.freedom, self._size
         limit = fdtri(SPREAD, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
         reach = len(self._taps) // 2
@@ -290,7 +264,7 @@ class Run:
                 for label, segment, means in segments:
                     there = state.labels[here] == label
                     distance = null.distance(measured(self._means(logs, copied, segment), means))
-                    distance[copied[segment.part][segment.at]] = 0
+                    distance[copied[segment.part][segment.at]] = 0  # samples of the picture fit
                     fit[c, here][there] = fdtrc(SPREAD, freedom, distance)
                     if c == label:
                         rejected[here][there] = distance > limit
@@ -305,26 +279,26 @@ class Run:
             means = np.where(found, means, windowed(self.machine, planes, own & ~copied, self._taps, at)[0])
         return means
 
-    def save(self, state: State) -> dict[str, Any]:
+    def save(self, state: ClassificationState) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
         return state._replace(logs=state.logs.copy(), labels=state.labels.copy())._asdict()
 
-    def load(self, saved: dict[str, Any]) -> State:
+    def load(self, saved: dict[str, Any]) -> ClassificationState:
         """Return the state that `save` copied."""
         kept = like(self.schedule.init(self._setting), saved["schedule"])
-        return State(**saved | {"schedule": kept, "changed": tuple(saved["changed"])})
+        return ClassificationState(**saved | {"schedule": kept, "changed": tuple(saved["changed"])})
 
-    def observer(self, callback: Callback | None) -> Record:
+    def observer(self, callback: Callback | None) -> ClassificationRecord:
         """Return the observer of this run."""
-        return Record(self, callback)
+        return ClassificationRecord(self, callback)
 
 
-class Record(Observer):
+class ClassificationRecord(Observer):
     """The observer of a classification: the state holds everything that it reports."""
 
-    _run: Run
+    _run: ClassificationRun
 
-    def step(self, state: State, info: None) -> None:
+    def step(self, state: ClassificationState, info: None) -> None:
         """Report a step."""
         if self._callback:
             compared, sweeps = state.done / self._run.grid.rows, len(state.changed)

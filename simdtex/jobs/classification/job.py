@@ -21,8 +21,6 @@ from simdtex.options import real_array, resolve, table
 from simdtex.random import as_seed
 from simdtex.run import Callback
 
-Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
-
 
 def classify(
     image: ArrayLike,
@@ -57,13 +55,11 @@ def classify(
     rng : int or numpy.random.Generator, optional
         The seed. The same seed gives the same bytes on every device. None draws a random seed.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a device's name, an index of ``simdtex devices``, or ``"reference"``; None: see `simdtex.synthesize`.
     callback : callable, optional
         Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        A file that keeps the state of the run, from which the same call continues after an interruption.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -102,27 +98,19 @@ def classify(
     >>> float((labels == np.repeat([1, 2], 64)).mean()) > 0.95
     True
     """
-    about: dict[str, Any] = {"masks": masks, "validation": validation, "channel_axis": channel_axis}
-    labels, output = run(
-        "classify", plan_classification(image, textures, **about, **options), rng, device, callback, checkpoint
-    )
+    job = plan_classification(image, textures, masks or {}, validation or {}, channel_axis, **options)
+    labels, output = run("classify", job, rng, device, callback, checkpoint)
     return (labels, output) if full_output else labels
 
 
 def plan_classification(
-    image: ArrayLike,
-    textures: Mapping[str, ArrayLike | Sequence[ArrayLike]] | ArrayLike,
-    *,
-    masks: Mapping[str, Any] | None = None,
-    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
-    channel_axis: int | None = None,
-    **options: Any,
+    image: Any, textures: Any, masks: Any, validation: Any, channel_axis: int | None, **options: Any
 ) -> Classification:
     """Check the arguments of `classify`, and return its job."""
     pixels, unknown = check_picture(image, channel_axis)
     chosen = resolve(Options, "classify", options, classify)
     if isinstance(textures, Mapping):
-        classes = _sampled(textures, masks or {}, validation or {}, pixels, channel_axis)
+        classes = _sampled(textures, masks, validation, pixels, channel_axis)
         names = dict(enumerate(textures, 1))
     elif masks or validation:
         raise ValueError("masks and validation belong to samples by name; leave them out with training regions")
@@ -133,11 +121,11 @@ def plan_classification(
 
 
 def _sampled(
-    textures: Textures, masks: Mapping[str, Any], validation: Textures, like: NDArray[Any], channel_axis: int | None
+    textures: Any, masks: Any, validation: Any, like: NDArray[Any], channel_axis: int | None
 ) -> list[list[Region]]:
     """Return the regions of each class."""
-    for what, given in (("masks", masks), ("validation", validation)):
-        if strange := [name for name in given if name not in textures]:
+    for what, named in (("masks", masks), ("validation", validation)):
+        if strange := [name for name in named if name not in textures]:
             raise ValueError(f"{what} name the class {strange[0]!r}, which textures do not; choose of {list(textures)}")
     _check_count(len(textures), like.shape[-1])
     classes = []
@@ -248,12 +236,7 @@ class TextureClassifier:
     _machine: Machine | None = None
 
     def __init__(
-        self,
-        *,
-        channel_axis: int | None = None,
-        rng: Seed = 0,
-        device: Device = None,
-        **options: Any,
+        self, *, channel_axis: int | None = None, rng: Seed = 0, device: Device = None, **options: Any
     ) -> None:
         self.channel_axis, self.rng, self.device = channel_axis, rng, device
         self.set_params(**{**vars(resolve(Options, "classify", {})), **options})
@@ -284,10 +267,7 @@ class TextureClassifier:
         return {name: vars(self)[name] for name in PARAMETERS}
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`.
-
-        Raises ValueError, without any change, if a name is unknown.
-        """
+        """Set arguments of the constructor, and return the classifier; its training is unchanged until `fit`."""
         for name in parameters:
             if name not in PARAMETERS:
                 raise ValueError(f"TextureClassifier has no parameter {name!r}; choose from: {', '.join(PARAMETERS)}")

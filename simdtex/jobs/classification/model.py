@@ -43,6 +43,9 @@ TEMPERATURE = 0.5
 FEWEST_NEIGHBOURHOODS = 16
 """The fewest neighbourhoods of a class at a level."""
 
+TOO_FEW = 8
+"""The fewest neighbourhoods for a comparison with a part."""
+
 BANDS = 14
 """The most bands of a picture."""
 
@@ -72,10 +75,7 @@ FLOOR = 1e-4
 
 
 class Expert(NamedTuple):
-    """A comparison of neighbourhoods: ``offsets`` (N, 2) int32 in pixels of a level, whether contrast is compressed.
-
-    ``reach`` is the farthest offset, in pixels, and ``factor`` the evidence, in `UNITS`, of one unit of its logarithms.
-    """
+    """A comparison of neighbourhoods by ``offsets`` (N, 2); ``factor``: evidence of one unit of its logarithms."""
 
     level: int
     contrast: bool
@@ -85,11 +85,7 @@ class Expert(NamedTuple):
 
 
 def experts_of(options: Options, levels: int) -> list[Expert]:
-    """Return the experts of ``levels`` levels: raw and contrast-compressed neighbourhoods at each, the finest first.
-
-    An expert has the weight of its level, in `FINER`, times the share of its kind; the weights add up to
-    1 / `TEMPERATURE`.
-    """
+    """Return the experts of levels, raw and contrast-compressed ones at each; weights add up to 1 / `TEMPERATURE`."""
     total = sum(FINER[:levels])
     found = []
     for level in range(levels):
@@ -102,16 +98,12 @@ def experts_of(options: Options, levels: int) -> list[Expert]:
 
 
 class Region(NamedTuple):
-    """Sites of a picture in one class.
-
-    ``pixels`` (rows, cols, B); ``sites`` (rows, cols) bool; ``whole``: whether neighbourhoods must lie within the
-    sites, or only their centres; ``judged``: whether the sites only show how the class differs from its exemplars.
-    """
+    """Sites of a class in a picture (rows, cols, B): ``whole`` neighbourhoods or only centres; ``judged`` alone."""
 
     pixels: NDArray[Any]
     sites: Mask
-    whole: bool = True
-    judged: bool = False
+    whole: bool = True  # neighbourhoods lie within the sites
+    judged: bool = False  # the sites only show how the class differs from its exemplars
 
 
 class Null(NamedTuple):
@@ -130,30 +122,21 @@ class Null(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """A trained classifier, without any machine.
-
-    ``exemplars``, one for each expert, with all classes, in NumPy; ``offsets`` (classes,) int64, added to the evidence
-    of each class; ``discriminant`` of patterns; ``nulls``, one for each class; ``freedom``, the degrees of freedom of
-    their variances; ``own`` (classes, E), the mean logarithm of distances of a class from itself; ``counts``, the
-    numbers of exemplars.
-    """
+    """A trained classifier, without any machine; lists and arrays have an entry for each expert or class."""
 
     scale: Scale
     experts: list[Expert]
     exemplars: list[Exemplars]
-    offsets: NDArray[np.int64]
+    offsets: NDArray[np.int64]  # of the evidence
     discriminant: Discriminant
     nulls: list[Null]
-    freedom: int
-    own: NDArray[np.float64]
-    counts: list[int]
+    freedom: int  # of the variances of nulls
+    own: NDArray[np.float64]  # (classes, E), mean logarithms of distances of a class from itself
+    counts: list[int]  # of exemplars
 
 
 def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
-    """Return the levels of a picture (rows, cols, B) on a machine, each (B, rows, cols) uint16 in sixteenths of 0..255.
-
-    Level 0 is the picture, and all further levels are smoothed by `SMOOTHING`, mirrored beyond the border.
-    """
+    """Return the levels of a picture on a machine, smoothed by `SMOOTHING`: (B, rows, cols) uint16 in sixteenths."""
     planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
     found = [machine.put(planes.astype(np.uint16))]
     for level in range(1, levels):
@@ -177,11 +160,8 @@ def blurred(planes: NDArray[Any], taps: NDArray[np.uint32]) -> NDArray[np.int64]
 def learn(
     machine: Machine, classes: Sequence[Sequence[Region]], names: Sequence[str], options: Options, seed: int
 ) -> Model:
-    """Return the model of classes, each given by regions of pictures of one type.
-
-    Raises ValueError if a neighbourhood has too many values, or a class fewer than `FEWEST_NEIGHBOURHOODS` of them.
-    """
-    regions = [region for one in classes for region in one]
+    """Return the model of classes, each given by regions of pictures; raise if one has too few neighbourhoods."""
+    regions = [region for several in classes for region in several]
     bands = regions[0].pixels.shape[-1]
     if (values := bands * len(experts_of(options, 1)[0].offsets)) > VALUES:
         few = f"give a smaller order, so that there are {VALUES} at most"
@@ -190,10 +170,10 @@ def learn(
     levels = _levels_of(options, classes, names)
     experts = experts_of(options, levels)
     taught = [_Class(machine, scale, experts, options, seed, c, one) for c, one in enumerate(classes)]
-    drawn = [[one.draw(expert) for expert in experts] for one in taught]
-    selves = [one.judge() for one in taught]
-    own = np.array([one.mean for one in selves])
-    counts = [min(map(len, one)) for one in drawn]
+    drawn = [[known.draw(expert) for expert in experts] for known in taught]
+    selves = [known.judge() for known in taught]
+    own = np.array([distances.mean for distances in selves])
+    counts = [min(map(len, exemplars_of)) for exemplars_of in drawn]
     offsets = []
     for c, count in enumerate(counts):
         typical = sum(expert.factor * options.typical * own[c, e] * LOGS for e, expert in enumerate(experts))
@@ -201,14 +181,14 @@ def learn(
         shift = sum(expert.factor * fewer / (len(expert.offsets) * bands) for expert in experts)
         offsets.append(round(typical - shift))
     nulls, freedom = _nulls(selves)
-    pooled = [stacked([one[e] for one in drawn]) for e in range(len(experts))]
+    pooled = [stacked([exemplars_of[e] for exemplars_of in drawn]) for e in range(len(experts))]
     discriminant = Discriminant.of([one.patterns for one in selves], [one.parts[:, len(experts) :] for one in selves])
     return Model(scale, experts, pooled, np.array(offsets, np.int64), discriminant, nulls, freedom, own, counts)
 
 
 def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
     """Return the number of levels at which all classes have enough sites; raise if it is 0."""
-    regions = [region for one in classes for region in one]
+    regions = [region for several in classes for region in several]
     side = min(min(region.sites.shape) for region in regions)
     most = max(1, sum(side >= LEAST_SAMPLE_SIDE << level for level in range(options.levels)))
     for levels in range(most, 0, -1):
@@ -241,16 +221,12 @@ def _cropped(region: Region, margin: int) -> Region:
 
 
 class OwnDistances(NamedTuple):
-    """The distances of the parts of a class from the rest of it.
-
-    ``mean`` (E,) of the logarithms in natural units; ``windows`` (M, n), the measures of windows; ``parts`` (parts, M),
-    those of each part; ``patterns`` (P, n), roots of the frequencies of patterns in small windows.
-    """
+    """How the parts of a class differ from the rest of it: mean logarithms (E,), measures, roots of frequencies."""
 
     mean: NDArray[np.float64]
-    windows: NDArray[np.float64]
-    parts: NDArray[np.float64]
-    patterns: NDArray[np.float64]
+    windows: NDArray[np.float64]  # (M, n), measures
+    parts: NDArray[np.float64]  # (parts, M)
+    patterns: NDArray[np.float64]  # (P, n)
 
 
 class _Class:
@@ -282,13 +258,13 @@ class _Class:
         if len(sites) > most:
             words = random.draw4(self._seed, expert.level, self._number, sites, random.SEARCH)[0]
             sites = np.sort(sites[np.argsort(words, kind="stable")[:most]])
-        found, first = [], 0
+        drawn, first = [], 0
         for place, mask in enumerate(masks):
-            own = sites[(sites >= first) & (sites < first + mask.size)] - first
+            here = sites[(sites >= first) & (sites < first + mask.size)] - first
             first += mask.size
-            if own.size:
-                found.append(self._features(place, expert, own).T)
-        return np.concatenate(found)
+            if here.size:
+                drawn.append(self._features(place, expert, here).T)
+        return np.concatenate(drawn)
 
     def _features(self, place: int, expert: Expert, sites: NDArray[np.intp]) -> NDArray[np.float32]:
         """Return the neighbourhoods of sites of a region, (K, S)."""
@@ -299,7 +275,7 @@ class _Class:
         )
 
     def judge(self) -> OwnDistances:
-        """Return the distances of the parts of the class from the rest of it, for each expert, and their measures."""
+        """Return the distances of the quarters of the class from the rest of it."""
         machine, taps = self._machine, gaussian(self._options.window)
         windows, parts, own, near = [], [], [], []
         for place, region in enumerate(self.regions):
@@ -324,15 +300,11 @@ class _Class:
         return OwnDistances(np.array(own).mean(0), np.concatenate(windows, 1), np.array(parts), np.concatenate(near, 1))
 
 
-TOO_FEW = 8
-"""The fewest neighbourhoods for a comparison with a part."""
-
-
 def _quarters(sites: Mask) -> list[Mask]:
     """Return sites in four nearly equal parts, divided by a row and by columns: above and below, left and right."""
     row, col = np.nonzero(sites)
     middle = np.median(row)
-    found = []
+    parts = []
     for half in (row <= middle, row > middle):
         if not half.any():
             continue
@@ -341,26 +313,23 @@ def _quarters(sites: Mask) -> list[Mask]:
             if side.any():
                 part = np.zeros_like(sites)
                 part[row[side], col[side]] = True
-                found.append(part)
-    return found
+                parts.append(part)
+    return parts
 
 
 def _boxed(sites: Mask) -> Mask:
     """Return the sites within a box of `BOX` x `BOX` pixels around their middle."""
     row, col = np.nonzero(sites)
     top, left = (max(0, int(np.median(axis)) - BOX // 2) for axis in (row, col))
-    found = np.zeros_like(sites)
-    found[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
-    return found
+    boxed = np.zeros_like(sites)
+    boxed[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
+    return boxed
 
 
 def windowed(
     machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32], at: Mask
 ) -> tuple[NDArray[np.int64], Mask]:
-    """Return the mean of planes (P, rows, cols) over the sites in each window, and whether it has any.
-
-    The windows are around the n sites ``at``; the means are in 1 / `MEANS` of the planes' units, (P, n).
-    """
+    """Return means of planes (P, rows, cols) over sites in the windows ``at`` n sites, (P, n), and if there are any."""
     labels, weights = machine.put(sites.astype(np.uint8)), machine.put(taps)
     ones = machine.put(np.ones(len(logs), np.int32))
     counts = machine.get(window(machine, labels, machine.put(np.ones(1, np.int32)), weights))[0, at].astype(np.int64)
@@ -369,11 +338,7 @@ def windowed(
 
 
 def _nulls(selves: Sequence[OwnDistances]) -> tuple[list[Null], int]:
-    """Return the distribution of each class, and the degrees of freedom of their variances.
-
-    The variance is that of the class between windows, with a share of the mean of all classes, plus the drift between
-    parts of a sample, which is pooled because a class has few parts.
-    """
+    """Return the distribution of each class, and the degrees of freedom of the drift, which is pooled over classes."""
     within = [_spread(one.windows)[1] for one in selves]
     pooled: NDArray[np.float64] = np.add.accumulate(within)[-1] / len(within)
     several = [one.parts.T for one in selves if len(one.parts) > 1]

@@ -18,14 +18,8 @@ SIXTEENTHS = 16
 
 @Operation
 def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Array, contrast: bool) -> Array:
-    """Return the neighbourhoods of sites, (B * N, S) float32 with integer values.
-
-    ``levels`` (B, rows, cols) uint16 are bands in sixteenths of 0..255, mirrored beyond the border; ``sites`` (S,)
-    int32 are row * cols + column; ``offsets`` (N, 2) int32 are the site itself and its neighbours. Raw values are
-    rounded to 0..255. With ``contrast`` the mean of each band is subtracted, and the whole vector z becomes
-    40 log(1 + |z| / 5) z / |z|. Cost: O(S B N).
-    """
-    bands, rows, cols = levels.shape
+    """Return the neighbourhoods of sites, (B * N, S) float32 of integers, by default values of 0..255: O(S B N)."""
+    bands, rows, cols = levels.shape  # in sixteenths, mirrored beyond the border
     count = offsets.shape[0]
     unit = np.float32(1) / np.float32(SIXTEENTHS * count)
     if machine is None:
@@ -60,10 +54,7 @@ PART = 2**14
 
 
 class Exemplars(NamedTuple):
-    """Neighbourhoods y that represent classes: ``doubled`` (M, K) float32 are -2 y, ``squares`` (M,) float32 |y|^2.
-
-    ``starts`` (classes + 1,) int32 is the first exemplar of each class, and M.
-    """
+    """Neighbourhoods y of classes: ``doubled`` (M, K) are -2 y, ``squares`` (M,) |y|^2, and ``starts`` of classes."""
 
     doubled: Array
     squares: Array
@@ -84,10 +75,7 @@ def stacked(classes: list[NDArray[np.float32]]) -> Exemplars:
 
 @Operation
 def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Array:
-    """Return log(d^2 + 1) of the nearest exemplar of each class, (classes, S) uint16 in 1/256.
-
-    ``features`` (K, S) float32 are integers, whose sums of products stay below 2^24. Cost: S M K multiply-adds.
-    """
+    """Return log(d^2 + 1) of the nearest exemplar of each class, (classes, S) uint16 in 1/256: O(S M K)."""
     count, classes = features.shape[1], known.starts.shape[0] - 1
     if machine is None:
         own = (features * features).sum(0)
@@ -124,13 +112,8 @@ def gaussian(sd: float) -> NDArray[np.uint32]:
 
 @Operation
 def window(machine: Launcher | None, labels: Array, owner: Array, taps: Array, values: Array | None = None) -> Array:
-    """Return the sums over the window of each site, (planes, rows, cols) uint32 in 2**-18.
-
-    ``labels`` (rows, cols) uint8; ``owner`` (planes,) int32 is the label that is summed in each plane; ``values``
-    (planes, rows, cols) uint16, below 2**13, or None if each is 1; ``taps`` (2 reach + 1,) uint32 come from `gaussian`.
-    Cost: two additions per tap for each site and plane.
-    """
-    rows, cols = labels.shape
+    """Return sums over the windows of sites, (planes, rows, cols) uint32 in 2**-18, each plane of one label's sites."""
+    rows, cols = labels.shape  # values are below 2**13
     planes, reach = owner.shape[0], taps.shape[0] // 2
     if machine is None:
         here = (labels == owner[:, None, None]).astype(np.uint32) * (1 if values is None else values.astype(np.uint32))
@@ -159,11 +142,7 @@ WEIGHTS = 16
 
 @Operation
 def potts(machine: Launcher | None, sites: Array, evidence: Array, votes: Array, weight: int, labels: Array) -> Array:
-    """Set sites to the class with the greatest evidence plus weight times votes, first of equals, in place.
-
-    ``sites`` (S,) int32; ``evidence`` (classes, rows, cols) int32 and ``votes`` (classes, rows, cols) uint32, both in
-    2**-18; ``weight`` in 1/16; ``labels`` (rows, cols) uint8. Cost: O(S classes).
-    """
+    """Set sites to the class with the greatest evidence plus weight times votes, first of equals, in place."""
     classes = evidence.shape[0]
     if machine is None:
         energy = evidence.reshape(classes, -1)[:, sites]

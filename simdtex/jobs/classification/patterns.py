@@ -47,11 +47,7 @@ _ROOT, _WHITE = 2**12, 2**20  # units in 1 of roots, and of whitening matrices
 
 
 def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.uint16]:
-    """Return where each binary pattern occurs in some rows, (levels x `PATTERNS`, rows, cols).
-
-    A neighbour is 1 if it is not less than the site. Neighbours of level l are 2^l pixels apart, mirrored beyond the
-    border. Values are shares of the bands, in 1 / `OCCURRENCE`.
-    """
+    """Return where binary patterns occur in some rows, (levels x `PATTERNS`, rows, cols): shares of the bands."""
     found = []
     for level, values in enumerate(levels):
         bands, height, width = values.shape
@@ -73,11 +69,7 @@ def roots(patterned: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class Discriminant(NamedTuple):
-    """Normal densities of the roots of the frequencies of patterns in windows, one for each class.
-
-    ``means`` (classes, P); ``whitening`` (classes, P, P), the inverse of the Cholesky factor of the covariance; both
-    hold integers. ``logs`` (classes,), half the logarithm of the determinant of the covariance.
-    """
+    """Normal densities of roots of frequencies: integer ``means`` (classes, P) and ``whitening`` (classes, P, P)."""
 
     means: NDArray[np.float64]
     whitening: NDArray[np.float64]
@@ -85,11 +77,8 @@ class Discriminant(NamedTuple):
 
     @classmethod
     def of(cls, windows: Sequence[NDArray[np.float64]], parts: Sequence[NDArray[np.float64]]) -> Self:
-        """Return the densities of classes by the roots of n windows, (P, n), and those of parts of the samples.
-
-        The covariance of a class has a share of its own, a share of the mean of all classes, and the covariance of
-        the parts' roots (parts, P) for the drift of textures. All products are of integers, so their sums are exact.
-        """
+        """Return the densities of classes by the roots in n windows, (P, n), and in parts of samples, (parts, P)."""
+        # products of integers have exact sums
         means, within_class = zip(*map(_covariance, windows), strict=True)
         drift = [_covariance(one.T)[1] for one in parts if len(one) > 1]
         shared = (1 - OWN) * sum(within_class) / len(means) + DRIFT * sum(drift) / max(1, len(drift))
@@ -102,10 +91,7 @@ class Discriminant(NamedTuple):
         return cls(np.array(means), np.array(whitening), np.array(logs))
 
     def logarithms(self, patterned: NDArray[np.float64]) -> NDArray[np.uint16]:
-        """Return -log of the probability of each class, bounded, (classes, n) uint16 in 1 / `LOGS`.
-
-        ``patterned`` (P, n) are the frequencies in the windows of n sites, in 1 / `OCCURRENCE`. Cost: O(classes P^2 n).
-        """
+        """Return -log of the probability of each class, (classes, n) uint16 in 1 / `LOGS`: O(classes P^2 n)."""
         values = np.rint(roots(patterned) * _ROOT)
         energy = np.empty((len(self.means), values.shape[1]))
         for one, mean, white, log in zip(energy, self.means, self.whitening, self.logs, strict=True):
@@ -127,10 +113,8 @@ def _covariance(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArr
 
 
 def _whitened(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return the inverse of the Cholesky factor of a covariance (P, P), and the logarithm of the factor's determinant.
-
-    NumPy's own factors differ in their last bits between machines; single operations are the same on all.
-    """
+    """Return the inverse Cholesky factor of a covariance (P, P), and the logarithm of the factor's determinant."""
+    # NumPy's own factors differ in their last bits between machines; single operations are the same on all
     rest, inverse, log = covariance.copy(), np.eye(len(covariance)), 0.0
     for k in range(len(rest)):
         root = np.sqrt(rest[k, k])

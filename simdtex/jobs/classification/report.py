@@ -27,11 +27,7 @@ def write_classification(
     truth: NDArray[Any] | None = None,
     command: str = "",
 ) -> None:
-    """Write the report of a classification: ``index.html``, PNG pictures, ``results.json``.
-
-    ``image`` is (rows, cols[, bands]); ``labels`` (rows, cols) are 0 where unknown; ``output`` is that of
-    `simdtex.classify`. ``truth`` (rows, cols) are the true labels, one of no class where the true one is unknown.
-    """
+    """Write the report of labels: ``index.html``, PNG pictures, ``results.json``; ``truth`` are the true labels."""
     statistics, fit = output.statistics, output.fit
     assert fit is not None
     classes = statistics["classes"]
@@ -45,7 +41,7 @@ def write_classification(
     legend = [
         {
             **{"Label": str(one["label"]), "Class": one["name"]},
-            **{"Colour": _hex(colours[one["label"]]), "Share": f"{one['share']:.1%}"},
+            **{"Colour": f"#{bytes(colours[one['label']]).hex()}", "Share": f"{one['share']:.1%}"},
         }
         for one in classes
     ]
@@ -83,15 +79,8 @@ def write_classification(
     write_report(folder, "Which texture is where", lead, sections, results, command)
 
 
-def _hex(colour: NDArray[np.uint8]) -> str:
-    return "#" + bytes(colour).hex()
-
-
 def confusion_matrix(labels: NDArray[Any], truth: NDArray[Any], count: int) -> NDArray[np.int64]:
-    """Return the number of pixels of each true class (rows) with each label (columns), (count, count).
-
-    Classes are numbered from 0; pixels whose true class is ``count`` or more are left out.
-    """
+    """Return the number of pixels of each true class (rows) with each label (columns); ``count`` is not known."""
     known = truth < count
     pairs = truth[known].astype(np.int64) * count + labels[known]
     return np.bincount(pairs, minlength=count * count).reshape(count, count)

@@ -179,7 +179,7 @@ def simulate(
         f"{number} realisation{'s' * (number != 1)} of {size_of(cells)}",
         str(output),
         [lambda made, run: write_realisations(output, made)],
-        more=lambda made, _: _say_shares(made.attrs),
+        more=_say_shares,
         report=lambda folder, made, run: _report(folder, material, made, cells),
     )
 
@@ -219,10 +219,8 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     cells = check_cells(material, output, size, data, options)
     plan = plan_estimation(cells, **given(options))
 
-    summary = f"maps of {size_of(cells)}"
-    return Task(
-        partial(make, "estimate", plan), summary, str(output), [lambda made, run: write_realisations(output, made)]
-    )
+    writers: list[Any] = [lambda made, _: write_realisations(output, made)]
+    return Task(partial(make, "estimate", plan), f"maps of {size_of(cells)}", str(output), writers)
 
 
 def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -237,17 +235,14 @@ def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: An
 def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict[str, Any]:
     """Return the mask, the data and the place of an output, whose options are taken out."""
     mask, path, like = (options.pop(name) for name in ("sample_mask", "known", "like"))
-    found = {"mask": read_masks(mask, material, how)}
-    found["known"], _ = read_known(path, material, how, options["origin"], like)
-    return found | {"like": like and read_like(like, how)}
-
-
-def read_like(path: Path, how: Reading) -> Any:
-    """Read the grid that says where the output lies."""
-    found, _, grid = read_pixels(path, how._replace(variables=()))
-    if grid is None or not grid.frame.told:
-        raise ValueError(f"{path} does not say where its cells lie; give a grid or a raster with coordinates")
-    return in_place(found[..., :1], grid)
+    data = {"mask": read_masks(mask, material, how), "like": None}
+    data["known"], _ = read_known(path, material, how, options["origin"], like)
+    if like:
+        pixels, _, grid = read_pixels(like, how._replace(variables=()))
+        if grid is None or not grid.frame.told:
+            raise ValueError(f"{like} does not say where its cells lie; give a grid or a raster with coordinates")
+        data["like"] = in_place(pixels[..., :1], grid)
+    return data
 
 
 def read_map(
@@ -263,8 +258,8 @@ def read_map(
         return table
     if name == "region" and how.channels and not grids.is_grid(path):  # a picture, whose white parts it is
         return image.read_mask(path, image.read(path).pixels.shape, ascending=how.ascending)
-    found, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
-    pixels = planes(found) > 0 if name == "region" else planes(found)
+    pixels, _, grid = read_pixels(path, how._replace(palette=name == "image_map", variables=()))
+    pixels = planes(pixels) > 0 if name == "region" else planes(pixels)
     several = pixels.shape[-1] > 1
     values: Any = in_place(pixels, grid) if grid else pixels if several else pixels[..., 0]
     if several:
@@ -273,17 +268,9 @@ def read_map(
 
 
 def check_cells(
-    material: Material,
-    output: Path,
-    size: str | None,
-    data: dict[str, Any],
-    options: dict[str, Any],
-    source: bool = False,
+    material: Material, output: Path, size: str | None, data: dict[str, Any], options: Any, source: bool = False
 ) -> Cells:
-    """Return the cells of an output, whose options are taken out; rows of tables become coordinates.
-
-    Raises ValueError if places differ, or the output cannot hold the place.
-    """
+    """Return the cells of an output, whose options are taken out; rows of tables become coordinates."""
     from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.hard_data import HardData
     from simdtex.io.volume import check_realisations_path
@@ -291,13 +278,18 @@ def check_cells(
 
     shape = None if size is None else output_shape(size, material.pixels[0], axes=2 + material.deep)
     lies = given({name: options.pop(name) for name in ("origin", "cell", "several", "outside")})
-    cells = plan_cells(described(material), shape, data, material.channel_axis, flag, **lies)
+    training = material.array
+    if material.grid is not None:  # which has coordinates
+        first, *others = material.pixels
+        placed = in_place(first if material.channel_axis else first[..., None], material.grid)
+        training = [placed, *others] if others else placed
+    cells = plan_cells(training, shape, data, material.channel_axis, flag, **lies)
     frame = cells.place.frame if cells.place else None
     if check_realisations_path(output, source=source) in SUFFIXES:
         check_grid(output, material.pixels, *(frame or (None, None)))
-    for name, one in cells.given.items():
-        if isinstance(one, HardData) and one.from_top:
-            cells.given[name] = one.upside_down(cells.size[-2], frame)
+    for name, table in cells.given.items():
+        if isinstance(table, HardData) and table.from_top:
+            cells.given[name] = table.upside_down(cells.size[-2], frame)
     return cells
 
 
@@ -306,19 +298,10 @@ def size_of(cells: Cells) -> str:
     return "x".join(map(str, cells.size[::-1]))
 
 
-def described(material: Material) -> Any:
-    """Return the training image, as an array of xarray with its coordinates if it is a grid."""
-    if material.grid is None:
-        return material.array
-    first, *others = material.pixels
-    placed = in_place(first if material.channel_axis else first[..., None], material.grid)
-    return [placed, *others] if others else placed
-
-
-def _say_shares(attributes: dict[str, Any]) -> None:
+def _say_shares(made: Any, _: Output) -> None:
     """Print the shares of categories that were asked and those reached."""
-    if "shares_asked" in attributes:
-        click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**attributes))
+    if "shares_asked" in made.attrs:
+        click.echo("shares of categories: {shares_asked} asked, {shares_reached} reached".format(**made.attrs))
 
 
 def _report(folder: Path, material: Material, made: Any, cells: Cells) -> None:

@@ -41,8 +41,6 @@ from simdtex.options import moderate, unmasked
 Array = NDArray[Any]
 
 MOST_CATEGORIES = 16  # integers with more values are continuous
-
-
 IMAGE, VOLUME, ENSEMBLE = "(rows, cols)", "(layers, rows, cols)", "(realisations, rows, cols)"
 
 
@@ -92,12 +90,7 @@ def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) 
     Returns
     -------
     ndarray, (K,)
-        The categories, in the given order or in ascending order; empty if the values are continuous.
-
-    Raises
-    ------
-    ValueError
-        The training image is not (rows, cols), or holds a value that is none of the categories.
+        The categories, in the order of ``categories`` or ascending; empty if the values are continuous.
     """
     image = checked(training, "training image")
     if categories is not None and len(categories):
@@ -136,7 +129,7 @@ class Connectivity(NamedTuple):
 
 
 def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
-    """Return the connectivity functions of a category, its components, and the share of the largest.
+    """Return the `Connectivity` of a category: its functions, components, and the share of the largest.
 
     Parameters
     ----------
@@ -145,15 +138,6 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
         The value of the pixels that are meant.
     max_lag : int
         The largest distance, pixels, less than a side of the image.
-
-    Returns
-    -------
-    Connectivity
-
-    Raises
-    ------
-    ValueError
-        The image has other axes, or is too small.
 
     Notes
     -----
@@ -193,6 +177,7 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     Parameters
     ----------
     image : array_like, (rows, cols)
+        More than 16 pixels a side.
     category : int
         The value of the pixels that are meant.
 
@@ -201,16 +186,10 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     ndarray of int, (n, 2)
         Rows and columns where the skeleton ends, about a half-width before the channel does, in raster order.
 
-    Raises
-    ------
-    ValueError
-        The image is not (rows, cols), or has a side of 16 pixels or less.
-
     Notes
     -----
-    About 20 ms for 250 x 250 pixels of channels. Meant for categories of long, narrow bodies of about the same width;
-    lobes of much wider ones count as ends. For the ground between channels, or for noise, the number has no plain
-    meaning, but it can be compared.
+    Meant for categories of long, narrow bodies of about the same width; lobes of much wider ones count as ends. For the
+    ground between channels, or for noise, the number can only be compared. About 20 ms for 250 x 250 pixels.
     """
     pixels = checked(image)
     if min(pixels.shape) <= 2 * MARGIN:
@@ -276,16 +255,10 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
         window of the training image; -1 if there is none, and -2 for windows with a single value, which do not count as
         copies.
 
-    Raises
-    ------
-    ValueError
-        The arrays have another number of axes, or a side of fewer pixels than a window.
-
     Notes
     -----
-    Windows are compared by their `simdtex.jobs.studies.quality.hashes`. Cost: 2 x side operations for every
-    pixel, and a look-up, about 20 ms for 250 x 250 pixels; memory: 50 bytes for every pixel of the training image and
-    of one realisation, beside the result.
+    Windows are compared by `simdtex.jobs.studies.quality.hashes`. Cost: 2 x side operations for every pixel, and a
+    look-up; 50 bytes for every pixel of the training image and of a realisation, beside the result.
     """
     image = checked(training, "training image", IMAGE, VOLUME)
     array = checked(ensemble, "ensemble", ENSEMBLE if image.ndim == 2 else "(realisations, layers, rows, cols)")
@@ -312,17 +285,12 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
 
 
 def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the share of windows that occur in the training image, among those with more than one value.
+    """Return the share of windows, (realisations,), that occur in the training image; NaN if all have a single value.
 
     Parameters
     ----------
     places : ndarray of int32, (realisations, [layers,] rows, cols)
-        The result of `copies`.
-
-    Returns
-    -------
-    ndarray of float64, (realisations,)
-        NaN where all windows have a single value.
+        The result of `copies`. Windows with a single value are left out.
     """
     places = places.reshape(len(places), -1)
     counted, found = (places != PLAIN).sum(1), (places >= 0).sum(1)
@@ -343,13 +311,12 @@ class Anodi(NamedTuple):
     Attributes
     ----------
     variety : float
-        Mean distance between two realisations: the larger, the greater the uncertainty. NaN for a single
-        realisation.
+        Mean distance between two realisations: the larger, the greater the uncertainty. NaN for a single one.
     likeness : float
         Mean distance between a realisation and the training image: the smaller, the better its patterns are kept.
     ratio : float
-        Variety over likeness. About 1 if realisations are as far from one another as from the training image, as
-        other images of the same kind would be; near 0 if all are the same; NaN if the likeness is 0.
+        Variety over likeness: about 1 if realisations are as far from one another as from the training image, near 0 if
+        all are the same; NaN if the likeness is 0.
     by_level : ndarray of float64, (levels, 2)
         Variety and likeness at each level, the finest first.
     distances : ndarray of float64, (realisations + 1, realisations + 1)
@@ -364,7 +331,7 @@ class Anodi(NamedTuple):
 
 
 def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int] | None = None) -> Anodi:
-    r"""Return the variety of an ensemble and its likeness to the training image.
+    """Return the variety of an ensemble and its likeness to the training image, an `Anodi`.
 
     The distance of two images is the mean over three levels :math:`g = 0, 1, 2` with weights :math:`2^{-g}` of the
     Jensen-Shannon distance (to base 2) between their histograms of patterns. A pattern of level g is a square of pixels
@@ -380,23 +347,13 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
         As in `categories_of`; those of the training image by default. Continuous values are cut into three classes, by
         quantiles of the training image. A value that is frequent enough to be such a quantile is a class of its own.
 
-    Returns
-    -------
-    Anodi
-
-    Raises
-    ------
-    ValueError
-        The arrays have another number of axes or are too small, a value is no category, or there are too many different
-        patterns for their counts to fit 0.5 GB.
-
     Notes
     -----
     After Tan, Tahmasebi and Caers, "Comparing training-image based algorithms using an analysis of distance",
     Mathematical Geosciences 46, 2014, and simpler: patterns are counted exactly where the paper
     clusters them; coarse levels take every second pixel instead of resampling the image; and the distance is the square
     root of the divergence. The paper compares two algorithms by the quotient of their ratios; the ratio here is that
-    of one ensemble, so that two ensembles can be compared if they are of the same size.
+    of one ensemble.
 
     Histograms of finite images differ by chance even where the law is the same, the more so the smaller they are:
     compare ensembles of the same numbers of pixels. About a second for 50 realisations of 250 x 250 pixels of
@@ -525,7 +482,7 @@ def summary(
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
 ) -> Summary:
-    """Return all figures of an ensemble.
+    """Return all figures of an ensemble, a `Summary`; about 8 s for 50 realisations of 250 x 250 pixels.
 
     Parameters
     ----------
@@ -536,19 +493,6 @@ def summary(
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
         As in `categories_of`: the training image's own by default, none for continuous values.
-
-    Returns
-    -------
-    Summary
-
-    Raises
-    ------
-    ValueError
-        The arrays have other shapes, a value is no category or beyond 1e100, or a datum lies outside.
-
-    Notes
-    -----
-    About 8 s for 50 realisations of 250 x 250 pixels in two categories.
     """
     array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     known = categories_of(image, categories)
@@ -633,8 +577,7 @@ __all__ = [
 def channels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return a training image of sinuous channels, and another map of the same kind for taking hard data from it.
 
-    Channels are about 8 pixels wide and cover 0.3 of each map. They meander from left to right, cross, part and join,
-    and a few end inside. ``benchmarks/channels.py`` draws them, and more of any size.
+    Channels are about 8 pixels wide and cover 0.3 of each map; ``benchmarks/channels.py`` draws maps of any size.
 
     Returns
     -------

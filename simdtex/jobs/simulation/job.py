@@ -23,16 +23,8 @@ from simdtex.driver import Device, Kept, Seed, drive, run
 from simdtex.inputs import check_inputs, check_known
 from simdtex.io.hard_data import HardData
 from simdtex.io.places import Location
-from simdtex.jobs.simulation.maps import (
-    Cells,
-    Maps,
-    check_region,
-    digests,
-    georeferenced,
-    grid_axes,
-    missing_value,
-    plan_cells,
-)
+from simdtex.jobs.simulation import maps
+from simdtex.jobs.simulation.maps import Cells, digests, georeferenced, grid_axes, plan_cells
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import given_data
@@ -88,27 +80,22 @@ def simulate(
     mask : (rows, cols) bool array, or a list of such, optional
         True for pixels of the training image that may be taken; all other pixels are still neighbours.
     known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
-        Conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN for
-        unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some variables
-        (channels) of a pixel may be known and others not.
+        Conditioning data as in `simdtex.synthesize`: values of the output, which do not change by a bit.
     origin : (x, y) or (x, y, z), optional
-        The centre of the first cell of a realisation, in the units of the table and of the result's coordinates.
-        None: see `like`, else 0.
+        The centre of the first cell, in the units of the table and of the result. None: see `like`, else 0.
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None: see `like`, else 1; without both, coordinates are columns and rows.
     like : array or dataset of xarray, optional
-        An array with coordinates y and x: the output has its origin, size of cells, coordinate reference system and
-        number of cells. None: those of `known`, `region` and the other maps that are arrays of xarray, which have to
-        lie at one place; else `origin` and `cell`; else those of such a training image.
+        An array with coordinates y and x: the output has its origin, cells and coordinate reference system. None: those
+        of `known` and the maps that are arrays of xarray, which have to lie at one place; else `origin` and `cell`;
+        else those of such a training image.
     several : {"refuse", "mean", "most"}
-        Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most frequent
-        value (most). There is no mean of categories. See `simdtex.place_hard_data`.
+        Of different data of a table in one cell take none, but raise; their mean, if they are no categories; or the
+        most frequent. See `simdtex.place_hard_data`.
     outside : {"refuse", "skip"}
         Treat data of a table outside of the cells as an error (refuse), or leave them out (skip).
     guide : (array, array), optional
-        Two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the training image's size and of the
-        output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
-        guide. With several training images, the first is a list of pictures.
+        Two pictures or volumes, of the training image's size and of the output's, as in `simdtex.synthesize`.
     first : int, 0 or more
         Start with the realisation of this number.
     shape : (int, int) or (int, int, int), optional
@@ -149,19 +136,17 @@ def simulate(
         cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
         realisation: `simdtex.synthesize` with it and the ``options`` returns the same map, unless `region` or a later
         parameter is used.
-        Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
-        ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
-        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. With `probabilities` or ``proportions``,
-        by default those of the training image if there is one variable and no guide, the shares of all realisations are
-        ``shares_asked`` and ``shares_reached``. All are texts and numbers, so that ``to_netcdf`` and ``to_zarr`` of
-        xarray write them; ``units`` and ``long_name`` are those of a training image of xarray. With `region` there is a
-        coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``. ``plot(number=8)`` draws
-        the first realisations.
+        Attributes, texts and numbers that xarray can write: ``seed``, ``options`` (a JSON text), ``version``,
+        ``device``; SHA-256 digests of ``training_image``, ``hard_data``, ``guide``, ``mask`` and the maps from `region`
+        to `scale`; with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``; ``units`` and ``long_name`` of
+        a training image of xarray. With `probabilities` or ``proportions``, by default those of the training image if
+        there is one variable and no guide, the shares of all realisations are ``shares_asked`` and ``shares_reached``.
+        With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``.
+        ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
-        With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column`` (realisation, y,
-        x), int32, are the row and the column in the training image, counted from 0, that each cell is from. A volume
-        adds ``source_layer``, and several training images add ``source_image``, the number of the training image. Cells
-        without a source, such as data, have -1. The dataset has the attributes, too.
+        With `source`: that array is the variable ``simulation``; ``source_row`` and ``source_column``, of a volume also
+        ``source_layer``, int32, are where in the training image each cell is from, counted from 0, and
+        ``source_image`` is the number of several training images. Cells without a source, such as data, have -1.
 
     Raises
     ------
@@ -202,45 +187,42 @@ def plan_simulation(
     true_or_false("source", source)
     if jobs is not None:
         whole("jobs", jobs, 1)
-    own, size, given = cells.training, cells.size, cells.given
-    maps = Maps(*(given[name] for name in Maps._fields))
-    inputs = check_inputs(own, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
+    pictures, size, given = cells.training, cells.size, cells.given
+    inputs = check_inputs(pictures, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
     missing: Any = None
-    if maps.region is not None:
-        inputs, missing = check_region(maps.region, size, inputs), missing_value(own.pixels)
+    if given["region"] is not None:
+        inputs, missing = maps.check_region(given["region"], size, inputs), maps.missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
-    copies, training, guide = maps.of_images(own, size), own, inputs.guide
+    copies, training, guide = maps.copies_of(given, pictures, size), pictures, inputs.guide
     if copies:
         if chosen.shares:
             raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
-        training = copies.pictures(own)
-        guide = guide and (tuple(one.of(guide[0]) for one in copies.copies), guide[1])
+        training = copies.pictures(pictures)
+        guide = guide and (tuple(copy.of(guide[0]) for copy in copies.copies), guide[1])
     kinds = chosen.of(training)
     cells.check_several(kinds)
     categories = kinds.categories(0)
-    soft = Soft(maps.of_categories(categories, size, cells.put), copies.probability if copies else None)
-    told = chosen.proportions or guide or maps.probabilities is not None
-    alone = own.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
+    probabilities = maps.of_categories(given["probabilities"], categories, size, cells.put)
+    soft = Soft(probabilities, copies.probability if copies else None)
+    told = chosen.proportions or guide or probabilities is not None
+    alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     if categories is not None and alone and not told:
         images = replace(kinds, shares=soft.shares) if copies else kinds
         chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
-    found = digests(own, inputs.given)
+    shas = digests(pictures, inputs.given)
     if inputs.guide:
-        found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
-    if own.usable:
-        found["mask"] = digest(*own.usable)
+        shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])
+    if pictures.usable:
+        shas["mask"] = digest(*pictures.usable)
     parts = (training, inputs.given, guide, soft, copies, source, chosen)
     axis = None if cells.channel_axis is None else -1
-    return Simulation(maps.digests(), n, first, size, *parts, cells._replace(given={}), found, missing, jobs, axis)
+    of_maps = maps.digests_of_maps(given)
+    return Simulation(of_maps, n, first, size, *parts, cells._replace(given={}), shas, missing, jobs, axis)
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """The job of `simulate`: a run of one plan for each realisation.
-
-    ``maps`` are digests. ``training`` and ``guide`` have the ``copies`` of training images, if these are turned or
-    scaled, and ``soft`` their probabilities. ``missing`` is the value outside of the region.
-    """
+    """The job of `simulate`: a run of one plan for each realisation; ``training`` and ``guide`` have the ``copies``."""
 
     maps: dict[str, str]
     n: int
@@ -286,8 +268,8 @@ class Simulation:
         together = min(self.jobs or usual, self.n)
         # each has a queue, but a profile is of a single machine
         info: Any = machine if machine.seconds is not None else getattr(machine, "info", "reference")
-        for one in (machine, *(open_machine(info) for _ in range(together - 1))):
-            batch.free.put(one)
+        for free in (machine, *(open_machine(info) for _ in range(together - 1))):
+            batch.free.put(free)
         try:
             with ThreadPoolExecutor(together) as workers:
                 list(workers.map(batch.make, left))  # the first error cancels those that wait
@@ -310,7 +292,7 @@ class Simulation:
         if not made.size:
             return {}
         asked = np.array(self.options.proportions or p[:, there].sum(1))
-        reached = np.array([(made == one).sum() for one in categories])
+        reached = np.array([(made == category).sum() for category in categories])
         both = {"shares_asked": asked, "shares_reached": reached}
         return {name: " ".join(f"{one:.3f}" for one in those / those.sum()) for name, those in both.items()}
 
@@ -343,10 +325,7 @@ class Simulation:
 
 
 class Batch:
-    """The realisations of a run, of which those of the numbers ``finished`` are made; threads make one each at a time.
-
-    ``free`` are the machines that make none.
-    """
+    """The realisations of a run; threads make one each at a time on the ``free`` machines."""
 
     def __init__(self, job: Simulation, seed: int, callback: Callback | None, checkpointing: Checkpointing) -> None:
         self.job, self.seed, self.callback, self.checkpointing = job, seed, callback, checkpointing
@@ -498,7 +477,7 @@ def plan_estimation(
     real("bandwidth", bandwidth, 0, above=True)
     options = mrf.Options(categorical=categorical)
     training = options.of(cells.training)
-    least = min(min(one.shape[-3:-1]) for one in training.pixels)
+    least = min(min(picture.shape[-3:-1]) for picture in training.pixels)
     reach = least // 8 if reach is None else reach
     whole("reach", reach, 0, least - 1)
     if cells.given["known"] is None:
@@ -562,7 +541,7 @@ class Estimation:
             variables: dict[str, Any] = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
             along["category"] = output.statistics["names"]
         else:
-            units = [{"units": one} if self.units else {} for one in (self.units, f"({self.units})\u00b2")]
+            units = [{"units": unit} if self.units else {} for unit in (self.units, f"({self.units})\u00b2")]
             variables = {"mean": (dims, maps[0], units[0]), "variance": (dims, maps[1], units[1])}
         attributes = {"version": version("simdtex"), "device": output.statistics["device"], **self.attributes, **sides}
         return georeferenced(Results(variables, along, attributes), self.place)

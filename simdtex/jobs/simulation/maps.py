@@ -26,94 +26,92 @@ SUMS = 1e-3
 """The largest deviation of a sum of probabilities from 1; they are divided by the sum."""
 
 
-class Maps(NamedTuple):
-    """The maps of a simulation as arrays or tables, see `simdtex.simulate`; None if not given."""
+MAP_NAMES = ("region", "probabilities", "image_map", "rotation", "scale")
+"""The maps of a simulation, arrays or tables, by the names of the parameters of `simdtex.simulate`."""
 
-    region: NDArray[Any] | HardData | None = None
-    probabilities: NDArray[Any] | HardData | None = None
-    image_map: NDArray[Any] | HardData | None = None
-    rotation: NDArray[Any] | HardData | None = None
-    scale: NDArray[Any] | HardData | None = None
 
-    def digests(self) -> dict[str, str]:
-        """Return the SHA-256 digest of each map, by name."""
-        found = {}
-        for name, one in self._asdict().items():
-            if isinstance(one, HardData):
-                found[name] = digest(one.points, one.values)
-            elif one is not None:
-                found[name] = digest(np.ma.getdata(one), np.ma.getmaskarray(one))
-        return found
+def digests_of_maps(given: dict[str, Any]) -> dict[str, str]:
+    """Return the SHA-256 digest of each map, by name."""
+    maps = {name: given[name] for name in MAP_NAMES if given[name] is not None}
+    return {
+        name: digest(field.points, field.values)
+        if isinstance(field, HardData)
+        else digest(np.ma.getdata(field), np.ma.getmaskarray(field))
+        for name, field in maps.items()
+    }
 
-    def of_images(self, pictures: Pictures, shape: tuple[int, ...]) -> Turned | None:
-        """Return the copies of training images that the maps require; None without such maps."""
-        if self.image_map is self.rotation is self.scale is None:
-            return None
-        rotation = None if self.rotation is None else _numbers("rotation", self.rotation, shape)
-        scale = None if self.scale is None else _numbers("scale", self.scale, shape)
-        most = 2.0 ** (HALVES / 2)
-        if scale is not None and ((scale < 1 / most) | (scale > most)).any():
-            raise ValueError(f"scale has {scale.min():g} to {scale.max():g}; give factors of {1 / most:g} to {most:g}")
-        return turned(pictures, self._images(pictures, shape), rotation, scale)
 
-    def _images(self, pictures: Pictures, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        """Return the probability of each training image, (training images, *shape)."""
-        areas, count = [float(prod(one.shape[:-1])) for one in pictures.pixels], len(pictures.pixels)
-        along = (-1, *[1] * len(shape))
-        if self.image_map is None:
-            return np.broadcast_to(np.array(areas).reshape(along) / sum(areas), (count, *shape))
-        given = as_array("image_map", self.image_map)
-        if given.ndim == 1 + len(shape):
-            each = _numbers("image_map", given, (count, *shape))
-            if (each < 0).any() or (each.sum(0) == 0).any():
-                raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
-            return np.asarray(each / each.sum(0))
-        number = _numbers("image_map", given, shape)
-        told = number[~np.isnan(number)]
-        if not (np.isin(told, np.arange(count))).all():
-            wrong = told[~np.isin(told, np.arange(count))][0]
+def copies_of(given: dict[str, Any], pictures: Pictures, shape: tuple[int, ...]) -> Turned | None:
+    """Return the copies of training images that the maps require; None without such maps."""
+    if given["image_map"] is given["rotation"] is given["scale"] is None:
+        return None
+    rotation, scale = (
+        given[name] if given[name] is None else _numbers(name, given[name], shape) for name in MAP_NAMES[3:]
+    )
+    most = 2.0 ** (HALVES / 2)
+    if scale is not None and ((scale < 1 / most) | (scale > most)).any():
+        raise ValueError(f"scale has {scale.min():g} to {scale.max():g}; give factors of {1 / most:g} to {most:g}")
+    return turned(pictures, _images(given["image_map"], pictures, shape), rotation, scale)
+
+
+def _images(image_map: Any, pictures: Pictures, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return the probability of each training image, (training images, *shape)."""
+    areas, count = [float(prod(picture.shape[:-1])) for picture in pictures.pixels], len(pictures.pixels)
+    along = (-1, *[1] * len(shape))
+    if image_map is None:
+        return np.broadcast_to(np.array(areas).reshape(along) / sum(areas), (count, *shape))
+    image_map = as_array("image_map", image_map)
+    if image_map.ndim == 1 + len(shape):
+        each = _numbers("image_map", image_map, (count, *shape))
+        if (each < 0).any() or (each.sum(0) == 0).any():
+            raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
+        return np.asarray(each / each.sum(0))
+    index = _numbers("image_map", image_map, shape)
+    wrong = index[~np.isnan(index) & ~np.isin(index, np.arange(count))]
+    if wrong.size:
+        raise ValueError(
+            f"image_map has {wrong[0]:g} and there {'is 1' if count == 1 else f'are {count}'} training "
+            f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, {AXES[len(shape)][1:]}"
+        )
+    weights: NDArray[np.float64] = (index == np.arange(count).reshape(along)).astype(np.float64)
+    weights[:, np.isnan(index)] = np.nan
+    return weights
+
+
+def of_categories(
+    soft: Any, categories: NDArray[Any] | None, shape: tuple[int, ...], place: Placing
+) -> NDArray[np.float64] | None:
+    """Return the probability of each category, (categories, *shape), NaN where not given; None without a map."""
+    if soft is None:
+        return None
+    if categories is None:
+        raise ValueError("probabilities are of categories; give categorical=True, or leave them out")
+    names = ", ".join(map(str, categories[:10]))
+    if isinstance(soft, HardData):
+        if len(soft.names) != len(categories):
             raise ValueError(
-                f"image_map has {wrong:g} and there {'is 1' if count == 1 else f'are {count}'} training "
-                f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, {AXES[len(shape)][1:]}"
+                f"the table of probabilities has {len(soft.names)} values in a row and the training image the "
+                f"{len(categories)} categories {names}; give x, y and one for each, in this order"
             )
-        weights: NDArray[np.float64] = (number == np.arange(count).reshape(along)).astype(np.float64)
-        weights[:, np.isnan(number)] = np.nan
-        return weights
-
-    def of_categories(
-        self, categories: NDArray[Any] | None, shape: tuple[int, ...], place: Placing
-    ) -> NDArray[np.float64] | None:
-        """Return the probability of each category, (categories, *shape), NaN where not given; None without a map."""
-        if self.probabilities is None:
-            return None
-        if categories is None:
-            raise ValueError("probabilities are of categories; give categorical=True, or leave them out")
-        given, names = self.probabilities, ", ".join(map(str, categories[:10]))
-        if isinstance(given, HardData):
-            if len(given.names) != len(categories):
-                raise ValueError(
-                    f"the table of probabilities has {len(given.names)} values in a row and the training image the "
-                    f"{len(categories)} categories {names}; give x, y and one for each, in this order"
-                )
-            placed = place(given, shape, np.float64).reshape(*shape, len(categories))
-            given = np.moveaxis(placed.filled(np.nan), -1, 0)
-        found = as_array("probabilities", given)
-        if found.ndim != 1 + len(shape) or len(found) != len(categories):
-            raise ValueError(
-                f"probabilities are {'x'.join(map(str, found.shape))} and the training image has the {len(categories)} "
-                f"categories {names}; give (categories, {AXES[len(shape)][1:]}, in this order"
-            )
-        found = _numbers("probabilities", found, (len(categories), *shape))
-        unknown = np.isnan(found).any(0)
-        total = found.sum(0)
-        off = ~unknown & ((found < 0).any(0) | (abs(total - 1) > SUMS))
-        if off.any():
-            at = np.argwhere(off)[0]
-            told = ", ".join(f"{p:g}" for p in found[(slice(None), *at)])
-            remedy = "give shares of 0 or more that add up to 1, or NaN"
-            raise ValueError(f"the probabilities of {_cell(at)} are {told}; {remedy}")
-        found[:, unknown] = np.nan
-        return np.asarray(found / total)
+        placed = place(soft, shape, np.float64).reshape(*shape, len(categories))
+        soft = np.moveaxis(placed.filled(np.nan), -1, 0)
+    p = as_array("probabilities", soft)
+    if p.ndim != 1 + len(shape) or len(p) != len(categories):
+        raise ValueError(
+            f"probabilities are {'x'.join(map(str, p.shape))} and the training image has the {len(categories)} "
+            f"categories {names}; give (categories, {AXES[len(shape)][1:]}, in this order"
+        )
+    p = _numbers("probabilities", p, (len(categories), *shape))
+    unknown, total = np.isnan(p).any(0), p.sum(0)
+    wrong = ~unknown & ((p < 0).any(0) | (abs(total - 1) > SUMS))
+    if wrong.any():
+        at = np.argwhere(wrong)[0]
+        told = ", ".join(f"{share:g}" for share in p[(slice(None), *at)])
+        raise ValueError(
+            f"the probabilities of {_cell(at)} are {told}; give shares of 0 or more that add up to 1, or NaN"
+        )
+    p[:, unknown] = np.nan
+    return np.asarray(p / total)
 
 
 def _cell(at: NDArray[np.integer]) -> str:
@@ -137,17 +135,14 @@ def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
 
 
 def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
-    """Return the number that marks a missing value in arrays of the training images' type.
-
-    It is NaN for floats; for integers the largest number of the type or, if the images have that, the smallest.
-    """
+    """Return the number that marks missing values: NaN, or the largest or smallest integer that images lack."""
     dtype = pixels[0].dtype
     if dtype.kind == "f":
         return dtype.type(np.nan)
     if dtype.kind in "iu":
-        for number in (np.iinfo(dtype).max, np.iinfo(dtype).min):
-            if not any((one == number).any() for one in pixels):
-                return dtype.type(number)
+        for value in (np.iinfo(dtype).max, np.iinfo(dtype).min):
+            if not any((picture == value).any() for picture in pixels):
+                return dtype.type(value)
     raise ValueError(f"{dtype} has no number that says that a cell is outside region; give the training image as int16")
 
 
@@ -156,20 +151,16 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float
     array = as_array(name, values)
     check_real(name, array)
     if array.shape != shape:
-        sides = ["x".join(map(str, one)) for one in (array.shape, shape)]
+        sides = ["x".join(map(str, size)) for size in (array.shape, shape)]
         raise ValueError(f"{name} is {sides[0]} and has to be {sides[1]}, as the output; give one size")
-    found = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
-    if np.isinf(found).any():
+    field = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
+    if np.isinf(field).any():
         raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
-    return found
+    return field
 
 
 class Cells(NamedTuple):
-    """The cells of an output, ``size`` ([layers,] rows, columns).
-
-    ``given`` are arrays and tables by the names of the parameters of `simdtex.simulate`, ``about`` the attributes of
-    the values, and ``place`` is None if nothing says where the cells lie. ``put(table, shape, dtype)`` places a table.
-    """
+    """The cells of an output; ``given`` are arrays and tables by parameter; ``put(table, shape, dtype)`` places one."""
 
     training: Pictures
     channel_axis: int | None
@@ -198,11 +189,7 @@ def plan_cells(
     several: Any = "refuse",
     outside: Any = "refuse",
 ) -> Cells:
-    """Check a training image and what is ``given`` in the cells of an output, and return the cells.
-
-    Arrays of xarray get their axes in ascending order. A training image of three axes, without that of the variables,
-    is a volume. ``named`` returns the name of a parameter in messages.
-    """
+    """Check a training image and what is ``given`` in cells of an output; ``named`` names parameters in messages."""
     require("simulate", "xarray")
     from simdtex.figures.show import described
 
@@ -215,7 +202,7 @@ def plan_cells(
     pictures = check_samples(training, channel_axis, given["mask"], axes)
     one_of("several", several, ("refuse", "mean", "most"))
     one_of("outside", outside, ("refuse", "skip"))
-    for name in ("known", *Maps._fields):
+    for name in ("known", *MAP_NAMES):
         if given.get(name) is not None:
             given[name] = as_known(given[name], name, pictures if name == "known" else None)
     sides = _size(shape, given, place, axes, channel_axis)
@@ -242,8 +229,8 @@ def _size(shape: Any, given: dict[str, Any], place: Location | None, axes: int, 
         return shape
     if isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
         return known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
-    shapes = (getattr(given.get(name), "shape", ())[-axes:] for name in Maps._fields)
-    return next((one for one in shapes if len(one) == axes), None)
+    shapes = (getattr(given.get(name), "shape", ())[-axes:] for name in MAP_NAMES)
+    return next((size for size in shapes if len(size) == axes), None)
 
 
 def grid_axes(size: tuple[int, ...], place: Location | None) -> tuple[dict[str, Any], dict[str, float]]:
@@ -270,8 +257,8 @@ def georeferenced(made: Any, place: Location | None) -> Any:
             if axis in found.coords:
                 named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
                 found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
-    for one in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
-        one.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
+    for field in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+        field.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
     return found
 
 

@@ -49,7 +49,7 @@ def write_ensemble(
     categories: Sequence[int] | None = None,
     command: str = "",
 ) -> None:
-    """Write the report of an ensemble: ``index.html``, PNG pictures, ``results.json``.
+    """Write the report of an ensemble: ``index.html``, PNG pictures, ``results.json``; about 3 s for the pictures.
 
     Parameters
     ----------
@@ -63,19 +63,9 @@ def write_ensemble(
     data : array_like, (m, 3), optional
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
-        The values that are categories; by default those of the training image if they are integers and at most 16. An
-        empty sequence means continuous values.
+        The values that are categories, as in `simdtex.jobs.simulation.ensemble.categories_of`.
     command : str
         The command line, if there is one.
-
-    Raises
-    ------
-    ValueError
-        The folder cannot be written, the arrays do not match, or a datum lies outside.
-
-    Notes
-    -----
-    The time is that of `simdtex.jobs.simulation.ensemble` and about 3 s for the pictures.
     """
     check_folder(folder)
     found = summary(np.asarray(ensemble), training, data=data, categories=categories)
@@ -263,9 +253,8 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
         if len(curves) > 1:
             axes.legend(title="category", frameon=False)
         most = max(float(one[-1]) for one in curves)
-        caption = (
-            f"Standard error of the map, over all cells: {most:.2g} after {n} realisations, half of it after {4 * n}."
-        )
+        after = f"{most:.2g} after {n} realisations, half of it after {4 * n}"
+        caption = f"Standard error of the map, over all cells: {after}."
         sections.append(Section("How many realisations", [Figure("error.png", figure, caption)]))
     return sections
 
@@ -289,8 +278,8 @@ def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     legend(figure, panels[0])
     caption = (
         "Vertical proportion curves: the share of each category in each layer, beside the training image's, whose "
+        "layers are stretched to those of the realisations if there are more or fewer."
     )
-    caption += "layers are stretched to those of the realisations if there are more or fewer."
     return Section("Vertical proportions", [Figure("vertical.png", figure, caption)])
 
 
@@ -428,11 +417,7 @@ def _copies(images: Array, own: Array, found: Summary) -> list[Part]:
 
 
 def _index_map(places: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
-    """Return the position of each pixel of a copied window in a training image with ``cols`` columns; -1 elsewhere.
-
-    ``places`` (rows, cols) are those of the windows. A pixel in several windows belongs to the one in whose middle it
-    is.
-    """
+    """Return the position of each pixel of copied windows in a training image with ``cols`` columns; -1 elsewhere."""
     rows, wide = places.shape
     index = np.full((rows + WINDOW - 1, wide + WINDOW - 1), -1, np.int32)
     middle = (WINDOW - 1) / 2
@@ -459,12 +444,7 @@ def write_volumes(
     command: str = "",
     data: Floats | None = None,
 ) -> None:
-    """Write the report of realisations of a volume: ``index.html``, PNG pictures, ``results.json``.
-
-    ``training`` is (layers, rows, cols), and ``ensemble`` (realisations, layers, rows, cols), or that of
-    `simdtex.simulate` with its coordinates. Of categories the last is drawn. ``data`` (m, 4) are hard data: column,
-    row, layer and value. Cost: a few passes over each realisation for every lag, up to a third of the shortest side.
-    """
+    """Write the report of realisations of a volume; ``data`` (m, 4) are hard data: column, row, layer and value."""
     made = uncertainty.named(ensemble, "realisation", *AXES)
     names = np.unique(training) if categorical else np.zeros(0, training.dtype)
     images, drawn = [*made.values, training], names[-1] if categorical else None
@@ -490,9 +470,8 @@ def write_volumes(
 
     def lagged(label: str, functions: list[Any]) -> Figure:
         table = np.moveaxis(np.array(functions), 1, 0)[:, None]
-        caption = (
-            f"{label.capitalize()} of {what} along z, y and x. The training image's line should run inside the band."
-        )
+        of = f"{label.capitalize()} of {what} along z, y and x"
+        caption = f"{of}. The training image's line should run inside the band."
         return Figure(f"{label}.png", _lagged(lags, table, [""], label, made), caption)
 
     variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]

@@ -58,14 +58,8 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     Returns
     -------
     DataArray, (realisation,)
-        Cells times the size of a cell, of a map an area; 0 where the well misses the category. Cells are connected by
-        their sides.
+        Cells, connected by their sides, times the size of a cell, of a map an area; 0 where no well meets the category.
         ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90. P10 is the small one, which is P90 of many reserves.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A point is outside of the cells, or the realisations have other dimensions.
     """
     field, wells = _field(realisations, category), np.atleast_2d(np.asarray(well, np.float64))
     axes = [axis for axis in "zyx" if axis in realisations.dims]
@@ -98,12 +92,9 @@ def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] 
     """
     data = named(data, "z", "y", "x")
     names = np.unique(data.values[_known(data).values]) if categories is None else np.asarray(categories)
-    found = (
-        _field(data, named(names, "category", coords={"category": names}), of="z")
-        .mean(("y", "x"))
-        .transpose("category", ...)
-    )
-    return _described(found, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
+    categorical = _field(data, named(names, "category", coords={"category": names}), of="z")
+    shares = categorical.mean(("y", "x")).transpose("category", ...)
+    return _described(shares, data, "vertical_proportions", f"share of {label(data, 'a category')} in a layer", "")
 
 
 def standard_error(realisations: DataArray, category: float | None = None) -> DataArray:

@@ -144,7 +144,7 @@ def synthesize(
             raise ValueError(
                 "a store keeps the state and the source map of its run; leave checkpoint and full_output out"
             )
-        return store.make(job, rng, device, callback)
+        return store.make(job, store.plan(job, rng), device, callback)
     picture, output = run("synthesize", job, rng, device, callback, checkpoint)
     return (picture, output) if full_output else picture
 

@@ -38,10 +38,7 @@ def here(store: Store, device: str | Machine | None) -> Execute:
 
 
 def across(client: Client, store: Store, device: str | Machine | None, note: Callable[[str], None]) -> Execute:
-    """Return a function that executes tasks on the workers of a cluster; if a worker is lost, another does its task.
-
-    ``note`` receives a sentence when there are no workers.
-    """
+    """Return a function that executes tasks on workers, again if one is lost; ``note`` is told if there are none."""
     what = store.where, store.about["name"], None if device is None else str(device)
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:
@@ -126,10 +123,7 @@ class Cores(WorkerPlugin):
 
 @contextmanager
 def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
-    """Yield a client: of a number of processes on this machine, of the scheduler at an address, or the given one.
-
-    None yields None.
-    """
+    """Yield a client: of processes on this machine, of the scheduler at an address, or the given one or None."""
     if workers is None or not isinstance(workers, (int, str)):
         yield workers
         return

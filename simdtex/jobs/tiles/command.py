@@ -74,13 +74,14 @@ def make_in_tiles(store: TileStore, job: Any) -> None:
     from simdtex.figures.tables import duration_text
 
     given = click.get_current_context().params
+    unsaid = 0 if given["dry_run"] else short_seed()
+    tiles = store.plan(job, unsaid if given["seed"] is None else given["seed"])
     if given["dry_run"] or not given["quiet"]:
-        for line in store.layout(job).lines():
+        for line in tiles.layout.lines():
             click.echo(line, err=not given["dry_run"])
     if not given["dry_run"]:
-        rng = short_seed() if given["seed"] is None else given["seed"]
         with _going_on(store, given["quiet"]) as callback:
-            store.make(job, rng, given["device"], callback)
+            store.make(job, tiles, given["device"], callback)
     elif job.given is None and job.guide is None:  # which have the size of the output
         side = min(CALIBRATED, *job.shape)
         part = replace(job, shape=(side, side))

@@ -16,7 +16,7 @@ import numpy as np
 from simdtex.checkpoint import check_version, warn
 from simdtex.driver import Device, Seed, drive
 from simdtex.io.files import Damaged, NotWritten, atomic_folder, exclusive
-from simdtex.jobs.tiles.layout import Layout, Maps, Outputs, planned
+from simdtex.jobs.tiles.layout import Maps, Outputs, TileLayout, TilePlan, planned
 from simdtex.machine import memory
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.plan import MrfPlan
@@ -30,11 +30,6 @@ if TYPE_CHECKING:
 
 TAKEN = ("image", "source", "checksums", "work")
 """Reserved names in a store, which no map may have."""
-
-PathLike = str | os.PathLike[str]
-
-Ended = Callable[[list[Any], Any, Output, Any], object]
-"""A function of the samples, the image, the rest of the output, and the ``command`` that the store keeps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,33 +69,36 @@ class TileStore:
     plus the redundant work in `layout`. The memory of a worker is that in `layout`, for any size of output.
     """
 
-    path: PathLike
+    path: str | os.PathLike[str]
     side: int = 2048
     workers: int | str | Client | None = None
     source_map: bool = False
     maps: dict[str, Any] | None = None
     note: Callable[[str], None] = warn
-    ended: Ended | None = None
+    ended: Callable[[list[Any], Any, Output, Any], object] | None = None
     command: Any = None
 
-    def layout(self, job: Any) -> Layout:
-        """Return the tiles of a job of `simdtex.jobs.synthesis.job.plan_synthesis`, and the memory and disk they need.
+    def layout(self, job: Any) -> TileLayout:
+        """Return the tiles of a job of `plan_synthesis`, and the memory and disk they need; nothing is written."""
+        return self.plan(job, 0).layout
 
-        Nothing is written.
-        """
-        return self._planned(job, 0)[-1]
+    def plan(self, job: Any, rng: Seed) -> TilePlan:
+        """Return the plan of a job in tiles."""
+        if job.method != "mrf":
+            raise ValueError(f"the method {job.method} needs the whole output at once; give mrf, or make no tiles")
+        plan = job.plan()
+        outputs = Outputs(job.channel_axis is not None, self.source_map, _maps(self.maps or {}, plan))
+        return planned(plan, as_seed(rng), self.side, outputs)
 
-    def make(self, job: Any, rng: Seed, device: Device = None, callback: Callback | None = None) -> Any:
-        """Make the output of a job, and return it; the parameters are those of `layout` and `simdtex.synthesize`."""
-        seed = as_seed(rng)
-        plan, outputs, layout = self._planned(job, seed)
+    def make(self, job: Any, tiles: TilePlan, device: Device = None, callback: Callback | None = None) -> Any:
+        """Make the output of a job, whose `plan` is ``tiles``, and return it as `resume` does."""
         require("distributed", "zarr", "dask", "distributed")
         from simdtex.jobs.tiles.cluster import check_workers, connected
         from simdtex.jobs.tiles.store import Store
 
         check_workers(self.workers, device)
         if self.workers is None or isinstance(self.workers, int):
-            memory.require_host(layout.memory * (self.workers or 1), "give smaller tiles or fewer workers")
+            memory.require_host(tiles.layout.memory * (self.workers or 1), "give smaller tiles or fewer workers")
         path = Path(self.path)
         if path.exists():
             raise ValueError(f"{path} is there already; give another name, or continue with: simdtex resume {path}")
@@ -108,7 +106,7 @@ class TileStore:
             raise ValueError(f"the folder {path.parent} does not exist; make it first")
         with connected(self.workers) as client:
             with atomic_folder(path) as new:
-                Store.create(str(new), plan, seed, outputs, layout, command=self.command, light=job.light.about)
+                Store.create(str(new), tiles, command=self.command, light=job.light.about)
             return replace(self, workers=client).resume(device, callback, channel_axis=job.channel_axis)
 
     def resume(self, device: Device = None, callback: Callback | None = None, *, channel_axis: int | None = -1) -> Any:
@@ -139,7 +137,7 @@ class TileStore:
         """
         store = self._opened()
         from simdtex.jobs.tiles.cluster import across, check_workers, connected, here
-        from simdtex.jobs.tiles.turns import Tiles
+        from simdtex.jobs.tiles.turns import Turns
 
         check_workers(self.workers, device)
         with exclusive(self.path):
@@ -150,7 +148,7 @@ class TileStore:
                 with connected(self.workers) as client, _mending(store):
                     each = here(store, device) if client is None else across(client, store, device, self.note)
                     about = store.about
-                    image, output = drive(Tiles(store, each), Reference(), about["seed"], callback)
+                    image, output = drive(Turns(store, each), Reference(), about["seed"], callback)
                     for name in ("device", "device_seconds"):  # of the leading process
                         del output.statistics[name]
                     output.statistics["light"] = about["light"]
@@ -166,14 +164,6 @@ class TileStore:
     def finished(self) -> bool:
         """Whether the output is complete; raises ValueError if the store holds none, as `resume` does."""
         return bool(self._opened().finished)
-
-    def _planned(self, job: Any, seed: int) -> tuple[MrfPlan, Outputs, Layout]:
-        """Return the plan of a job, the arrays of its output, and its tiles."""
-        if job.method != "mrf":
-            raise ValueError(f"the method {job.method} needs the whole output at once; give mrf, or make no tiles")
-        plan = job.plan()
-        outputs = Outputs(job.channel_axis is not None, self.source_map, _maps(self.maps or {}, plan))
-        return plan, outputs, planned(plan, seed, self.side, outputs)
 
     def _opened(self) -> Any:
         """Return the store; raise ValueError unless this version can continue it."""
@@ -198,7 +188,7 @@ class TileStore:
 
 def _maps(maps: dict[str, Any], plan: MrfPlan) -> Maps:
     """Return further maps as lists, with one map for each picture of the sample; raise if they do not fit."""
-    found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
+    listed, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:
         raise ValueError("the maps have no values for known pixels, which are not from the sample; leave the maps out")
     for name, given in maps.items():
@@ -208,16 +198,13 @@ def _maps(maps: dict[str, Any], plan: MrfPlan) -> Maps:
         if len(sizes) == 1:
             last, given = last[..., :2], given[0] if isinstance(given, (list, tuple)) else given
         apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
-        found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
-    return found
+        listed[name] = [np.asarray(picture) for picture in (given if len(sizes) > 1 else [given])]
+    return listed
 
 
 @contextmanager
 def _mending(store: Any) -> Iterator[None]:
-    """Raise an error that names the remedy if a part of a store is damaged or cannot be written.
-
-    The store has then returned to a turn that does not need the damaged part.
-    """
+    """Raise an error that names the remedy if a part of a store, which has gone back, is damaged or not written."""
     try:
         yield
     except NotWritten as error:
@@ -225,9 +212,8 @@ def _mending(store: Any) -> Iterator[None]:
     except Damaged as error:
         where, part = store.where, str(error)
         if not os.path.exists(os.path.join(where, "zarr.json")):
-            raise ValueError(
-                f"{where} was removed or moved while the run went on; put it back, or begin anew"
-            ) from None
+            gone = f"{where} was removed or moved while the run went on"
+            raise ValueError(f"{gone}; put it back, or begin anew") from None
         wrong, again = f"{part} of {where} is missing or damaged", store.back(part)
         if again is None:
             raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None

@@ -26,9 +26,7 @@ TASKS = 2**14
 """The most tasks of a turn, since one process distributes them and reads their notes."""
 
 PROCESS = 2**30
-"""Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
-
-Once they are compiled it is 400 MiB (``benchmarks/tiles.py``)."""
+"""Bytes of an idle worker that compiles kernels; then it needs 400 MiB (``benchmarks/tiles.py``)."""
 
 SITE = 110, 12
 """Bytes of a worker for each site of a window, and for each channel of a site (measured; see the docs)."""
@@ -66,11 +64,7 @@ class Tile(NamedTuple):
 
 @dataclass(frozen=True)
 class LevelLayout:
-    """A level in tiles of ``side`` x ``side`` sites; the last row and column of tiles may be smaller.
-
-    ``number`` 0 is the finest level. A sweep of a tile also reads ``halo`` sites around it: the number of groups of the
-    schedule times the radius of the neighbourhood.
-    """
+    """A level, 0 the finest, in tiles of ``side`` sites a side; a sweep of a tile reads ``halo`` sites around it."""
 
     number: int
     rows: int
@@ -137,16 +131,13 @@ class LevelLayout:
 
     @property
     def redundant(self) -> float:
-        """Repeated relaxations of a tile that touches no edge, divided by its required ones.
-
-        A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
-        """
+        """Repeated relaxations of a tile that touches no edge, divided by its required ones."""
         rows, cols, (down, across) = min(self.side, self.rows), min(self.side, self.cols), self.window
         return (down if down == self.rows else (rows + down) // 2) * across / (rows * cols) - 1
 
 
 @dataclass(frozen=True)
-class Layout:
+class TileLayout:
     """An output in tiles.
 
     Attributes
@@ -169,21 +160,28 @@ class Layout:
 
     def lines(self) -> list[str]:
         """Return a line of text for each level, and one for memory and disk."""
-        found = [
-            f"level {one.number}: {one.cols}x{one.rows} sites in {one.count} tile{'s' * (one.count > 1)} of "
-            f"{min(one.side, one.cols)}x{min(one.side, one.rows)}"
-            + (f", halo {one.halo}, {100 * one.redundant:.1f} % redundant work" if one.count > 1 else "")
-            for one in reversed(self.levels)
+        lines = [
+            f"level {level.number}: {level.cols}x{level.rows} sites in {level.count} tile{'s' * (level.count > 1)} of "
+            f"{min(level.side, level.cols)}x{min(level.side, level.rows)}"
+            + (f", halo {level.halo}, {100 * level.redundant:.1f} % redundant work" if level.count > 1 else "")
+            for level in reversed(self.levels)
         ]
         memory, disk = (size / 2**20 for size in (self.memory, self.disk))
-        return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
+        return [*lines, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def planned(plan: MrfPlan, seed: int, side: int, outputs: Outputs) -> Layout:
-    """Return the layout of ``outputs`` in tiles of at most ``side`` sites on a side.
+@dataclass(frozen=True, eq=False)
+class TilePlan:
+    """The plan of an output in tiles, with its ``seed``, the arrays of the output, and the layout of the tiles."""
 
-    Raises ValueError if the schedule relaxes a window otherwise than the whole, or if there are too many tiles.
-    """
+    plan: MrfPlan
+    seed: int
+    outputs: Outputs
+    layout: TileLayout
+
+
+def planned(plan: MrfPlan, seed: int, side: int, outputs: Outputs) -> TilePlan:
+    """Return the plan of an output in tiles of at most ``side`` sites a side; raise if the whole is needed at once."""
     whole("side of tiles", side, 1)
     options, schedule = plan.options, plan.schedule
     if not isinstance(options.schedule, str):
@@ -202,7 +200,7 @@ def planned(plan: MrfPlan, seed: int, side: int, outputs: Outputs) -> Layout:
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
     shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in outputs.arrays(plan).values())
     disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + shown_bytes))
-    return Layout(levels, channels, memory, disk)
+    return TilePlan(plan, seed, outputs, TileLayout(levels, channels, memory, disk))
 
 
 def _level(plan: MrfPlan, seed: int, number: int, side: int) -> LevelLayout:

@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.checkpoint import read_state, write_state
 from simdtex.io.files import Damaged, write_durable
-from simdtex.jobs.tiles.layout import Layout, LevelLayout, Outputs, Tile, planned
+from simdtex.jobs.tiles.layout import LevelLayout, Outputs, Tile, TilePlan, planned
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
@@ -118,20 +118,15 @@ each candidate and the sites of each kind in each region."""
 
 
 class Turn(NamedTuple):
-    """An operation on every tile.
-
-    ``number``, from 1; ``phase``: ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or
-    ``"done"``; ``level``; the level's ``cooling`` and ``free`` sweeps so far; its current ``active`` sites, and their
-    ``temperature_sum``.
-    """
+    """An operation on every tile, ``number`` from 1: begin a level, all of a level of one tile, sweep, or show."""
 
     number: int
-    phase: str
+    phase: str  # "begin", "whole", "sweep", "show" or "done"
     level: int
-    cooling: int = 0
+    cooling: int = 0  # sweeps of the level so far
     free: int = 0
-    active: int = 0
-    temperature_sum: int = 0
+    active: int = 0  # sites of the level
+    temperature_sum: int = 0  # of these
 
     @property
     def reads(self) -> int:
@@ -139,21 +134,14 @@ class Turn(NamedTuple):
         return self.level + (self.phase in ("begin", "whole"))
 
 
-class Work(NamedTuple):
-    """The ``plan`` of a store, without conditioning data, its ``seed``, ``outputs``, and the ``layout`` of its tiles.
+@dataclass(frozen=True, eq=False)
+class Work(TilePlan):
+    """The plan of a store, without the data and guides of the output, and what it needs of these."""
 
-    ``confidences``: those of the conditions; ``held``: whether there are conditioning data or guides; ``given``:
-    whether there are data; ``scattered``: the data between the sites, for each level that has such.
-    """
-
-    plan: MrfPlan
-    seed: int
-    outputs: Outputs
-    layout: Layout
     confidences: Confidences
-    held: bool
-    given: bool
-    scattered: dict[str, Data]
+    held: bool  # there are data or guides
+    given: bool  # there are data
+    scattered: dict[str, Data]  # between the sites, for each level that has such
 
 
 class Files(zarr.storage.LocalStore):
@@ -241,13 +229,13 @@ class Store:
             self.root = zarr.open_group(self._files, mode="a")
 
     @staticmethod
-    def create(where: str, plan: MrfPlan, seed: int, outputs: Outputs, layout: Layout, **about: Any) -> Store:
+    def create(where: str, tiles: TilePlan, **about: Any) -> Store:
         """Make a store, ready for its first turn, and return it; ``about`` are JSON types that it keeps."""
         zarr.open_group(Files(where), mode="w-")
         store, held, scattered = Store(where), False, {}
         store._files.name = secrets.token_hex(8)
         store.root.create_group("work")
-        given = plan.given
+        plan, layout, given = tiles.plan, tiles.layout, tiles.plan.given
         conditions = Conditioning(plan)
         for level in layout.levels:
             part = plan.of(level.number)
@@ -263,9 +251,9 @@ class Store:
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
-        about |= {"format": FORMAT, "version": version("simdtex"), "seed": seed}
+        about |= {"format": FORMAT, "version": version("simdtex"), "seed": tiles.seed}
         conditioned = list(conditions.confidences), held, given is not None, scattered
-        store._keep("run", about, [described(plan), list(outputs), layout.levels[0].side, *conditioned])
+        store._keep("run", about, [described(plan), list(tiles.outputs), layout.levels[0].side, *conditioned])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
 
@@ -278,10 +266,9 @@ class Store:
     def work(self) -> Work:
         """The plan and its data."""
         about, (tree, outputs, side, confidences, held, given, scattered) = self._state("run")
-        plan, seed, more = restored(tree), about["seed"], Outputs(*outputs)
         between = {number: Data(*data) for number, data in scattered.items()}
-        layout = planned(plan, seed, side, more)
-        return Work(plan, seed, more, layout, Confidences(*confidences), held, given, between)
+        tiles = planned(restored(tree), about["seed"], side, Outputs(*outputs))
+        return Work(**vars(tiles), confidences=Confidences(*confidences), held=held, given=given, scattered=between)
 
     @property
     def finished(self) -> bool:
@@ -336,7 +323,7 @@ class Store:
     def samples(self) -> list[NDArray[Any]]:
         """Return the pictures of the sample, with a channel axis if the image has one."""
         pixels = self.work.plan.sample.pictures.pixels
-        return [one if self.work.outputs.channels else one[..., 0] for one in pixels]
+        return [picture if self.work.outputs.channels else picture[..., 0] for picture in pixels]
 
     def finish(self) -> None:
         """Note that the output is complete, with its description."""
@@ -451,7 +438,7 @@ class Store:
         """Return the position of the checksums of an output tile, and the checksums in its chunks."""
         sides = self._at("image").chunks
         rows, cols = (
-            slice(one.start // side, -(-one.stop // side)) for one, side in zip(spans(tile), sides, strict=False)
+            slice(span.start // side, -(-span.stop // side)) for span, side in zip(spans(tile), sides, strict=False)
         )
         places = [(row, col) for row in range(rows.start, rows.stop) for col in range(cols.start, cols.stop)]
         found = np.array([[self._checksum(name, *place) for place in places] for name in names], np.uint32)
@@ -482,11 +469,11 @@ class Store:
     def _cut(self, name: str, number: int, window: Tile) -> NDArray[Any]:
         """Return a window of an array (..., rows, cols) over the sites of a level, which may cross the seam."""
         array, level = self._at(name), self.work.layout.levels[number]
-        found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
+        plane = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
         for rows, down in _parts(window.top, window.rows, level.rows):
             for cols, right in _parts(window.left, window.cols, level.cols):
-                found[..., down, right] = array[..., rows, cols]
-        return found
+                plane[..., down, right] = array[..., rows, cols]
+        return plane
 
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)

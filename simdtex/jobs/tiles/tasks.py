@@ -36,10 +36,7 @@ def context(where: str, name: str, device: str | Machine | None) -> tuple[Store,
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
-    """Execute a turn of a task's tiles, unless it is done and its data are undamaged; return the number of the task.
-
-    ``where`` and ``name`` are the store's path and name, since the path may later hold another store.
-    """
+    """Execute a turn of a task's tiles, unless it is done and its data are undamaged; return the number of the task."""
     with _one:
         store, run = context(where, name, device)
         if not store.done(turn, task):

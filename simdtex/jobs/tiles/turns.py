@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from math import sqrt
 from typing import Any
@@ -27,25 +26,19 @@ SHOWN = 1024
 """The largest side of the picture of a callback, sites."""
 
 
-@dataclass(frozen=True)
-class Tiles:
-    """The plan of an output in tiles: its store, and the function that executes tasks."""
+class Turns:
+    """The turns of an output, the plan and its run at once: the state is the current turn, which the store keeps."""
 
-    store: Store
-    execute: Execute
+    lattices: Lattices
+
+    def __init__(self, store: Store, execute: Execute) -> None:
+        self.store, self.execute, self.levels = store, execute, store.work.layout.levels
 
     def on(self, machine: Machine, seed: int) -> Turns:
         """Return the run of the leading process, which has the sample and a count for each of its candidates."""
-        return Turns(self, machine)
-
-
-class Turns:
-    """The turns of an output; the state is the current turn, which the store keeps."""
-
-    def __init__(self, tiles: Tiles, machine: Machine) -> None:
-        self.store, self.execute, work = tiles.store, tiles.execute, tiles.store.work
-        self.levels = work.layout.levels
+        work = self.store.work
         self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store))
+        return self
 
     def begin(self) -> Turn:
         """Return the current turn of the store."""

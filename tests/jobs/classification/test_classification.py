@@ -46,52 +46,38 @@ def colour(image):
     return np.stack([image, image // 2, 255 - image], -1)
 
 
-def test_labels_are_bytes_and_the_classes_are_numbered_from_1():
-    labels = classify(unknown=0.0)
+def test_labels_are_bytes_and_the_output_tells_the_classes():
+    seen = []
+    labels, output = classify(unknown=0.0, full_output=True, callback=seen.append)
     assert (labels.dtype, labels.shape) == (np.uint8, (24, 40))
-    assert (labels == TRUTH).mean() > 0.9
-    swapped = classify(textures=dict(reversed(TEXTURES.items())), unknown=0.0)
-    assert (swapped == 3 - TRUTH).mean() > 0.9
-
-
-def test_the_output_tells_the_classes():
-    labels, output = classify(full_output=True)
-    found = output.statistics["classes"]
-    assert [one["name"] for one in found] == ["unknown", "left", "right"]
-    assert [one["label"] for one in found] == [0, 1, 2]
-    assert sum(one["share"] for one in found) == pytest.approx(1)
+    assert (labels == TRUTH).mean() > 0.9 and (labels == output.made[..., 0]).all()
+    classes = output.statistics["classes"]
+    assert [(one["label"], one["name"]) for one in classes] == [(0, "unknown"), (1, "left"), (2, "right")]
+    assert [one["share"] for one in classes] == [(labels == label).mean() for label in range(3)]
     assert output.fit.shape == output.probability.shape == (24, 40, 2)
-    assert output.statistics["seed"] == 1 and output.made[..., 0] is not None
-    assert "24x40" in repr(output)
-    assert (labels == output.made[..., 0]).all()
+    assert output.fit.min() >= 0 and output.fit.max() <= 1
+    assert abs(output.probability.sum(-1) - 1).max() < 1e-6
+    assert (output.probability.argmax(-1) + 1 == labels).mean() > 0.95
+    assert output.statistics["seed"] == 1 and "24x40" in repr(output)
+    assert [one.fraction for one in seen] == sorted(one.fraction for one in seen)
+    assert seen[0].doing == "compared 100 %" and seen[1].doing == "sweep 1"
+    assert set(np.unique(seen[-1].image())) <= {1, 2}
 
 
-@pytest.mark.parametrize("axis", [0, -1])
-def test_channels_may_be_on_any_axis(axis):
-    def placed(image):
-        return np.moveaxis(colour(image), -1, axis)
-
-    textures = {name: placed(one) for name, one in TEXTURES.items()}
-    labels = classify(placed(PICTURE), textures, channel_axis=axis, unknown=0.0)
+def test_channels_may_be_on_any_axis_and_several_samples_make_one_class():
+    textures = {"left": [LEFT[:12], LEFT[10:]], "right": [RIGHT]}
+    placed = {name: [np.moveaxis(colour(one), -1, 0) for one in several] for name, several in textures.items()}
+    labels = classify(np.moveaxis(colour(PICTURE), -1, 0), placed, channel_axis=0, unknown=0.0)
     assert (labels == TRUTH).mean() > 0.9
 
 
-@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64, np.bool_])
+@pytest.mark.parametrize("dtype", [np.int16, np.float32, np.bool_])
 def test_any_real_type(dtype):
     def converted(image):
-        if dtype == np.bool_:
-            return image > 60
-        return (image.astype(np.float64) * 100 - 50).astype(dtype)
+        return image > 60 if dtype == np.bool_ else (image.astype(np.float64) * 100 - 50).astype(dtype)
 
     textures = {name: converted(one) for name, one in TEXTURES.items()}
     assert (classify(converted(PICTURE), textures, unknown=0.0) == TRUTH).mean() > 0.85
-
-
-def test_several_samples_make_one_class():
-    parts = {"left": [LEFT[:12], LEFT[10:]], "right": [RIGHT]}
-    assert (classify(textures=parts, unknown=0.0) == TRUTH).mean() > 0.9
-    both = {"all": [LEFT, RIGHT]}
-    assert (classify(textures=both, unknown=0.0) == 1).all()
 
 
 def test_masked_parts_of_a_sample_are_not_used():
@@ -101,10 +87,6 @@ def test_masked_parts_of_a_sample_are_not_used():
     assert (labels == TRUTH).mean() > 0.9
     hidden = {name: np.ma.MaskedArray(PICTURE, ~mask) for name, mask in masks.items()}
     assert (classify(textures=hidden, unknown=0.0) == labels).mean() > 0.95
-    spoiled = LEFT.astype(np.float32)
-    spoiled[3:6, 3:6] = np.nan
-    textures = {"left": spoiled, "right": RIGHT.astype(np.float32)}
-    assert (classify(PICTURE.astype(np.float32), textures, unknown=0.0) == TRUTH).mean() > 0.9
 
 
 def test_pixels_without_a_value_are_unknown():
@@ -135,15 +117,6 @@ def test_training_regions_are_painted_on_the_picture():
     assert (labels == np.array([0, 3, 7])[TRUTH]).mean() > 0.9
     found = output.statistics["classes"]
     assert [(one["label"], one["name"]) for one in found] == [(0, "unknown"), (3, "3"), (7, "7")]
-    assert [one["share"] for one in found] == [(labels == label).mean() for label in (0, 3, 7)]
-
-
-def test_a_callback_sees_labels():
-    seen = []
-    classify(callback=seen.append)
-    assert [one.fraction for one in seen] == sorted(one.fraction for one in seen)
-    assert seen[0].doing == "compared 100 %" and seen[1].doing == "sweep 1"
-    assert set(np.unique(seen[-1].image())) <= {1, 2}
 
 
 def test_the_estimator_is_trained_once():
@@ -179,12 +152,8 @@ def test_scikit_learn_takes_the_estimator_for_a_classifier():
     assert is_classifier(found) and get_tags(found).target_tags.required
     with pytest.warns(SkipTestWarning, match="requires input"):
         assert {one["status"] for one in estimator_checks.check_estimator(found)} == {"passed"}
-    name = "TextureClassifier"
-    estimator_checks.check_valid_tag_types(name, found)
-    estimator_checks.check_estimator_repr(name, found)
-    estimator_checks.check_get_params_invariance(name, found)
-    estimator_checks.check_set_params(name, found)
-    estimator_checks.check_parameters_default_constructible(name, found)
+    for check in ("valid_tag_types", "estimator_repr", "set_params", "parameters_default_constructible"):
+        getattr(estimator_checks, f"check_{check}")("TextureClassifier", found)
     pipeline = make_pipeline(FunctionTransformer(np.flipud), found)
     with pytest.raises(NotFittedError):
         pipeline.predict(PICTURE)
@@ -203,9 +172,8 @@ numpy.save(labels, joblib.load(file).predict(numpy.load(picture)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(machine, tmp_path, dtype):
-    picture = PICTURE.astype(dtype)
+def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(machine, tmp_path):
+    picture = PICTURE.astype(np.float32)
     found = simdtex.TextureClassifier(**QUICK | {"device": machine, "levels": 1}).fit(picture, STROKES)
     labels, size = found.predict(picture), len(pickle.dumps(found))
     for copied in (copy.deepcopy(found), pickle.loads(pickle.dumps(found)), clone(found).fit(picture, STROKES)):
@@ -222,77 +190,44 @@ def test_a_trained_estimator_labels_the_same_as_a_copy_and_in_another_process(ma
 
 
 BAD = {
-    "no class": ({"textures": {}}, ValueError, "there are 0 classes; give 1 to 254"),
+    "no class": ({"textures": {}}, "there are 0 classes; give 1 to 254"),
     "another type": (
-        {"textures": {"a": LEFT.astype(np.float32)}},
-        ValueError,
-        "class 'a' has 1 channel of float32 and the picture 1 channel of uint8; convert them to one type",
+        {"textures": {"a": LEFT * 0.5}},
+        "class 'a' has 1 channel of float64 and the picture 1 channel of",
     ),
-    "another number of axes": ({"textures": {"a": colour(LEFT)}}, ValueError, "class 'a': the sample is 3-dimensional"),
-    "an empty sample": ({"textures": {"a": LEFT[:0]}}, ValueError, "class 'a': the sample is empty"),
-    "a tiny sample": ({"textures": {"a": LEFT[:5, :7]}}, ValueError, "class 'a' has 3 whole neighbourhoods of 5x5"),
-    "the name unknown": ({"textures": {"unknown": LEFT}}, ValueError, "'unknown' is no name of a class"),
-    "a name that is no text": ({"textures": {3: LEFT}}, ValueError, "3 is no name of a class"),
+    "a tiny sample": ({"textures": {"a": LEFT[:5, :7]}}, "class 'a' has 3 whole neighbourhoods of 5x5"),
+    "the name unknown": ({"textures": {"unknown": LEFT}}, "'unknown' is no name of a class"),
+    "a name that is no text": ({"textures": {3: LEFT}}, "3 is no name of a class"),
     "a mask of another size": (
-        {"masks": {"left": np.ones((3, 3), bool)}},
-        ValueError,
+        {"masks": {"left": LEFT[:3, :3] > 0}},
         "class 'left': mask is 3x3 and the picture 18x20",
     ),
-    "a mask for no class": (
-        {"masks": {"lft": LEFT > 0}},
-        ValueError,
-        "masks name the class 'lft', which textures do not",
-    ),
-    "masks too many": ({"masks": {"left": [LEFT[:18] > 0] * 2}}, ValueError, "class 'left' has 1 samples and 2 masks"),
-    "validation of no class": ({"validation": {"x": LEFT}}, ValueError, "validation name the class 'x'"),
-    "strokes and masks": ({"textures": STROKES, "masks": {"a": LEFT}}, ValueError, "belong to samples by name"),
-    "strokes of another shape": ({"textures": STROKES[:3]}, ValueError, r"give integers of the shape \(24, 40\)"),
-    "strokes of floats": ({"textures": STROKES * 0.5}, ValueError, "the training regions are float64"),
-    "negative strokes": ({"textures": STROKES - 1}, ValueError, "have the label -1; give 0 or more"),
-    "a large label": ({"textures": STROKES * 100}, ValueError, "have the label 700; give 254 at most"),
-    "a stroke of one pixel": (
-        {"textures": np.where(np.arange(960).reshape(24, 40) == 500, 1, STROKES)},
-        ValueError,
-        "label 1 is painted on 1 pixels; paint 16 or more",
-    ),
-    "no stroke": ({"textures": STROKES * 0}, ValueError, "there are 0 classes"),
+    "masks too many": ({"masks": {"left": [LEFT[:18] > 0] * 2}}, "class 'left' has 1 samples and 2 masks"),
+    "validation of no class": ({"validation": {"x": LEFT}}, "validation name the class 'x'"),
+    "strokes and masks": ({"textures": STROKES, "masks": {"a": LEFT}}, "belong to samples by name"),
+    "strokes of another shape": ({"textures": STROKES[:3]}, r"give integers of the shape \(24, 40\)"),
+    "strokes of floats": ({"textures": STROKES * 0.5}, "the training regions are float64"),
+    "negative strokes": ({"textures": STROKES - 1}, "have the label -1; give 0 or more"),
+    "a large label": ({"textures": STROKES * 100}, "have the label 700; give 254 at most"),
+    "a stroke of one row": ({"textures": STROKES * (np.arange(24) == 9)[:, None]}, "painted on 10 pixels; paint 16 or"),
     "too many bands": (
-        {
-            "image": np.zeros((9, 9, 15), np.uint8),
-            "textures": {"a": np.zeros((9, 9, 15), np.uint8)},
-            "channel_axis": -1,
-        },
-        ValueError,
+        {"image": np.zeros((9, 9, 15)), "textures": {"a": np.zeros((9, 9, 15))}, "channel_axis": -1},
         "the picture has 15 bands; give 14 at most",
     ),
     "too many values": (
-        {
-            "image": np.zeros((40, 40, 2), np.uint8),
-            "textures": {"a": np.zeros((40, 40, 2), np.uint8)},
-            "channel_axis": -1,
-            "order": 45,
-        },
-        ValueError,
+        {"image": np.zeros((40, 40, 2)), "textures": {"a": np.zeros((40, 40, 2))}, "channel_axis": -1, "order": 45},
         "order=45 with 2 bands compares 290 values; give a smaller order, so that there are 258 at most",
     ),
-    "an unknown option": (
-        {"orders": 3},
-        TypeError,
-        "unknown option 'orders' of the method 'classification' .did you mean",
-    ),
-    "a misspelt input": ({"mask": {}}, TypeError, "did you mean 'masks'"),
-    "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),
-    "an option out of range": ({"unknown": 2}, ValueError, "unknown is 2; give at most 1"),
-    "a schedule of many steps": ({"schedule": "raster"}, ValueError, "takes more than 64 steps"),
+    "a misspelt input": ({"mask": {}}, "did you mean 'masks'"),
+    "a schedule of many steps": ({"schedule": "raster"}, "takes more than 64 steps"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_is_wrong_is_said(case):
-    options, kind, words = BAD[case]
-    with pytest.raises(kind, match=words) as caught:
+    options, words = BAD[case]
+    with pytest.raises((TypeError, ValueError), match=words):
         classify(**options)
-    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_the_estimator_says_what_is_wrong():
@@ -338,47 +273,26 @@ def run(*args):
 def test_the_command_gives_the_bytes_of_the_function(folder):
     result = run("picture.png", *SAMPLES, "-o", "labels.png", "--confidence", "fit.tif", "--unknown", 0.02)
     assert result.exit_code == 0, result.output
-    wanted, output = simdtex.classify(
-        PICTURE_RGB,
-        {"left": LEFT_RGB[:18], "right": RIGHT_RGB[6:]},
-        channel_axis=-1,
-        rng=5,
-        device="reference",
-        full_output=True,
-        unknown=0.02,
-        **OPTIONS,
-    )
+    textures, how = {"left": LEFT_RGB[:18], "right": RIGHT_RGB[6:]}, {"rng": 5, "device": "reference"} | OPTIONS
+    wanted, output = simdtex.classify(PICTURE_RGB, textures, channel_axis=-1, unknown=0.02, full_output=True, **how)
     assert (read_labels("labels.png") == wanted).all()
+    with PIL.Image.open("labels.png") as shown:  # viewers see colours, and programs numbers
+        assert (np.asarray(shown.convert("RGB")) == label_colours(256)[wanted]).all()
     assert (image.read("fit.tif").pixels == output.fit).all()
     shares = [f"{one['name']} {one['share']:.1%}" for one in output.statistics["classes"]]
     assert result.output.startswith("labels.png: 40x24, 2 classes in ") and "seed 5\n" in result.output
     assert result.output.endswith(f"{', '.join(shares)}\n")
 
 
-def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
-    assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
-    labels = read_labels("labels.png")
-    with PIL.Image.open("labels.png") as shown:
-        assert (np.asarray(shown.convert("RGB")) == label_colours(256)[labels]).all()
-    assert run("picture.png", *SAMPLES, "-o", "labels.tif", "--unknown", 0).exit_code == 0
-    assert (image.read("labels.tif").pixels == labels).all()
-
-
 @pytest.mark.slow
 def test_labels_are_a_training_image(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
-    labels, common = read_labels("labels.png")[::-1], ["--categorical", "--order", 2, "--device", "reference"]
-    words = ["simulate", "labels.png", "-o", "many.npz", "--seed", 5, *common]
-    result = CliRunner().invoke(main, [*map(str, words)])
-    assert result.exit_code == 0, result.output
-    wanted = simdtex.simulate(labels, 1, categorical=True, order=2, rng=5, device="reference")
-    assert (np.load("many.npz")["values"] == wanted.values).all()
     write_labels("known.png", np.where(np.arange(40) < 20, 1, 2).astype(np.uint8) * np.ones((24, 1), np.uint8))
     with PIL.Image.open("known.png") as picture:
         picture.save("known.png", transparency=2)
     words = ["estimate", "labels.png", "-o", "maps.npz", "--known", "known.png", "--categorical"]
     assert CliRunner().invoke(main, [*words, "--device", "reference"]).exit_code == 0
-    known = np.ma.masked_equal(read_labels("known.png")[::-1], 0)
+    labels, known = read_labels("labels.png")[::-1], np.ma.masked_equal(read_labels("known.png")[::-1], 0)
     wanted = simdtex.estimate(labels, known=known, categorical=True, device="reference")
     assert (np.load("maps.npz")["probability"] == wanted.probability.values).all()
 
@@ -406,17 +320,9 @@ def test_several_samples_of_a_class_and_transparent_parts(folder):
     result = run("picture.png", *words, "-o", "labels.png", "--unknown", 0)
     assert result.exit_code == 0, result.output
     hidden = np.ma.MaskedArray(PICTURE_RGB, np.arange(40)[None, :, None].repeat(24, 0).repeat(3, 2) >= 20)
-    textures = {"left": [hidden, LEFT_RGB[:18]], "right": RIGHT_RGB[6:]}
-    wanted = simdtex.classify(
-        PICTURE_RGB,
-        textures,
-        validation={"right": RIGHT_RGB[6:]},
-        channel_axis=-1,
-        rng=5,
-        device="reference",
-        unknown=0.0,
-        **OPTIONS,
-    )
+    textures, how = {"left": [hidden, LEFT_RGB[:18]], "right": RIGHT_RGB[6:]}, {"rng": 5, "device": "reference"}
+    how |= {"validation": {"right": RIGHT_RGB[6:]}, "channel_axis": -1, "unknown": 0.0}
+    wanted = simdtex.classify(PICTURE_RGB, textures, **how, **OPTIONS)
     assert (read_labels("labels.png") == wanted).all()
 
 
@@ -437,13 +343,6 @@ def test_the_report_shows_labels_fits_and_the_confusion(folder):
     assert {"labels.png", "fit.png"} <= {path.name for path in (folder / "page").iterdir()}
 
 
-def test_the_report_shows_a_grey_picture(folder):
-    result = run("grey.png", "--texture", "left=grey.png", "-o", "labels.png", "--report", "page", "--unknown", 0)
-    assert result.exit_code == 0, result.output
-    shown = image.read(folder / "page/labels.png").pixels.reshape(-1, 3)
-    assert set(map(tuple, np.repeat(LEFT_RGB[..., 0].reshape(-1, 1), 3, 1))) <= set(map(tuple, shown))
-
-
 def test_confusion_leaves_out_what_is_not_known():
     truth = np.array([[0, 1, 1], [2, 2, 255]])
     assert confusion_matrix(np.array([[0, 1, 2], [2, 2, 1]]), truth, 3).tolist() == [[1, 0, 0], [0, 1, 1], [0, 0, 2]]
@@ -455,14 +354,11 @@ BAD_COMMAND = {
         ["--strokes", "strokes.png", "--validation", "left=left.png"],
         "--validation requires --texture; leave it out",
     ),
-    "both": ([*SAMPLES, "--strokes", "strokes.png"], "give --texture once for each class, or --strokes"),
-    "no name": (["--texture", "left.png"], "--texture 'left.png' must be NAME=FILE"),
     "a name twice": ([*SAMPLES, "--texture", "left=cut.png"], "names left twice; give left=FILE0,FILE1"),
     "grey": (["--texture", "left=grey.png"], "grey.png has 1 channel of uint8 and picture.png 3 channels of uint8"),
     "truth of another size": ([*SAMPLES, "--truth", "small.png"], "small.png is 40x3 and picture.png 40x24"),
     "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give labels of the classes, 0"),
     "colours for strokes": (["--strokes", "picture.png"], "picture.png is no picture of labels"),
-    "fits in a png": ([*SAMPLES, "--confidence", "fit.png"], "fit.png ends in .png: end its name in one of .npy"),
 }
 
 

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import tolerances
 from cases import REFERENCE, assert_same_bits, opencl, texture
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.special import softmax
 from scipy.stats import multivariate_normal
@@ -34,56 +32,37 @@ from simdtex.model.scale import Scale
 TOP = 4080
 
 
-def run(machine, levels, sites, offsets, contrast):
-    arrays = [np.asarray(levels, np.uint16), np.asarray(sites, np.int32), np.asarray(offsets, np.int32)]
-    return machine.get(features(machine, *map(machine.put, arrays), contrast))
-
-
-def mirrored(i, n):
-    while not 0 <= i < n:
-        i = -i if i < 0 else 2 * n - 2 - i
-        if n == 1:
-            i = 0
-    return i
+def made(machine, operation, *values):
+    """The result of an operation, whose arrays are put on the machine."""
+    values = (machine.put(one) if isinstance(one, np.ndarray) else one for one in values)
+    return machine.get(operation(machine, *values))
 
 
 def plain(levels, sites, offsets, contrast):
-    """One neighbourhood after another, in float64."""
-    bands, rows, cols = levels.shape
-    found = []
-    for site in sites:
-        i, j = divmod(int(site), cols)
-        values = np.array(
-            [[levels[b, mirrored(i + y, rows), mirrored(j + x, cols)] / 16 for y, x in offsets] for b in range(bands)]
-        )
-        if contrast:
-            z = values - values.mean(1, keepdims=True)
-            size = np.sqrt((z * z).sum())
-            # below 1 the size is taken for its square
-            shown, inverse = (size, 1 / size) if size > 1 else (size * size, 1)
-            values = z * 40 * np.log1p(shown / 5) * inverse
-        found.append(values.ravel())
-    return np.array(found).T
+    """Neighbourhoods in float64, (B * N, S), mirrored beyond the border."""
+    pad = np.pad(levels, ((0, 0), (8, 8), (8, 8)), "reflect") / 16
+    row, col = np.divmod(sites, levels.shape[2])
+    values = np.stack([pad[:, 8 + row + y, 8 + col + x] for y, x in offsets], 1)
+    if contrast:
+        z = values - values.mean(1, keepdims=True)
+        size = np.sqrt((z * z).sum((0, 1)))
+        # below 1 the size is taken for its square
+        shown, inverse = np.where(size > 1, (size, 1 / np.maximum(size, 1)), (size * size, size * 0 + 1))
+        values = z * 40 * np.log1p(shown / 5) * inverse
+    return values.reshape(-1, len(sites))
 
 
-@st.composite
-def cases(draw):
-    bands, rows, cols = draw(st.integers(1, 3)), draw(st.integers(1, 7)), draw(st.integers(1, 7))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    spread = draw(st.sampled_from([1, 8, 300, TOP]))
-    levels = rng.integers(0, spread, (bands, rows, cols), endpoint=True) + rng.integers(0, TOP - spread, endpoint=True)
-    sites = rng.integers(0, rows * cols, draw(st.integers(1, 40)))
-    offsets = np.concatenate([[[0, 0]], rng.integers(-4, 4, (draw(st.integers(1, 12)), 2), endpoint=True)])
-    return levels, sites, offsets
-
-
-@given(cases(), st.booleans())
-@settings(max_examples=60)
-def test_the_reference_is_the_formula(case, contrast):
-    found, exact = run(REFERENCE, *case, contrast), plain(*case, contrast)
-    assert found.dtype == np.float32
-    assert (found == np.rint(found)).all()
-    assert abs(found - exact).max() <= tolerances.HALF + tolerances.GAIN
+@pytest.mark.parametrize("contrast", [False, True])
+def test_the_reference_is_the_formula(contrast):
+    rng = np.random.default_rng(1)
+    for bands, rows, cols, spread in ((1, 1, 1, 8), (3, 7, 5, TOP), (2, 2, 7, 300), (1, 6, 1, 1), (2, 5, 6, 8)):
+        levels = rng.integers(0, spread, (bands, rows, cols), np.uint16, True)
+        levels += rng.integers(0, TOP - spread, (), np.uint16, True)
+        sites = rng.integers(0, rows * cols, 40, np.int32)
+        offsets = np.concatenate([np.zeros((1, 2), np.int32), rng.integers(-4, 4, (9, 2), np.int32, True)])
+        found = made(REFERENCE, features, levels, sites, offsets, contrast)
+        assert found.dtype == np.float32 and (found == np.rint(found)).all()
+        assert abs(found - plain(levels, sites, offsets, contrast)).max() <= tolerances.HALF + tolerances.GAIN
 
 
 # -- The least squared distance of a neighbourhood to the exemplars of each class.
@@ -91,31 +70,22 @@ def test_the_reference_is_the_formula(case, contrast):
 
 def run_exemplars(machine, features, classes):
     known = stacked([np.asarray(one, np.float32) for one in classes]).on(machine)
-    return machine.get(exemplars(machine, machine.put(np.asarray(features, np.float32)), known))
+    return made(machine, exemplars, features.astype(np.float32), known)
 
 
-@st.composite
-def cases_exemplars(draw):
-    count, sites = draw(st.integers(1, 40)), draw(st.integers(1, 70))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    low, high = draw(st.sampled_from([(0, 255), (-180, 180), (0, 3)]))
-    sizes = draw(st.lists(st.integers(1, 11), min_size=1, max_size=4))
-    features = rng.integers(low, high, (count, sites), endpoint=True)
-    return features, [rng.integers(low, high, (size, count), endpoint=True) for size in sizes]
+def test_the_reference_is_the_least_of_all_distances():
+    rng = np.random.default_rng(2)
+    for count, sites, low, high, sizes in ((1, 1, 0, 3, [1]), (40, 70, -180, 180, [11, 2, 4]), (9, 33, 0, 255, [5, 8])):
+        features = rng.integers(low, high, (count, sites), endpoint=True)
+        classes = [rng.integers(low, high, (size, count), endpoint=True) for size in sizes]
+        found = run_exemplars(REFERENCE, features, classes)
+        assert (found.dtype, found.shape) == (np.uint16, (len(classes), sites))
+        for logs, known in zip(found, classes, strict=True):
+            squared = ((features.T[:, None] - known[None]) ** 2).sum(-1).min(1)
+            assert abs(logs - 256 * np.log1p(squared)).max() <= 0.501
 
 
-@given(cases_exemplars())
-@settings(max_examples=60)
-def test_the_reference_is_the_least_of_all_distances(case):
-    features, classes = case
-    found = run_exemplars(REFERENCE, *case)
-    assert (found.dtype, found.shape) == (np.uint16, (len(classes), features.shape[1]))
-    for logs, known in zip(found, classes, strict=True):
-        squared = ((features.T[:, None] - known[None]) ** 2).sum(-1).min(1)
-        assert abs(logs - 256 * np.log1p(squared)).max() <= 0.501
-
-
-@pytest.mark.parametrize("vector", [1, 4, 16])
+@pytest.mark.parametrize("vector", [1, 4])
 def test_the_width_of_a_vector_changes_nothing(machine, vector):
     rng = np.random.default_rng(3)
     features, known = rng.integers(0, 255, (9, 37)), [rng.integers(0, 255, (n, 9)) for n in (5, 8)]
@@ -143,47 +113,34 @@ def test_classes_are_filled_up_by_their_own_last_exemplar():
 # -- Sums over a Gaussian window around each site, of the sites with one label alone.
 
 
-def run_window(machine, labels, owner, taps, values=None):
-    arrays = [np.asarray(labels, np.uint8), np.asarray(owner, np.int32), np.asarray(taps, np.uint32)]
-    more = [] if values is None else [machine.put(np.asarray(values, np.uint16))]
-    return machine.get(window(machine, *map(machine.put, arrays), *more))
-
-
-@st.composite
-def cases_window(draw):
-    rows, cols, planes = draw(st.integers(1, 9)), draw(st.integers(1, 20)), draw(st.integers(1, 4))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    reach = draw(st.integers(1, 5))
-    taps = np.diff(np.sort(np.concatenate([[0], rng.integers(0, TAPS, 2 * reach, endpoint=True), [TAPS]])))
-    values = rng.integers(0, 2**13, (planes, rows, cols)) if draw(st.booleans()) else None
-    return rng.integers(0, 3, (rows, cols)), rng.integers(0, 3, planes), taps, values
-
-
-@given(cases_window())
-@settings(max_examples=60)
-def test_the_reference_is_a_correlation(case):
-    labels, owner, taps, values = case
-    found = run_window(REFERENCE, *case)
-    assert found.dtype == np.uint32
-    for p, own in enumerate(owner):
-        here = (labels == own) * (1 if values is None else values[p])
-        for axis in (0, 1):
-            here = ndimage.correlate1d(here.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
-        assert (found[p] == here).all()
+def test_the_reference_is_a_correlation():
+    rng = np.random.default_rng(3)
+    for rows, cols, reach, valued in ((9, 20, 5, True), (1, 7, 2, False), (4, 1, 1, True)):
+        taps = np.diff([0, *np.sort(rng.integers(0, TAPS, 2 * reach, endpoint=True)), TAPS]).astype(np.uint32)
+        labels, owner = rng.integers(0, 3, (rows, cols), np.uint8), np.array([0, 2, 1], np.int32)
+        values = rng.integers(0, 2**13, (3, rows, cols), np.uint16) if valued else None
+        found = made(REFERENCE, window, labels, owner, taps, values)
+        assert found.dtype == np.uint32
+        for p, label in enumerate(owner):
+            here = (labels == label) * (1 if values is None else values[p])
+            for axis in (0, 1):
+                here = ndimage.correlate1d(here.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
+            assert (found[p] == here).all()
 
 
 def test_the_largest_sums_fit_32_bits(machine):
-    labels, taps = np.zeros((40, 40)), gaussian(6.0)
-    values = np.full((1, 40, 40), 2**13 - 1)
+    labels, owner, taps = np.zeros((40, 40), np.uint8), np.zeros(1, np.int32), gaussian(6.0)
+    values = np.full((1, 40, 40), 2**13 - 1, np.uint16)
     for m in (REFERENCE, machine):
-        assert (run_window(m, labels, [0], taps, values) == (2**13 - 1) * TAPS**2).all()
-        assert (run_window(m, labels, [0], taps) == TAPS**2).all()
+        assert (made(m, window, labels, owner, taps, values) == (2**13 - 1) * TAPS**2).all()
+        assert (made(m, window, labels, owner, taps) == TAPS**2).all()
     draw = np.random.default_rng(1)  # columns of a vector, and those that are left
-    case = draw.integers(0, 2, (9, 40)), [0, 1], taps, draw.integers(0, 2**13, (2, 9, 40))
-    assert np.array_equal(run_window(machine, *case), run_window(REFERENCE, *case))
+    case = draw.integers(0, 2, (9, 40), np.uint8), np.arange(2, dtype=np.int32), taps
+    values = draw.integers(0, 2**13, (2, 9, 40), np.uint16)
+    assert np.array_equal(*(made(m, window, *case, values) for m in (machine, REFERENCE)))
 
 
-@pytest.mark.parametrize("sd", [0.5, 0.8, 1.8, 8.0, 10.0, 33.3, 100.0])
+@pytest.mark.parametrize("sd", [0.5, 1.8, 33.3])
 def test_taps_are_a_gaussian_in_whole_numbers(sd):
     taps = gaussian(sd).astype(np.int64)
     reach = len(taps) // 2
@@ -197,38 +154,19 @@ def test_taps_are_a_gaussian_in_whole_numbers(sd):
 # -- Iterated conditional modes of a Potts field.
 
 
-def run_potts(machine, sites, evidence, votes, weight, labels):
-    put = machine.put
-    arrays = put(np.asarray(sites, np.int32)), put(np.asarray(evidence, np.int32)), put(np.asarray(votes, np.uint32))
-    return machine.get(potts(machine, *arrays, weight, put(np.asarray(labels, np.uint8))))
-
-
-@st.composite
-def cases_potts(draw):
-    classes, rows, cols = draw(st.integers(1, 5)), draw(st.integers(1, 6)), draw(st.integers(1, 6))
-    rng = np.random.default_rng(draw(st.integers(0, 2**16)))
-    scale = draw(st.sampled_from([2, 2**18, 2**24]))  # of the smallest, many are equal
-    evidence = rng.integers(-scale, scale, (classes, rows, cols))
-    votes = rng.integers(0, min(scale, 2**18), (classes, rows, cols), endpoint=True)
-    sites = rng.permutation(rows * cols)[: draw(st.integers(1, rows * cols))]
-    return sites, evidence, votes, draw(st.sampled_from([0, 1, 112, 1600])), rng.integers(0, classes, (rows, cols))
-
-
-@given(case=cases_potts())
-@settings(max_examples=25)
-def test_a_device_has_the_references_bits_of_potts(machine, case):
-    assert_same_bits(run_potts(machine, *case), run_potts(REFERENCE, *case))
-
-
-@given(cases_potts())
-@settings(max_examples=60)
-def test_the_reference_takes_the_first_of_the_greatest_energies(case):
-    sites, evidence, votes, weight, labels = case
-    found = run_potts(REFERENCE, *case)
-    for site in range(labels.size):
-        at = np.unravel_index(site, labels.shape)
-        energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
-        assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
+@pytest.mark.parametrize("scale", [2, 2**18, 2**24])  # of the smallest, many are equal
+def test_sites_take_the_first_of_the_greatest_energies(machine, scale):
+    rng = np.random.default_rng(scale)
+    for classes, weight in ((1, 0), (3, 1), (5, 112), (4, 1600)):
+        evidence = rng.integers(-scale, scale, (classes, 6, 5), np.int32)
+        votes = rng.integers(0, min(scale, 2**18), (classes, 6, 5), np.uint32, True)
+        sites, labels = rng.permutation(30)[:20].astype(np.int32), rng.integers(0, classes, (6, 5), np.uint8)
+        found = made(REFERENCE, potts, sites, evidence, votes, weight, labels.copy())
+        for site in range(30):
+            at = np.unravel_index(site, (6, 5))
+            energy = [int(u[at]) + (weight * int(v[at])) // 16 for u, v in zip(evidence, votes, strict=True)]
+            assert found[at] == (energy.index(max(energy)) if site in sites else labels[at])
+        assert_same_bits(made(machine, potts, sites, evidence, votes, weight, labels), found)
 
 
 # -- The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown.
@@ -278,23 +216,15 @@ def test_every_level_has_two_experts_whose_weights_add_up():
 def distances(picture, known, expert):
     """Of every site to the nearest of all whole neighbourhoods of a picture, by formula."""
 
-    def neighbourhoods(one):
-        rows, cols = one.shape
-        values = one * 16.0
+    def neighbourhoods(image):
+        values = image * 16.0
         if expert.level:
             for axis in (0, 1):
                 taps = gaussian(model.SMOOTHING[expert.level]) / 512
                 values = ndimage.correlate1d(values, taps, axis, mode="mirror")
             values = np.floor(values + 0.5)
-        pad = np.pad(values, expert.reach, "reflect") / 16
-        y, x = expert.offsets.T + expert.reach
-        found = np.stack([pad[i : i + rows, j : j + cols] for i, j in zip(y, x, strict=True)], -1)
-        if expert.contrast:
-            z = found - found.mean(-1, keepdims=True)
-            size = np.sqrt((z * z).sum(-1, keepdims=True))
-            found = z * 40 * np.log1p(size / 5) / np.maximum(size, 1e-9)
-            return np.rint(found)
-        return np.floor(found + 0.5)
+        features = plain(values[None], np.arange(image.size), expert.offsets, expert.contrast)
+        return np.floor(features.T + 0.5).reshape(*image.shape, -1)
 
     inside = (slice(expert.reach, -expert.reach),) * 2
     mine, theirs = neighbourhoods(picture), neighbourhoods(known)[inside].reshape(-1, len(expert.offsets))
@@ -305,8 +235,7 @@ ALIKE = [whole(stripes((16, 16), seed=1)), whole(stripes((40, 40), seed=2))]
 """One texture, of which one class shows nine times as much as the other."""
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 1.5])
-@pytest.mark.parametrize("classes", [CLASSES, ALIKE], ids=["apart", "alike"])
+@pytest.mark.parametrize(("classes", "smoothing"), [(CLASSES, 0.0), (ALIKE, 1.5)], ids=["apart", "alike"])
 def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoothing):
     picture, given = halves(20)[0][:, 20:40], {"levels": 1, "exemplars": 2**14, "typical": 0.3, "smoothing": smoothing}
     plan = planned(picture, classes, weight=0.0, unknown=0.0, sweeps=0, **given)
@@ -330,17 +259,6 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence(classes, smoo
     assert (labels == np.where(gap > 0, 2, 1))[clear].all()
 
 
-def test_two_textures_are_told_apart_up_to_their_border():
-    picture, truth = halves()
-    labels, output = run_classifier(picture, unknown=0.0)
-    assert (labels == truth).mean() > 0.97
-    assert output.probability.shape == output.fit.shape == (*picture.shape, 2)
-    assert abs(output.probability.sum(-1) - 1).max() < 1e-6
-    assert (output.probability.argmax(-1) + 1 == labels).mean() > 0.99
-    shares = [one["share"] for one in output.statistics["classes"]]
-    assert shares == [float((labels == c).mean()) for c in range(3)]
-
-
 def test_a_texture_that_was_not_shown_is_unknown():
     picture, truth = halves(60)
     picture[20:, :30] = np.random.default_rng(9).integers(0, 255, (40, 30))
@@ -362,24 +280,22 @@ def test_known_texture_is_rarely_unknown():
     assert np.median(output.fit) > 0.1
 
 
-@pytest.mark.parametrize("schedule", ["checkerboard", "coloring", "random-subset:0.5"])
-def test_any_schedule_of_few_steps_relaxes_the_labels(schedule):
+def test_any_schedule_of_few_steps_relaxes_the_labels():
     picture, truth = halves()
-    labels, output = run_classifier(picture, schedule=schedule, unknown=0.0)
+    labels, output = run_classifier(picture, schedule="random-subset:0.5", unknown=0.0)
     assert (labels == truth).mean() > 0.97
-    assert schedule.startswith(output.statistics["options"]["schedule"])
+    assert output.statistics["options"]["schedule"] == "random-subset"
 
 
 def test_the_field_ends_when_no_label_changes():
     changed = run_classifier(halves()[0], sweeps=500)[1].statistics["changed"]
     assert len(changed) < 500 and changed[-1] == 0 and all(changed[:-1])
-    assert run_classifier(halves()[0], sweeps=0)[1].statistics["changed"] == []
+    assert run_classifier(halves(12)[0], sweeps=0)[1].statistics["changed"] == []
 
 
 def test_a_small_sample_has_fewer_levels_and_a_tiny_one_is_refused():
     picture, small = halves()[0], whole(stripes((12, 12)))
     assert run_classifier(picture, [small])[1].statistics["options"]["levels"] == 1
-    assert run_classifier(picture)[1].statistics["options"]["levels"] == 1
     large = whole(stripes((70, 70)))
     assert run_classifier(picture, [large])[1].statistics["options"]["levels"] == 2
     with pytest.raises(
@@ -551,11 +467,9 @@ def test_the_fit_compares_measures_with_their_variances():
     null, gap = learned.nulls[0], np.linspace(0, 1, len(learned.nulls[0].mean))
     distance = null.distance(np.array([null.mean, null.mean + gap]).T)
     assert distance == pytest.approx([0, (gap**2 / null.variance).mean()])
-    fit = run_classifier(halves()[0])[1].fit
-    assert fit.min() >= 0 and fit.max() <= 1
 
 
-@pytest.mark.parametrize(("dtype", "channels"), [(np.uint8, 14), (np.uint16, 3), (np.float32, 1)])
+@pytest.mark.parametrize(("dtype", "channels"), [(np.uint16, 3), (np.float32, 1)])
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]

@@ -1,7 +1,5 @@
 """``simdtex simulate``, end to end."""
 
-import json
-
 import numpy as np
 import pytest
 from commands import contents, run
@@ -41,7 +39,7 @@ def folder(tmp_path, monkeypatch):
     }
     for name, one in pictures.items():
         image.write(name, one)
-    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n", "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n"}
+    tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n"}
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
     for suffix in (".gslib", ".sgems"):
@@ -51,7 +49,6 @@ def folder(tmp_path, monkeypatch):
     tables |= {
         "wells.eas": "wells\n4\nX\nY\nZ\nfacies\n1035 2022.5 3 3\n1104 2037 2.5 0\n1107 2036 2.5 0\n1108 2036 2.5 3\n",
         "ti.dat": "20 16 1\n1\nfacies\n" + "\n".join(map(str, facies[::-1].ravel())) + "\n",
-        "cut.gslib": (tmp_path / "ti.gslib").read_text()[:-9],
     }
     for name, text in tables.items():
         (tmp_path / name).write_text(text)
@@ -67,57 +64,33 @@ def simulate(*words):
     return run("simulate", *words, *QUICK)
 
 
-def made(*words, out="out.npz"):
-    result = simulate(*words, "-o", out)
+def made(*words):
+    result = simulate(*words, "-o", "out.nc")
     assert result.exit_code == 0, result.output
-    if not out.endswith(".npz"):
-        with xarray.open_dataarray(out) as found:
-            return found.load()
-    with np.load(out) as arrays:
-        dims = ("realisation", "y", "x", "variable")[: arrays["values"].ndim]
-        coordinates = {name: arrays[name] for name in ("realisation", "y", "x")}
-        coordinates["seed"] = ("realisation", arrays["seed"])
-        return xarray.DataArray(arrays["values"], coordinates, dims, attrs=json.loads(str(arrays["attributes"])))
+    with xarray.open_dataarray("out.nc") as found:
+        return found.load()
 
 
-def assert_same(ours, theirs):
-    """Two arrays of realisations agree in values, types, coordinates and attributes."""
-    assert (ours.dtype, ours.dims) == (theirs.dtype, theirs.dims)
-    assert ours.values.tobytes() == theirs.values.tobytes()
-    for name in theirs.coords:
-        assert np.array_equal(ours[name], theirs[name])
-    assert ours.attrs == theirs.attrs
-
-
-@pytest.mark.parametrize("suffix", ["npz", "nc", "zarr"])
-def test_the_bytes_of_the_function_in_every_format(folder, suffix):
-    found = made("grey.png", "-n", 3, "--first", 2, "--size", "14x12", out=f"out.{suffix}")
-    assert_same(found, simdtex.simulate(pixels("grey.png"), 3, first=2, shape=(12, 14), **OPTIONS))
-
-
-def test_what_is_told(folder):
-    args = ("grey.png", "-n", 2, "--size", "14x12", "-o", "out.npz", "--jobs", 2)
-    result = simulate(*args)
-    assert result.exit_code == 0
+def test_realisations_are_those_of_the_function_and_honour_a_table(folder):
+    args = ("grey.png", "-n", 2, "--first", 2, "--size", "14x12", "--known", "wells.csv", "--jobs", 2)
+    result = simulate(*args, "-o", "out.zarr")
+    assert result.exit_code == 0, result.output
     assert "2 realisations of 14x12 in" in result.output and "on reference" in result.output
     assert "seed 5" in result.output
-    assert simulate(*args, "-q").output == ""
+    with xarray.open_dataarray("out.zarr") as found:
+        assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
+        table = read_hard_data(folder / "wells.csv")
+        own = simdtex.simulate(pixels("grey.png"), 2, first=2, shape=(12, 14), known=table, **OPTIONS)
+        assert found.identical(own) and found.dtype == own.dtype
+    assert simulate("grey.png", "--size", "9x8", "-o", "out.npz", "-q").output == ""
     assert "1 realisation of 20x16" in simulate("grey.png", "-o", "out.npz").output
 
 
-def test_a_table_of_hard_data(folder):
-    found = made("grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
-    assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
-    table = read_hard_data(folder / "wells.csv")
-    assert_same(found, simdtex.simulate(pixels("grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
-
-
-@pytest.mark.parametrize(("name", "out"), [("ti.gslib", "out.sgems"), ("ti.sgems", "out.gslib")])
-def test_from_a_grid_to_a_grid(folder, name, out):
+def test_from_a_grid_to_a_grid(folder):
     args = ["--known", "wells.eas", "--categorical", "--several", "most", "--size", "14x12", "-n", 2]
-    result = simulate(name, *args, "-o", out)
+    result = simulate("ti.gslib", *args, "-o", "out.sgems")
     assert result.exit_code == 0, result.output
-    grid = read_grid(folder / out)
+    grid = read_grid(folder / "out.sgems")
     assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
     assert list(grid.values) == ["simulation__real0", "simulation__real1"]
     options = {"known": folder / "wells.eas", "several": "most", "origin": grid.origin, "cell": grid.cell} | OPTIONS
@@ -141,14 +114,8 @@ def test_a_grid_is_a_picture_with_coordinates(folder):
 
 
 def axes(*words):
-    found = made(*words, "--size", "4x4", out="out.nc")
+    found = made(*words, "--size", "4x4")
     return [(float(found[axis].min()), found.attrs[f"cell_{axis}"]) for axis in "xyz" if axis in found.coords]
-
-
-@pytest.mark.parametrize("case", ["a grid that holds no such number", "a grid too far away"])
-def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatch):
-    monkeypatch.setattr("simdtex.driver.run", lambda *_, **__: pytest.fail("this takes hours"))
-    refused(*BAD[case])
 
 
 @pytest.mark.slow
@@ -162,9 +129,7 @@ def test_where_cells_lie(folder):
     """What is given on the command line counts more than the file of the training image."""
     assert axes("ti.sgems") == [(1005, 10), (2002.5, 5), (3, 2)]
     assert axes("ti.gslib", "--origin", "-7,0,0.5") == [(-7, 10), (0, 5), (0.5, 2)]
-    assert axes("ti.gslib", "--origin", "-7,0") == [(-7, 10), (0, 5)]
     assert axes("ti.gslib", "--cell", "2,3") == [(1005, 2), (2002.5, 3)]
-    assert axes("grey.png", "--cell", "2,3") == [(0, 2), (0, 3)]
     assert axes("grey.png", "--origin", "5,6", "--cell", "2,3") == [(5, 2), (6, 3)]
 
 
@@ -174,8 +139,8 @@ def test_a_grid_of_known_values(folder):
     write_grid(folder / "known.gslib", {"v": known, "w": known})
     refused(["grey.png", "-o", "out.npz", "--known", "known.gslib"], "known is")
     write_grid(folder / "known.gslib", {"v": known})
-    found = made("grey.png", "--known", "known.gslib")
-    assert_same(found, simdtex.simulate(pixels("grey.png"), 1, known=known, **OPTIONS))
+    own = simdtex.simulate(pixels("grey.png"), 1, known=known, **OPTIONS)
+    assert made("grey.png", "--known", "known.gslib").identical(own)
 
 
 def test_grids_as_guides(folder):
@@ -191,18 +156,10 @@ def test_grids_as_guides(folder):
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
-    "a grid cut short": (
-        ["cut.gslib", "-o", "out.npz"],
-        "too short for what its header says, 20 x 16 x 1 cells of 1 variable, 320 values",
-    ),
-    "a well off the grid": ([*FACIES, "--known", "wells.eas"], "line 7 of the hard data is at x 1035.0"),
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
-    "no origin": ([*GREY, "--origin", ""], "must be numbers"),
-    "a text for a number": ([*GREY, "--categories", "sand=x"], "--categories sand=x must be NAME=NUMBER,..."),
     "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
-    "proportions in words": ([*FACIES, "--proportions", "half"], "numbers separated by commas"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
     "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
@@ -222,7 +179,8 @@ def refused(args, words):
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
+def test_bad_input_gets_one_sentence_before_the_run_and_writes_nothing(folder, case, monkeypatch):
+    monkeypatch.setattr("simdtex.driver.run", lambda *_, **__: pytest.fail("this takes hours"))
     refused(*BAD[case])
 
 
@@ -275,9 +233,7 @@ def test_a_region_is_the_white_parts_of_a_picture(folder, maps):
     image.write(folder / "grey-region.png", grey)
     image.write(folder / "colour-region.png", np.stack([grey] * 3, -1))
     for name in ("grey-region.png", "colour-region.png"):
-        made("facies.png", "--region", name, "--categorical")
-        with np.load(folder / "out.npz") as arrays:
-            assert np.array_equal(arrays["region"], maps["region"])
+        assert np.array_equal(made("facies.png", "--region", name, "--categorical").region, maps["region"])
 
 
 def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
@@ -288,54 +244,41 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
     assert np.array_equal(np.isnan(values), ~maps["region"])
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
+def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps):
+    for words, sentence in (
         (["--rotation", "angles.tif", "--size", "8x8"], "rotation is 16x20 and has to be 8x8"),
-        (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),
         (["--source", "-o", "out.gslib"], "is a grid, which holds no source map: end its name in .zarr, .nc or .npz"),
         (["--source", "--report", "report"], "--report cannot be used with --source or --region"),
-    ],
-)
-def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps, words, sentence):
-    before = sorted(folder.iterdir())
-    result = simulate("facies.png", *words, *([] if "-o" in words else ["-o", "out.npz"]))
-    assert result.exit_code != 0 and sentence in " ".join(result.output.split())
-    assert sorted(folder.iterdir()) == before
+    ):
+        refused(["facies.png", "-o", "out.npz", *words], sentence)
 
 
 def estimate(*words):
     return run("estimate", *words, "--device", "reference")
 
 
-@pytest.mark.parametrize("out", ["out.nc", "out.gslib"])
-def test_an_estimate_is_that_of_the_function(folder, out):
+def test_an_estimate_is_that_of_the_function(folder):
     how = ["--several", "most", "--nearest", 3, "--size", "20x16"]
-    result = estimate("ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", out)
+    result = estimate("ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", "out.nc")
     assert result.exit_code == 0 and "maps of 20x16" in result.output, result.output
     expected = simdtex.estimate(
         read_grid(folder / "ti.gslib").values["facies"][0], known=folder / "wells.eas", shape=(16, 20),
         origin=(1005, 2002.5, 3), cell=(10, 5, 2), several="most", nearest=3, categorical=True, device="reference",
     )  # fmt: skip
-    if out == "out.nc":
-        with xarray.open_dataset(folder / out) as found:
-            assert found.identical(expected)
-        return
-    grid = read_grid(folder / out)
+    with xarray.open_dataset(folder / "out.nc") as found:
+        assert found.identical(expected)
+    assert estimate("ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", "out.gslib").exit_code == 0
+    grid = read_grid(folder / "out.gslib")
     assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
     assert np.array_equal(grid.values["probability_3"][0], expected.probability.sel(category=3))
     assert np.array_equal(grid.values["entropy"][0], expected.entropy)
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
+def test_an_estimate_of_nothing_is_refused(folder):
+    for words, sentence in (
         (["grey.png"], "an estimate requires data; give --known"),
         (["colour.png", "--known", "wells.csv"], "has several channels; give a training image of one variable"),
-        (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
-    ],
-)
-def test_an_estimate_of_nothing_is_refused(folder, words, sentence):
-    result = estimate(*words, "-o", "out.npz")
-    assert result.exit_code != 0 and sentence in " ".join(result.output.split())
-    assert not (folder / "out.npz").exists()
+    ):
+        result = estimate(*words, "-o", "out.npz")
+        assert result.exit_code != 0 and sentence in " ".join(result.output.split())
+        assert not (folder / "out.npz").exists()

@@ -9,7 +9,6 @@ import xarray
 from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
-import simdtex
 from simdtex.figures.show import Realisations
 from simdtex.jobs.simulation import ensemble
 from simdtex.jobs.simulation.ensemble import MARGIN, variogram
@@ -57,10 +56,7 @@ def test_connectivity_of_a_broken_bar():
     # at a distance of 3 there are 5 + 7 pairs within the pieces, and 7 - 8, 6 - 9 ... across: columns 7 to 10
     assert found.function[1, 3] == pytest.approx(12 / 13)
     assert found.function[1, 1] == 1 and found.largest == pytest.approx(10 / 18)
-
-
-def test_pixels_are_connected_by_their_sides():
-    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2).components == pytest.approx(6e4 / 36)
+    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2).components == pytest.approx(6e4 / 36), "by their sides"
 
 
 def lines(*ends, width=8, shape=(100, 120)):
@@ -74,41 +70,30 @@ def lines(*ends, width=8, shape=(100, 120)):
     return image
 
 
-def box(top, bottom, left, right, shape=(100, 120)):
-    image = np.zeros(shape, np.uint8)
-    image[top:bottom, left:right] = 1
-    return image
-
-
 MIDDLE = (50, 60)
 LEFT, UP, DOWN = (50, -20), (-30, 140), (130, 140)
 DRAWN = {
     "across": (lines((LEFT, (50, 140))), 0),
-    "aslant": (lines(((-20, -20), (120, 140))), 0),
     "inside": (lines((LEFT, (50, 70))), 1),
     "free": (lines(((50, 30), (50, 90))), 2),
     "Y that leaves": (lines((LEFT, MIDDLE), (MIDDLE, UP), (MIDDLE, DOWN)), 0),
     "Y with one end": (lines((LEFT, MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, DOWN)), 1),
     "Y with three ends": (lines(((50, 20), MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, (85, 90))), 3),
-    "disc": (lines((MIDDLE, (50, 61)), width=40), 0),
     "blob": (lines((MIDDLE, (50, 70)), width=24), 0),
     "wide across": (lines((LEFT, (50, 140)), width=30), 0),
     "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
     "stub": (lines((LEFT, (50, 140)), (MIDDLE, (30, 60))), 1),
     "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
-    "dash": (lines((LEFT, (50, 140))) | box(20, 21, 50, 58), 0),
+    "dash": (lines((LEFT, (50, 140))) | lines(((20, 50), (20, 57)), width=1), 0),
     "near the border": (lines((LEFT, (50, 118))), 0),
-    "thin": (lines((LEFT, (50, 70)), width=1), 1),
     "nothing": (lines(), 0),
     "everything": (lines() + 1, 0),
 }
 
 
-@pytest.mark.parametrize("name", DRAWN)
-@pytest.mark.parametrize("turned", [0, 1, 2])
-def test_dead_ends_of_drawn_figures(name, turned):
-    image, expected = DRAWN[name]
-    assert len(ensemble.dead_ends(np.rot90(image, turned), 1)) == expected
+def test_dead_ends_of_drawn_figures():
+    for turned, (name, (image, expected)) in enumerate(DRAWN.items()):
+        assert len(ensemble.dead_ends(np.rot90(image, turned), 1)) == expected, name
 
 
 def test_a_flat_end_counts_once_where_it_is():
@@ -120,9 +105,8 @@ def test_a_flat_end_counts_once_where_it_is():
     assert found == pytest.approx(1e4 / ((80 - 2 * MARGIN) * (100 - 2 * MARGIN)))
 
 
-@pytest.mark.parametrize("name", ["across", "Y with one end", "free"])
-def test_rough_banks_holes_and_specks_hardly_make_dead_ends(name):
-    rng, (image, expected) = np.random.default_rng(3), DRAWN[name]
+def test_rough_banks_holes_and_specks_hardly_make_dead_ends():
+    rng, (image, expected) = np.random.default_rng(3), DRAWN["Y with one end"]
     bank = binary_dilation(image) & ~binary_erosion(image, border_value=1)
     rough, specks = [], []
     for _ in range(20):
@@ -157,17 +141,13 @@ def test_distances_against_their_definition():
     np.testing.assert_allclose(found.by_level[:, 0], [table[0, 1] for table in tables])
 
 
-def test_continuous_values_are_cut_by_the_quantiles_of_the_training_image():
+def test_continuous_values_are_cut_by_quantiles_and_frequent_ones_are_classes_of_their_own():
+    for frequent in (0.0, 1.0):
+        training = np.where((np.indices((12, 12)) % 3).any(0), frequent, 1 - frequent)  # one in nine is the other
+        assert ensemble.anodi(np.full((1, 12, 12), frequent), training).likeness == pytest.approx(1)
     training = np.random.default_rng(8).normal(size=(40, 40))
     same = ensemble.anodi(np.exp(training)[np.newaxis], np.exp(training))  # only ranks matter
     assert same.likeness == 0 and np.isnan(same.ratio) and np.isnan(same.variety)
-
-
-@pytest.mark.parametrize("frequent", [0.0, 1.0])
-def test_frequent_values_are_classes_of_their_own(frequent):
-    training = np.where((np.indices((12, 12)) % 3).any(0), frequent, 1 - frequent)  # one in nine is the other
-    constant = np.full((1, 12, 12), frequent)
-    assert ensemble.anodi(constant, training).likeness == pytest.approx(1)
 
 
 def test_summary_puts_everything_together():
@@ -198,15 +178,14 @@ def test_summary_of_continuous_values():
     assert found.connectivity.shape == (2, 0, 4, 7)
     np.testing.assert_allclose(found.misses, np.abs(images[:, 2, 1] - 0.5))
     np.testing.assert_allclose(found.open, images.std(0, ddof=1))
-
-
-@pytest.fixture
-def make_channels(script):
-    return script("channels").channels
+    image = np.random.default_rng(1).integers(0, 200, (3, 20, 20)).astype(np.uint8)
+    found = ensemble.summary(image[:2], image[2], categories=[])
+    np.testing.assert_allclose(found.open, image[:2].std(0, ddof=1, dtype=float))
 
 
 @pytest.mark.slow
-def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_channels):
+def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(script):
+    make_channels = script("channels").channels
     for image, seed in zip(ensemble.channels(), (1, 7), strict=True):
         np.testing.assert_array_equal(image, make_channels((256, 256), seed))
     digest = hashlib.sha256(make_channels((96, 120), 2024).tobytes()).hexdigest()
@@ -215,47 +194,7 @@ def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_cha
         make_channels((20, 99), 1)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64])
-def test_a_summary_of_any_type_warns_of_nothing(dtype):
-    image = np.random.default_rng(1).integers(0, 200, (3, 20, 20)).astype(dtype)
-    found = ensemble.summary(image[:2], image[2], categories=[])
-    np.testing.assert_allclose(found.open, image[:2].std(0, ddof=1, dtype=float))
-
-
-IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: ensemble.summary(IMAGE, IMAGE), r"the ensemble has the shape \(20, 20\)"),
-        (lambda: ensemble.summary(FEW, IMAGE, categories=[1]), "holds 0, which is no category"),
-        (lambda: ensemble.categories_of(IMAGE, [[0]]), "there are no categories"),
-        (lambda: ensemble.categories_of(IMAGE, [0, 0]), "named twice"),
-        (lambda: ensemble.connectivity(IMAGE, 1, 20), "max_lag is 20: give 1 to 19"),
-        (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
-        (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
-        (lambda: ensemble.dead_ends(FEW, 0), "the image has the shape"),
-        (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
-        (lambda: ensemble.anodi(FEW, IMAGE + 1), "the ensemble holds 0, which is no category"),
-        (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
-        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
-        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
-        (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
-        (lambda: ensemble.summary(FEW, IMAGE - 1e200), "values beyond 1e.100: give them in a larger unit"),
-    ],
-)
-def test_bad_input_is_refused_in_a_sentence(call, words):
-    with pytest.raises(ValueError, match=words):
-        call()
-
-
-def test_other_types_are_refused():
-    with pytest.raises(TypeError, match="holds complex128"):
-        ensemble.summary(np.ones((1, 2, 2), complex), IMAGE)
-
-
-@pytest.mark.parametrize("side", [1, 2, 5, 8])
+@pytest.mark.parametrize("side", [2, 5])
 def test_copies_against_plain_loops(side):
     training, made = noise(5, (1, 14, 17), 3)[0], noise(6, (2, 12, 15), 4)  # 3 is nowhere in the training image
     made[0, 1:12, 2:13] = training[3:14, 4:15]
@@ -349,29 +288,33 @@ def test_unknown_cells_count_for_nothing():
     assert ensemble.e_type(maps)[0, 0, 1] == 1.5 and ensemble.connected_volume(maps, 255, (100, 65)).values.max() == 0
 
 
-@pytest.mark.parametrize("ground", [False, True])
-def test_plots_of_xarray_have_names_units_and_north_up(ground):
-    options = {"origin": (5, 5, 0), "cell": (10, 10, 1)} if ground else {}
-    made = simdtex.simulate(
-        ensemble.channels()[0][:24, :24],
-        2,
-        shape=(9, 8),
-        categorical=True,
-        order=2,
-        rng=1,
-        device="reference",
-        **options,
-    )
-    image = ensemble.probability(made, 1).plot()
-    assert image.axes.get_title() == "" and image.colorbar.ax.get_ylabel() == "probability of category 1"
-    low, high = image.axes.get_ylim()
-    assert (low, high) == ((0, 90) if ground else (-0.5, 8.5))
+def test_plots_of_xarray_have_names_units_and_north_up():
+    image = ensemble.probability(reservoir().isel(z=0), 3).plot()
+    assert image.axes.get_title() == "" and image.colorbar.ax.get_ylabel() == "probability of facies 3"
+    assert image.axes.get_ylim() == (-5, 75) and image.axes.get_xlabel() == "x [m]"
     plt.close("all")
+
+
+IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
+        (lambda: ensemble.summary(IMAGE, IMAGE), r"the ensemble has the shape \(20, 20\)"),
+        (lambda: ensemble.summary(FEW, IMAGE, categories=[1]), "holds 0, which is no category"),
+        (lambda: ensemble.categories_of(IMAGE, [[0]]), "there are no categories"),
+        (lambda: ensemble.categories_of(IMAGE, [0, 0]), "named twice"),
+        (lambda: ensemble.connectivity(IMAGE, 1, 20), "max_lag is 20: give 1 to 19"),
+        (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
+        (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
+        (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
+        (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
+        (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
+        (lambda: ensemble.summary(FEW, IMAGE - 1e200), "values beyond 1e.100: give them in a larger unit"),
+        (lambda: ensemble.summary(np.ones((1, 2, 2), complex), IMAGE), "holds complex128"),
         (lambda: ensemble.probability(np.zeros((2, 3, 3)), 1), "with the dimension realisation"),
         (lambda: ensemble.e_type(reservoir().assign_attrs(options='{"categorical": true}')), "are of categories"),
         (lambda: ensemble.connected_volume(reservoir(), 3, (90, 5)), "outside"),
@@ -381,6 +324,6 @@ def test_plots_of_xarray_have_names_units_and_north_up(ground):
         (lambda: ensemble.connected_volume(reservoir()[..., ::-1], 3, (100, 5)), "evenly spaced in ascending order"),
     ],
 )
-def test_what_has_no_uncertainty_is_refused(call, words):
+def test_bad_input_is_refused_in_a_sentence(call, words):
     with pytest.raises((TypeError, ValueError), match=words):
         call()

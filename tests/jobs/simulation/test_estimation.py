@@ -71,29 +71,27 @@ def test_probabilities_are_those_of_plain_loops(kinds, how):
         assert found.entropy.values[cell] == pytest.approx(entropy, abs=1e-3)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
-def test_mean_and_variance_are_those_of_plain_loops(dtype):
-    training = texture((16, 18), dtype=dtype)
+def test_mean_and_variance_are_those_of_plain_loops():
+    training = texture((16, 18), dtype=np.float64)
     known = data(training)
     found = simdtex.estimate(training, known=known, nearest=4, reach=6, device="reference")
-    exact = training.astype(float)
     for cell in np.ndindex(*SHAPE):
         mean, variance = found["mean"].values[cell], found["variance"].values[cell]
         if not np.isnan(known[cell]):
             assert (mean, variance) == (known[cell], 0)
             continue
         w = weights(
-            exact, known, cell, nearest=4, reach=6, bandwidth=1.0, variance=exact.var(), channels=1,
+            training, known, cell, nearest=4, reach=6, bandwidth=1.0, variance=training.var(), channels=1,
             differs=lambda a, b: (a - b) ** 2,
         )  # fmt: skip
-        expected = (w * exact).sum() / w.sum()
-        assert mean == pytest.approx(expected, abs=0.02 * exact.std())
-        assert variance == pytest.approx((w * (exact - expected) ** 2).sum() / w.sum(), abs=0.05 * exact.var())
+        expected = (w * training).sum() / w.sum()
+        assert mean == pytest.approx(expected, abs=0.02 * training.std())
+        assert variance == pytest.approx((w * (training - expected) ** 2).sum() / w.sum(), abs=0.05 * training.var())
 
 
 def test_a_device_has_the_references_bits(cl_device):
     for options in ({"categorical": True}, {"reach": 7}):
-        known = data(TRAINING, (13, 12))
+        known = data(TRAINING, (9, 8))
         both = [
             simdtex.estimate(TRAINING, known=known, device=device, **options)
             for device in ("reference", str(cl_device.index))
@@ -102,22 +100,16 @@ def test_a_device_has_the_references_bits(cl_device):
             assert_same_bits(both[1][name].values, both[0][name].values)
 
 
-def test_tables_ground_masks_and_several_training_images(tmp_path):
-    path = tmp_path / "wells.csv"
-    path.write_text("x,y,value\n1035,2025,4\n1045,2035,8\n")
-    options = {"shape": SHAPE, "categorical": True, "device": "reference"}
-    found = simdtex.estimate(TRAINING, known=path, origin=(1005, 2005), cell=(10, 10), **options)
-    assert found.probability.sel(category=4, x=1035, y=2025) == 1
-    rows = np.full(SHAPE, np.nan)
-    rows[2, 3], rows[3, 4] = 4, 8
-    assert_same_bits(found.probability.values, simdtex.estimate(TRAINING, known=rows, **options).probability.values)
-    two = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, **options)
-    usable = [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
-    one = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, mask=usable, **options)
-    assert not np.array_equal(two.probability, one.probability)
-    assert set(found.attrs) == {
-        *("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data", "cell_x", "cell_y")
-    }
+def test_masks_of_several_training_images_and_attributes():
+    options, known = {"shape": SHAPE, "categorical": True, "device": "reference"}, np.full(SHAPE, np.nan)
+    known[2, 3], known[3, 4] = 4, 8
+    pictures, usable = [TRAINING, TRAINING[:12]], [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
+    two, masked = (simdtex.estimate(pictures, known=known, mask=mask, **options) for mask in (None, usable))
+    assert not np.array_equal(two.probability, masked.probability)
+    names = ("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data")
+    assert {*two.attrs} == {*names}
+    placed = simdtex.estimate(pictures, known=known, origin=(5, 6), cell=(10, 20), **options)
+    assert {*placed.attrs} == {*names, "cell_x", "cell_y"} and placed.x[1] == 15
 
 
 BAD = {
@@ -133,17 +125,15 @@ BAD = {
         "several is 'mean', which invents categories; give 'most', or 'refuse'",
     ),
     "category": ({"known": data(TRAINING + 1)}, "known has the category [159] and the sample has 0, 4, 8"),
-    "shape": ({"shape": (8, 9)}, "known is 9x11x1 and the output 8x9x1"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_refused_with_a_remedy(case):
     change, words = BAD[case]
-    with pytest.raises(ValueError, match=words) as caught:
-        call = {"training": TRAINING, "known": data(TRAINING), "categorical": True, "device": "reference"}
+    call = {"training": TRAINING, "known": data(TRAINING), "categorical": True, "device": "reference"}
+    with pytest.raises(ValueError, match=words):
         simdtex.estimate(**call | change)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_callback_sees_the_share_and_the_maps(monkeypatch):
@@ -151,12 +141,8 @@ def test_the_callback_sees_the_share_and_the_maps(monkeypatch):
     seen = []
     known = np.full((4, 6), np.nan)
     known[2, 1] = 1
-    found = simdtex.estimate(
-        np.tile([0.0, 0, 0, 1], (32, 8)),
-        known=known,
-        device="reference",
-        callback=lambda p: seen.append((p, p.image())),
-    )
+    training, look = np.tile([0.0, 0, 0, 1], (32, 8)), lambda progress: seen.append((progress, progress.image()))
+    found = simdtex.estimate(training, known=known, device="reference", callback=look)
     shares = [progress.fraction for progress, _ in seen]
     assert shares == sorted(set(shares)) and len(shares) > 3 and shares[-1] == 1
     assert [np.isfinite(maps[..., 0]).mean() for _, maps in seen] == shares

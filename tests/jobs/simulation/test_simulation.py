@@ -39,30 +39,20 @@ def holed(dtype=np.float32, shape=SHAPE, channels=None):
 
 
 def test_a_realisation_depends_on_its_number_alone():
-    four = simulate(n=4)
-    assert len({one.tobytes() for one in four.values}) == 4
-    for k in range(4):
-        assert_same_bits(simulate(n=1, first=k).values[0], four.values[k])
-    assert_same_bits(simulate(n=2, first=2).values, four.values[2:])
-
-
-@pytest.mark.parametrize("jobs", [2, 9, None])
-def test_how_many_at_a_time_makes_no_difference(jobs):
-    one, many = simulate(n=3), simulate(n=3, jobs=jobs)
+    one, many = simulate(n=3), simulate(n=3, jobs=9)
+    assert len({values.tobytes() for values in one.values}) == 3
     assert_same_bits(one.values, many.values)
     assert one.attrs == many.attrs
-    assert np.array_equal(one.seed, many.seed)
+    assert_same_bits(simulate(n=2, first=1, jobs=None).values, one.values[1:])
 
 
 def test_a_realisation_is_what_synthesize_gives_with_its_seed():
-    data = holed()
-    options = {"order": 2, "device": "reference"}
-    found = simulate(texture((16, 20), dtype=np.float32), known=data)
+    training, data = texture((16, 20), dtype=np.float32), holed()
+    found = simulate(training, known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
-        own = simdtex.synthesize(
-            texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **OWN, **options
-        )
+        own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, order=2, device="reference", **OWN)
         assert_same_bits(values, own)
+        assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
 
 
 def test_seeds_are_apart_and_stay_what_they_are():
@@ -74,37 +64,30 @@ def test_seeds_are_apart_and_stay_what_they_are():
     assert simulate(first=3).seed.values.tolist() == [realisation_seed(5, 3), realisation_seed(5, 4)]
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
-    data = holed(dtype)
-    known = ~np.isnan(data)
-    found = simulate(texture((16, 20), dtype=dtype), n=3, known=data)
-    assert found.dtype == dtype
-    for one in found.values:
-        assert_same_bits(one[known], data[known].astype(dtype))
+def test_the_size_is_that_of_the_data_of_a_map_or_of_the_training_image():
+    training, how = texture((16, 20), dtype=np.float32), {"n": 1, "shape": None, "levels": 1, "free_sweeps": 0}
+    assert simulate(training, **how, known=holed()).shape == (1, *SHAPE)
+    assert simulate(training, **how).shape == (1, 16, 20)
+    assert simulate(**how | {"shape": (np.int64(7), 9)}).shape == (1, 7, 9)
+    assert simulate(**how, rotation=np.zeros((7, 9))).shape == (1, 7, 9)
+    assert simulate(**how, image_map=np.ones((1, 7, 9))).shape == (1, 7, 9)
 
 
-def test_the_size_is_that_of_the_data_or_of_the_training_image():
-    training = texture((16, 20), dtype=np.float32)
-    assert simulate(training, n=1, shape=None, known=holed()).shape == (1, *SHAPE)
-    assert simulate(training, n=1, shape=None).shape == (1, 16, 20)
-    assert simulate(n=1, shape=(np.int64(7), 9)).shape == (1, 7, 9)
-
-
-@pytest.mark.parametrize("axis", [0, -1])
-def test_a_table_of_several_variables(tmp_path, axis):
+def test_a_table_of_several_variables_which_are_the_last_dimension(tmp_path):
     path = tmp_path / "wells.csv"
     path.write_text("x,y,a,b\n3,4,0.5,0.25\n7,2,,0.75\n")
-    training = np.moveaxis(texture((16, 20), 2, np.float32), -1, axis)
-    found = simulate(training, n=2, known=path, channel_axis=axis)
+    training = np.moveaxis(texture((16, 20), 2, np.float32), -1, 0)
+    found = simulate(training, n=2, known=path, channel_axis=0)
+    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 2)
     placed = place_hard_data(read_hard_data(path), SHAPE, np.float32)
-    for one in found.values:
-        assert_same_bits(one[~placed.mask], placed.data[~placed.mask])
-    same = simulate(training, n=2, known=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
-    assert_same_bits(found.values, same.values)
-    assert (
-        simulate(training, n=1, known=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+    for values in found.values:
+        assert_same_bits(values[~placed.mask], placed.data[~placed.mask])
+    known = np.ma.MaskedArray(np.moveaxis(placed, -1, 0))
+    assert_same_bits(found.values, simulate(training, n=2, known=known, channel_axis=0, shape=None).values)
+    own = simdtex.synthesize(
+        training, SHAPE, channel_axis=0, known=known, rng=int(found.seed[1]), order=2, device="reference", **OWN
     )
+    assert np.array_equal(found.values[1], np.moveaxis(own, 0, -1))
 
 
 def smooth(shape, seed):
@@ -120,7 +103,7 @@ def smooth(shape, seed):
     [
         ("coherent", (64, 64), (48, 48), 0.03),
         pytest.param("exact", (80, 80), (64, 64), 0.03, marks=pytest.mark.slow),
-        ("coherent", (10, 24, 24), (6, 16, 16), 0.1),
+        pytest.param("coherent", (10, 24, 24), (6, 16, 16), 0.1, marks=pytest.mark.slow),
     ],
 )
 def test_a_variable_known_alone_decides_on_the_others(search, sample, shape, share):
@@ -136,15 +119,24 @@ def test_a_variable_known_alone_decides_on_the_others(search, sample, shape, sha
     assert ((found[there, 1] > 0) != (truth[there] > 0)).mean() <= share
 
 
-@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32, np.float64])
-def test_dimensions_coordinates_and_type(dtype):
-    found = simulate(texture((16, 20), dtype=dtype), n=2, first=4)
-    assert found.dtype == dtype and found.name == "simulation"
-    assert dict(found.sizes) == {"realisation": 2, "y": 12, "x": 14}
-    assert found.dims == ("realisation", "y", "x")
-    assert found.realisation.values.tolist() == [4, 5]
-    assert np.array_equal(found.y, np.arange(12)) and np.array_equal(found.x, np.arange(14))
-    assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")
+def test_dimensions_coordinates_type_and_attributes_are_written_by_xarray_itself(tmp_path):
+    for dtype in (np.bool_, np.float64):
+        found = simulate(texture((16, 20), dtype=dtype), first=4, rng=2**64 - 1, order=np.int64(2), levels=1)
+        assert found.dtype == dtype and found.name == "simulation"
+        assert found.dims == ("realisation", "y", "x") and found.realisation.values.tolist() == [4, 5]
+        assert np.array_equal(found.y, np.arange(12)) and np.array_equal(found.x, np.arange(14))
+        assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
+    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
+    assert (found.attrs["seed"], found.attrs["version"]) == (2**64 - 1, simdtex.__version__)
+    assert found.attrs["device"].startswith("reference") and len(found.attrs["training_image"]) == 64
+    options = json.loads(found.attrs["options"])
+    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 1.0)
+    found.to_netcdf(tmp_path / "t.nc")
+    found.to_zarr(tmp_path / "t.zarr")
+    for name in ("t.nc", "t.zarr"):
+        with xarray.open_dataarray(tmp_path / name) as back:
+            assert back.identical(found) and back.dtype == found.dtype
 
 
 def test_coordinates_on_the_ground():
@@ -159,27 +151,12 @@ def test_coordinates_on_the_ground():
 
 def test_data_on_the_ground(tmp_path):
     path = tmp_path / "wells.csv"
-    path.write_text("x,y,value\n1035,2094.5,20\n1074,2053,30\n1065,2051,33\n")
-    found = simulate(known=path, origin=(1005, 2010.5), cell=(10, 21), several="mean")
-    assert (found.values[:, 4, 3] == 20).all() and (found.values[:, 2, [6, 7]] == [33, 30]).all()
-    rows = [(3, 4, 20), (7, 2, 30), (6, 2, 33)]
-    assert_same_bits(found.values, simulate(known=place_hard_data(rows, SHAPE, np.uint8)).values)
+    path.write_text("x,y,value\n1035,2094.5,20\n1074,2053,30\n1074,2053,31\n1074,2053,31\n")
+    how = {"known": path, "origin": (1005, 2010.5), "cell": (10, 21)}
+    found = simulate(**how, several="most")
+    assert_same_bits(found.values, simulate(known=place_hard_data([(3, 4, 20), (7, 2, 31)], SHAPE, np.uint8)).values)
     with pytest.raises(ValueError, match=r"line 2 of the hard data is at x 1035\.0, y 2094\.5, outside"):
         simulate(known=path)
-    path.write_text("x,y,value\n3,4,20\n3,4,30\n3,4,31\n")
-    assert (simulate(known=path, several="mean").values[:, 4, 3] == 27).all()
-    assert (simulate(known=path, several="most").values[:, 4, 3] == 20).all()
-
-
-@pytest.mark.parametrize("axis", [0, -1])
-def test_several_variables_are_the_last_dimension(axis):
-    training = np.moveaxis(texture((16, 20), 3), -1, axis)
-    found = simulate(training, n=2, channel_axis=axis)
-    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 3)
-    own = simdtex.synthesize(
-        training, SHAPE, channel_axis=axis, rng=int(found.seed[1]), order=2, device="reference", **OWN
-    )
-    assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
 
 
 def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guide_tells_others():
@@ -187,35 +164,11 @@ def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guid
     shares = np.bincount(training.ravel())
     usual, told = (simulate(training, categorical=True, **how) for how in ({}, {"proportions": shares.tolist()}))
     assert np.array_equal(usual, told) and usual.attrs == told.attrs
-    assert np.array_equal(usual, simulate(training, categorical=True, proportions=(shares * 2**20).tolist())), "counts"
-    even = simulate(training, categorical=True, proportions=(1, 1, 1))
-    assert not np.array_equal(usual, even)
     for how in ({"probabilities": np.full((3, *SHAPE), 1 / 3)}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
         found = simulate(training, n=1, categorical=True, **how)
         assert json.loads(found.attrs["options"])["proportions"] is None
     several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
     assert json.loads(several.attrs["options"])["proportions"] is None
-
-
-def test_attributes_tell_how():
-    found = simulate(n=1, levels=1)
-    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
-    assert (found.attrs["seed"], found.attrs["version"]) == (5, simdtex.__version__)
-    assert found.attrs["device"].startswith("reference")
-    options = json.loads(found.attrs["options"])
-    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 1.0)
-    assert len(found.attrs["training_image"]) == 64
-
-
-@pytest.mark.filterwarnings("ignore:Consolidated metadata")
-def test_what_is_returned_is_written_by_xarray_itself(tmp_path):
-    found = simulate(n=2, rng=2**64 - 1, order=np.int64(2), levels=1)
-    found.to_netcdf(tmp_path / "t.nc")
-    found.to_zarr(tmp_path / "t.zarr")
-    for name in ("t.nc", "t.zarr"):
-        with xarray.open_dataarray(tmp_path / name) as back:
-            assert back.identical(found)
-            assert back.dtype == found.dtype and json.loads(back.attrs["options"])["order"] == 2
 
 
 DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")
@@ -244,41 +197,35 @@ def with_value(array, value, at=(2, 3)):
     return found
 
 
-CHANGES = {
-    "training_image": [
-        {"training": with_value(FLOATS, FLOATS[0, 0])},
-        {"training": with_value(FLOATS, np.nan)},
-        {"training": FLOATS.astype(np.float64)},
-    ],
-    "hard_data": [{"known": with_value(holed(), 0.5)}, {"known": None}],
-    "guide": [{"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}, {"guide": None}],
-    "region": [{"region": np.ones(SHAPE, bool)}, {"region": None}],
-    "image_map": [{"image_map": np.ones((1, *SHAPE))}, {"image_map": None}],
-    "rotation": [{"rotation": np.full(SHAPE, 5.0)}, {"rotation": None}],
-    "scale": [{"scale": np.full(SHAPE, 2.0)}, {"scale": None}],
-    "mask": [{"mask": np.arange(20) < np.full((16, 1), 15)}, {"mask": None}],
-}
+CHANGES = [
+    ("training_image", {"training": with_value(FLOATS, FLOATS[0, 0])}),
+    ("training_image", {"training": with_value(FLOATS, np.nan)}),
+    ("training_image", {"training": FLOATS.astype(np.float64)}),
+    ("hard_data", {"known": with_value(holed(), 0.5)}),
+    ("guide", {"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}),
+    ("region", {"region": np.ones(SHAPE, bool)}),
+    ("image_map", {"image_map": np.ones((1, *SHAPE))}),
+    ("rotation", {"rotation": None}),
+    ("scale", {"scale": np.full(SHAPE, 2.0)}),
+    ("mask", {"mask": np.arange(20) < np.full((16, 1), 15)}),
+]
 
 
-@pytest.mark.parametrize(("name", "number"), [(name, k) for name in CHANGES for k in range(len(CHANGES[name]))])
-def test_a_digest_changes_with_its_array_and_with_nothing_else(name, number):
-    before, after = digests(), digests(**CHANGES[name][number])
-    assert all(before[one] for one in CHANGES) and after[name] != before[name]
-    # hard data are of the training image's type
-    kept = [other for other in DIGESTS if other != name and not (number == 2 and other == "hard_data")]
-    assert [after[other] for other in kept] == [before[other] for other in kept]
-
-
-def test_an_unknown_pixel_is_not_what_it_is_completed_with():
-    holey = with_value(FLOATS, np.nan)
+def test_a_digest_changes_with_its_array_and_with_nothing_else():
+    before, seen = digests(), []
+    for name, change in CHANGES:
+        after = digests(**change)
+        assert before[name] and after[name] != before[name], name
+        # hard data are of the training image's type
+        kept = [other for other in DIGESTS if other != name and (other, name) != ("hard_data", "training_image")]
+        assert [after[other] for other in kept] == [before[other] for other in kept], name
+        seen.append(after)
     near = [with_value(FLOATS, FLOATS[i, j]) for i, j in ((1, 3), (3, 3), (2, 2), (2, 4))]
-    found = digests(training=holey)["training_image"]
-    assert found not in [digests(training=one)["training_image"] for one in near]
+    completed = [digests(training=training)["training_image"] for training in near]
+    assert seen[1]["training_image"] not in completed, "an unknown pixel is not what it is completed with"
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("axis", [None, 0])
-def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
+def test_a_callback_is_told_of_every_realisation_and_its_parts():
     seen, shares = [], []
 
     def look(progress):
@@ -286,10 +233,10 @@ def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
         if progress.stage:
             seen.append((progress, progress.image()))
         else:
-            assert progress.image().ndim == 2 + (axis is not None)
+            assert progress.image().ndim == 3
 
-    training = TRAINING if axis is None else np.moveaxis(texture((16, 20), 2), -1, 0)
-    found = simulate(training, n=3, first=2, jobs=jobs, channel_axis=axis, callback=look)
+    training = np.moveaxis(texture((16, 20), 2), -1, 0)
+    found = simulate(training, n=3, first=2, jobs=2, channel_axis=0, callback=look)
     assert [one.finished for one, _ in seen] == [1, 2, 3]
     assert len(shares) > 9 and shares == sorted(shares) and (0 < shares[0] < 1 / 3, shares[-1]) == (True, 1.0)
     assert sorted(one.realisation for one, _ in seen) == [2, 3, 4]
@@ -300,8 +247,7 @@ def test_a_callback_is_told_of_every_realisation_and_its_parts(jobs, axis):
         assert np.array_equal(picture, found.sel(realisation=one.realisation).values)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+@pytest.mark.parametrize(("jobs", "error"), [(1, KeyboardInterrupt), (2, ZeroDivisionError)])
 def test_an_error_in_one_realisation_ends_all(jobs, error):
     before, calls = set(threading.enumerate()), []
 
@@ -334,45 +280,28 @@ def test_cells_outside_of_the_region_take_no_part():
         assert np.array_equal(row < 0, outside | known)
         assert found.attrs.get("missing") == (None if np.isnan(missing) else missing)
         assert np.array_equal(np.isnan(found.simulation.where(found.region)), outside)
-    other = simulate(FLOATS, region=region).attrs
-    assert "hard_data" not in other and "region" in other
+    assert "hard_data" in found.attrs and "region" in found.attrs
 
 
-def test_a_narrow_region_is_simulated_to_its_end():
-    region = np.zeros(SHAPE, bool)
-    region[5, 3:9] = region[2, 2] = True
-    found = simulate(CATEGORIES, region=region, categorical=True, levels=2)
-    assert np.isin(found.values[:, region], CATEGORIES).all() and (found.values[:, ~region] == 255).all()
-
-
-@pytest.mark.parametrize("several", [False, True])
-def test_the_source_map_of_every_realisation(several):
+def test_the_source_map_of_every_realisation():
     training = np.arange(16 * 20, dtype=np.int32).reshape(16, 20)
     data = holed()
     options = {"known": np.where(data > 0, 7, np.nan), "finish": 0.0}
-    found = simulate([training, -training] if several else training, source=True, **options)
-    assert set(found.data_vars) == {"simulation", "source_row", "source_column"} | (
-        {"source_image"} if several else set()
-    )
+    found = simulate([training, -training], source=True, **options)
+    assert {*found.data_vars} == {"simulation", "source_row", "source_column", "source_image"}
     assert found.attrs == found.simulation.attrs and found.source_row.dims == ("realisation", "y", "x")
-    taken, known = (found.source_row >= 0).values, data > 0
-    assert np.array_equal(taken, ~known | np.zeros((2, 1, 1), bool))
-    signs = np.where(found.source_image == 1, -1, 1)[taken] if several else 1
-    assert (signs * training[found.source_row.values[taken], found.source_column.values[taken]]).tolist() == (
-        found.simulation.values[taken].tolist()
-    )
-    alone = simulate([training, -training] if several else training, **options)
-    assert alone.identical(found.simulation)
+    taken = (found.source_row >= 0).values
+    assert np.array_equal(taken, ~(data > 0) | np.zeros((2, 1, 1), bool))
+    signs = np.where(found.source_image == 1, -1, 1)[taken]
+    rows, cols = (found[name].values[taken] for name in ("source_row", "source_column"))
+    assert np.array_equal(signs * training[rows, cols], found.simulation.values[taken])
+    assert simulate([training, -training], **options).identical(found.simulation)
 
 
 ANOTHER = {
     "source": {"source": False},
     "n": {"n": 4},
     "first": {"first": 1},
-    "sample": {"training": TRAINING[::-1]},
-    "mask": {"mask": TRAINING > 90},
-    "known": {"known": np.where(holed() > 0, 7, np.nan)},
-    "guide": {"guide": (TRAINING, TRAINING[:12, :14])},
     "region": {"region": np.arange(14) < np.full((12, 1), 9)},
     "rotation": {"rotation": np.zeros(SHAPE)},
     "option order": {"order": 1},
@@ -402,11 +331,6 @@ def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):
     xarray.testing.assert_identical(simulate(n=3, source=True, checkpoint=path), whole)
 
 
-def test_the_size_is_that_of_a_map():
-    assert simulate(n=1, shape=None, rotation=np.zeros((7, 9))).shape == (1, 7, 9)
-    assert simulate(n=1, shape=None, image_map=np.ones((1, 7, 9))).shape == (1, 7, 9)
-
-
 def test_a_table_of_probabilities(tmp_path):
     path = tmp_path / "soft.csv"
     path.write_text("x,y,none,some,more\n3,4,0,0,1\n7,2,1,0,0\n5,5,,,\n")
@@ -414,53 +338,38 @@ def test_a_table_of_probabilities(tmp_path):
     assert (found.values[:, 4, 3] == 7).all() and (found.values[:, 2, 7] == 0).all()
     table = np.full((3, *SHAPE), np.nan)
     table[:, 4, 3], table[:, 2, 7] = [0, 0, 1], [1, 0, 0]
-    same = simulate(CATEGORIES, categorical=True, probabilities=table)
+    same = simulate(CATEGORIES, categorical=True, probabilities=np.ma.masked_invalid(table))
     assert_same_bits(found.values, same.values)
-    assert_same_bits(
-        simulate(CATEGORIES, categorical=True, probabilities=np.ma.masked_invalid(table)).values, same.values
-    )
 
 
 NOTHING = np.full(SHAPE, np.nan)
-THIRDS = np.full((3, *SHAPE), 1 / 3)
+THIRDS, LEFT = np.full((3, *SHAPE), 1 / 3), np.arange(14) < np.full((12, 1), 3)
 NAMED = {"training": CATEGORIES, "categorical": True}
 BAD = {
-    "no categories": ({"probabilities": THIRDS}, ValueError, "are of categories; give categorical=True"),
-    "too few": (NAMED | {"probabilities": THIRDS[:2]}, ValueError, "2x12x14 .* the 3 categories 0, 3, 7; give"),
-    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, ValueError, "is 3x5x14 and has to be 3x12x14"),
-    "no sum": (NAMED | {"probabilities": THIRDS * 2}, ValueError, "row 0, column 0 are 0.6.*add up to 1"),
-    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, ValueError, "of 0 or more that add up"),
-    "no table": (NAMED | {"probabilities": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
-    "words": ({"rotation": np.full(SHAPE, "a")}, TypeError, "rotation holds .* convert it to integers or real floats"),
-    "scale": ({"scale": np.full(SHAPE, 3.0)}, ValueError, "scale has 3 to 3; give factors of 0.5 to 2"),
-    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, ValueError, "rotation has infinite values"),
-    "no such image": ({"image_map": np.ones(SHAPE)}, ValueError, "image_map has 1 and there is 1 training image;"),
-    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, ValueError, "weights below 0, or 0 alone"),
-    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, ValueError, "leave shares out"),
-    "no region": ({"region": np.zeros(SHAPE, bool)}, ValueError, "region is False everywhere"),
-    "numbers": ({"region": np.ones(SHAPE)}, TypeError, "region holds float64 values; give True and False"),
-    "region's size": ({"region": np.ones((3, 4), bool)}, ValueError, "region is 3x4 and the output 12x14"),
-    "data outside": (
-        {"region": np.arange(14) < np.full((12, 1), 3), "known": np.where(NOTHING < 0, 0, 20 + 0 * np.indices(SHAPE)[0])
-         * np.where(np.indices(SHAPE)[1] == 5, 1, np.nan)}, ValueError, "row 0, column 5, outside region; leave"),
-    "no missing value": (
-        {"training": TRAINING > 90, "region": np.arange(14) < np.full((12, 1), 3)}, ValueError, "as int16"),
-    "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
-    "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
-    "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),
-    "an unknown category": (
-        {"training": CATEGORIES, "categorical": True, "known": with_value(NOTHING, 1.0)}, ValueError, "1"),
-    "a cell of no size": ({"cell": (1, 0)}, ValueError, "give sizes above 0"),
-    "an origin of one number": ({"origin": (1,)}, ValueError, "origin is .*; give"),
-}  # fmt: skip
+    "no categories": ({"probabilities": THIRDS}, "are of categories; give categorical=True"),
+    "too few": (NAMED | {"probabilities": THIRDS[:2]}, "2x12x14 .* the 3 categories 0, 3, 7; give"),
+    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, "is 3x5x14 and has to be 3x12x14"),
+    "no sum": (NAMED | {"probabilities": THIRDS * 2}, "row 0, column 0 are 0.6.*add up to 1"),
+    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, "of 0 or more that add up"),
+    "scale": ({"scale": np.full(SHAPE, 3.0)}, "scale has 3 to 3; give factors of 0.5 to 2"),
+    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, "rotation has infinite values"),
+    "no such image": ({"image_map": np.ones(SHAPE)}, "image_map has 1 and there is 1 training image;"),
+    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, "weights below 0, or 0 alone"),
+    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, "leave shares out"),
+    "no region": ({"region": np.zeros(SHAPE, bool)}, "region is False everywhere"),
+    "data outside": ({"region": LEFT, "known": with_value(NOTHING, 20, (0, 5))}, "row 0, column 5, outside region;"),
+    "no missing value": ({"training": TRAINING > 90, "region": LEFT}, "as int16"),
+    "none": ({"n": 0}, "n is 0; give 1 or more"),
+    "first": ({"first": -1}, "first is -1; give 0 or more"),
+    "jobs": ({"jobs": 0}, "jobs is 0; give 1 or more"),
+}
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_refused_with_a_remedy(case):
-    change, error, words = BAD[case]
-    with pytest.raises(error, match=words) as caught:
+    change, words = BAD[case]
+    with pytest.raises(ValueError, match=words):
         simulate(**change)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.slow

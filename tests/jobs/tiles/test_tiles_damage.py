@@ -1,7 +1,6 @@
 """A store that is damaged gives the bytes of one that is not, or a sentence: never another picture."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,14 +35,6 @@ def flipped(path):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 4
     path.write_bytes(data)
-
-
-DAMAGES = {
-    "removed": Path.unlink,
-    "flipped": flipped,
-    "emptied": lambda path: path.write_bytes(b""),
-    "cut": lambda path: path.write_bytes(path.read_bytes()[:-3]),
-}
 
 
 @pytest.fixture(scope="module")
@@ -100,163 +91,80 @@ def gone_on(path, sentences):
     raise AssertionError("no end")
 
 
+AGAIN, ANEW = "level 0 begins again with: simdtex resume", "and nothing makes it again; remove the store and begin anew"
+REMOVED, FLIPPED = "removed", "flipped"
 PARTS = [
-    ("sweep", "work/level0/READ/values/c/0/1/1", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/READ/source/c/1/1", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/READ/temperature/zarr.json", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/level0/WRITE/values/c/0/0/0", None),  # what the present turn writes
-    ("sweep", "work/level0/WRITE/source/zarr.json", None),
-    ("sweep", "work/turn", "level 0 begins again with: simdtex resume"),
-    ("sweep", "work/tally*/c/1/0", None),
-    ("sweep", "work/tally*/zarr.json", None),
-    ("sweep", "zarr.json", None),
-    ("sweep", "work/zarr.json", None),
-    ("begin", "work/level0/zarr.json", None),
-    ("begin", "work/level1/*/values/c/0/0/0", "level 1 begins again with: simdtex resume"),
-    ("begin", "work/given/held0/known/c/1/1", "and nothing makes it again; remove the store and begin anew"),
-    ("show", "work/given/values/c/1/1/0", "and nothing makes it again; remove the store and begin anew"),
-    ("begin", "work/run", "and nothing makes it again; remove the store and begin anew"),
-    ("show", "image/c/0/1", None),
-    ("show", "image/zarr.json", None),
-    ("show", "source/c/0/1/0", None),
+    ("sweep", "work/level0/READ/values/c/0/1/1", FLIPPED, AGAIN),
+    ("sweep", "work/level0/READ/values/c/0/1/1", REMOVED, AGAIN),
+    ("sweep", "work/level0/READ/temperature/zarr.json", REMOVED, AGAIN),
+    ("sweep", "work/level0/WRITE/values/c/0/0/0", FLIPPED, None),  # what the present turn writes
+    ("sweep", "work/turn", FLIPPED, AGAIN),
+    ("sweep", "work/tally*/c/1/0", REMOVED, None),
+    ("sweep", "zarr.json", FLIPPED, None),
+    ("sweep", "work/zarr.json", REMOVED, None),
+    ("begin", "work/level1/*/values/c/0/0/0", FLIPPED, "level 1 begins again with: simdtex resume"),
+    ("begin", "work/given/held0/known/c/1/1", FLIPPED, ANEW),
+    ("show", "work/given/values/c/1/1/0", REMOVED, ANEW),
+    ("begin", "work/run", FLIPPED, ANEW),
+    ("show", "image/c/0/1", FLIPPED, None),
+    ("show", "image/zarr.json", REMOVED, None),
+    # what is another one's
+    ("sweep", "work/level0/READ/values/c/0/0/1", "work/level0/READ/values/c/0/0/0", AGAIN),
+    ("sweep", "work/level0/READ/values/c/0/0/0", "work/level0/WRITE/values/c/0/0/0", AGAIN),
+    ("sweep", "work/level0/WRITE/source/c/0/0", "work/level0/READ/source/c/0/0", None),
+    ("sweep", "work/run", "work/turn", ANEW),
+    ("sweep", "work/turn", "work/begun0", AGAIN),
+    ("show", "image/c/0/1", "image/c/0/0", None),
+    ("show", "checksums/c/0/1/0", "checksums/c/0/0/1", None),
 ]
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-@pytest.mark.parametrize(("phase", "part", "words"), PARTS, ids=lambda one: one and one.replace("/", "."))
-def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, damage):
+@pytest.mark.parametrize(("phase", "part", "damage", "words"), PARTS)
+def test_damage_is_mended_or_said(tmp_path, stopped, finished, whole, phase, part, damage, words):
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
     where = part_of(path, part)
-    DAMAGES[damage](where)
+    if damage == REMOVED:
+        where.unlink()
+    elif damage == FLIPPED:
+        flipped(where)
+    else:
+        assert part_of(path, damage).read_bytes() != where.read_bytes()
+        shutil.copyfile(part_of(path, damage), where)
     image = gone_on(path, sentences)
     if words is None:
         assert sentences == []
     else:
         assert words in sentences[0]
         assert str(where.relative_to(path)) in sentences[0] or "zarr.json" in where.name
-    if words is None or "begin anew" not in words:
+    if words != ANEW:
         assert_same_bits(image.compute(), whole)
+        assert_same_bits(zarr.open_group(path)["source"][:], zarr.open_group(finished)["source"][:])
         assert sorted(one.name for one in path.iterdir()) == ["checksums", "image", "source", "zarr.json"]
 
 
-PLACES = [
-    ("sweep", "work/level0/READ/values/c/0/0/0", "work/level0/READ/values/c/0/0/1", "level 0 begins again with"),
-    ("sweep", "work/turn", "work/run", "and nothing makes it again"),
-    ("show", "image/c/0/0", "image/c/0/1", None),
-    ("sweep", "work/level0/WRITE/values/c/0/0/0", "work/level0/READ/values/c/0/0/0", "level 0 begins again with"),
-    ("sweep", "work/level0/READ/source/c/0/0", "work/level0/WRITE/source/c/0/0", None),  # the present turn writes it
-    ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
-    ("sweep", "work/begun0", "work/turn", "level 0 begins again with"),
-    ("begin", "work/given/held0/known/c/0/0", "work/given/held0/known/c/1/1", "and nothing makes it again"),
-    ("show", "source/c/0/1/0", "source/c/1/0/0", None),
-    ("show", "checksums/c/0/0/1", "checksums/c/0/1/0", None),
-]
+def test_a_chunk_of_another_store_is_damage(tmp_path, stopped):
+    """It has the place and the content, and the name of its own store in its checksum."""
+    path, name, sentences = tmp_path / "o.zarr", "work/given/held0/known/c/0/0", []
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    shutil.copyfile(stopped("begin", 3) / name, path / name)
+    assert gone_on(path, sentences) is None
+    assert f"{name} of {path} is missing or damaged, and nothing makes it again" in sentences[0]
 
 
-@pytest.mark.parametrize(("phase", "part", "other", "words"), PLACES, ids=lambda one: one and one.replace("/", "."))
-def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finished, whole, phase, part, other, words):
-    path, sentences = tmp_path / "o.zarr", []
-    shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
-    one, two = part_of(path, part), part_of(path, other)
-    assert one.read_bytes() != two.read_bytes()
-    shutil.copyfile(one, two)
-    image = gone_on(path, sentences)
-    if words is None:
-        assert sentences == []
-    else:
-        assert f"{two.relative_to(path)} of {path} is missing or damaged" in sentences[0]
-        assert words in sentences[0]
-    if image is not None:
-        assert_same_bits(image.compute(), whole)
-        assert_same_bits(zarr.open_group(path)["source"][:], zarr.open_group(finished)["source"][:])
-
-
-@pytest.fixture(scope="module")
-def moments(tmp_path_factory):
-    """Return copies of three stores after every tile, and when finished: two of one run, and one of another seed."""
-    found, place = {}, tmp_path_factory.mktemp("moments")
-    for name, rng in (("one", 11), ("again", 11), ("other", 12)):
-        path, copies = place / f"{name}.zarr", []
-
-        def keep(progress, path=path, copies=copies):
-            copies.append(path.with_name(f"{path.stem}{len(copies)}"))
-            shutil.copytree(path, copies[-1])
-
-        image = made_in(path, source_map=True, callback=keep, rng=rng).compute()
-        keep(None)
-        found[name] = copies, image
-    return found
-
-
-def mixed(path, one, other, chosen):
-    """Make a store of the files of two copies: those that are chosen from the other."""
-    names = {file.relative_to(copy) for copy in (one, other) for file in copy.rglob("*") if file.is_file()}
-    for name in sorted(names):
-        if (source := (other if chosen(name) else one) / name).exists():
-            (path / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, path / name)
-
-
-@pytest.mark.parametrize("how", ["older first", "newer first", "at random", "again", "other", "finished"])
-@pytest.mark.parametrize("seed", range(6))
-def test_a_copy_of_several_moments_gives_the_same_picture_or_a_sentence(tmp_path, moments, how, seed):
-    """As of a backup that was made while the run went on, or a restored part; never another picture."""
-    rng = np.random.default_rng(seed)
-    copies, expected = moments["one"]
-    picked = sorted(rng.choice(len(copies) - 1, 2, replace=False))
-    one, other = (copies[number] for number in picked)
-    if how in moments:
-        other = moments[how][0][picked[1]]
-    elif how == "finished":
-        one, other = copies[-1], moments["other"][0][-1]
-    names = sorted(file.relative_to(one) for file in one.rglob("*") if file.is_file())
-    part = names[rng.integers(len(names))]
-    chosen = {"older first": lambda name: name > part, "newer first": lambda name: name < part}
-    path, sentences = tmp_path / "o.zarr", []
-    mixed(path, one, other, chosen.get(how, lambda name: rng.random() < 0.5))
-    try:
-        image = gone_on(path, sentences)
-        found = None if image is None else image.compute()
-    except ValueError as error:
-        assert how == "finished" and "checksum" in str(error)  # Zarr's, of a chunk
-        return
-    if found is not None:
-        root = zarr.open_group(path)
-        copies, expected = moments["one" if root.attrs["simdtex"]["seed"] == 11 else "other"]
-        assert_same_bits(found, expected)
-        assert_same_bits(root["source"][:], zarr.open_group(copies[-1])["source"][:])
-    else:
-        assert how in ("again", "other", "finished")
-
-
-def test_a_plane_of_an_earlier_turn_is_damage(tmp_path, moments):
-    copies, expected = moments["one"]
-    stores = [Store(str(copy)) for copy in copies[:-1]]
-    late = next(n for n, store in enumerate(stores) if (turn := store.turn).level == 0 and turn.cooling == 1)
-    early = next(store for store in stores if store.turn.number == stores[late].turn.number - 1)
-    path, sentences = tmp_path / "o.zarr", []
-    shutil.copytree(copies[late], path)
-    where, old = (part_of(Path(store), "work/level0/READ/values/c/0/0/1") for store in (path, early.where))
-    assert old.read_bytes() != where.read_bytes()
-    shutil.copyfile(old, where)
-    image = gone_on(path, sentences)
-    assert f"{where.relative_to(path)} of {path} is missing or damaged; level 0 begins again" in sentences[0]
-    assert_same_bits(image.compute(), expected)
-
-
-@pytest.mark.parametrize("damage", ["removed", "cut", "another"])
-@pytest.mark.parametrize("part", ["image/c/3/3", "source/c/1/0/0"])
-def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
+@pytest.mark.parametrize(
+    ("part", "other"), [("image/c/3/3", None), ("image/c/3/3", "image/c/2/3"), ("source/c/1/0/0", "source/c/2/0/0")]
+)
+def test_a_finished_store_is_checked(tmp_path, finished, whole, part, other):
     path = tmp_path / "o.zarr"
     shutil.copytree(finished, path)
     image = TileStore(path).resume()
     assert image.chunks[0][:2] == (4, 4)
     assert_same_bits(image.compute(), whole)
-    if damage == "another":
-        shutil.copyfile(path / part.replace("c/1/", "c/2/").replace("c/3/", "c/2/"), path / part)
+    if other:
+        shutil.copyfile(path / other, path / part)
     else:
-        DAMAGES[damage](path / part)
+        (path / part).unlink()
     with pytest.raises(
         ValueError, match=rf"{part} of .* is missing or damaged, and nothing makes it again; remove the store and begin"
     ):
@@ -270,9 +178,6 @@ def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
         ("source/zarr.json", b"14", b"13"),
         ("zarr.json", b'"arrays"', b'"arrayc"'),
         ("checksums/zarr.json", b"2,", b"1,"),
-        ("image/zarr.json", b'"name": "bytes"', b'"name": "bytes2"'),
-        ("source/zarr.json", b'"little"', b'"big"'),
-        ("source/zarr.json", b'"fill_value": 0', b'"fill_value": 1'),
         ("image/zarr.json", b'"attributes": {}', b'"attributes": {"mine": 1}'),
     ],
 )
@@ -289,15 +194,6 @@ def test_the_description_of_a_finished_store_is_checked(tmp_path, finished, whol
         TileStore(path).resume()
 
 
-def test_the_picture_has_checksums(tmp_path, stopped):
-    path = tmp_path / "o.zarr"
-    shutil.copytree(stopped("show", 3), path)
-    image = TileStore(path).resume(REFERENCE)
-    flipped(path / "image/c/0/1")
-    with pytest.raises(ValueError, match="checksum"):
-        image.compute()
-
-
 def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
     path = tmp_path / "o.zarr"
 
@@ -305,22 +201,8 @@ def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
         if progress.phase == "sweep":
             shutil.rmtree(path)
 
-    with pytest.raises(
-        ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin anew"
-    ):
+    with pytest.raises(ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin"):
         made_in(path, callback=remove)
-    assert not path.exists()
-
-
-def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
-    path = tmp_path / "o.zarr"
-    shutil.copytree(stopped("sweep", 3, 2), path)
-    store = Store(str(path))
-    turn = store.turn
-    assert store.done(turn, 0)  # which opens the arrays
-    shutil.rmtree(path)
-    with pytest.raises(files.Damaged, match=r"zarr\.json"):
-        store.note(turn, 0, np.zeros(462, np.int64))
     assert not path.exists()
 
 
@@ -330,8 +212,12 @@ def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_remov
     TileStore(path).resume(REFERENCE)
     shutil.copytree(stopped("show", 3) / "work" / "given", path / "work" / "given")
     assert TileStore(path).finished
-    assert_same_bits(TileStore(path).resume(REFERENCE).compute(), whole)
+    image = TileStore(path).resume(REFERENCE)
+    assert_same_bits(image.compute(), whole)
     assert not (path / "work").exists()
+    flipped(path / "image/c/0/1")
+    with pytest.raises(ValueError, match="checksum"):
+        image.compute()
 
 
 def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_path, monkeypatch):
@@ -354,15 +240,13 @@ def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_pat
     assert "." in flushed  # the name of the store itself
 
 
-@pytest.mark.parametrize("tasks", [1, 3])
-def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
-    monkeypatch.setattr(layout, "TASKS", tasks)
+def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch):
+    monkeypatch.setattr(layout, "TASKS", 3)
     seen = []
     given = {"known": KNOWN, "callback": lambda progress: seen.append((progress.level, progress.tile))}
     image = made_in(tmp_path / "o.zarr", **given)
     assert_same_bits(image.compute(), whole)
-    each = -(-4 // tasks)
-    assert {tile for level, tile in seen if level == 0} == {min(4, each * n) for n in range(1, -(-4 // each) + 1)}
+    assert {tile for level, tile in seen if level == 0} == {2, 4}
 
 
 def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
@@ -377,8 +261,3 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
         with pytest.raises(ValueError, match=rf"^{tmp_path}/new\.zarr/.* could not be written .*: free some space"):
             made_in(tmp_path / "new.zarr")
     assert_same_bits(TileStore(path).resume(REFERENCE).compute(), whole)
-    (path / "image" / "zarr.json").unlink()
-    with pytest.raises(
-        ValueError, match=r"image/zarr.json of .* is missing or damaged, and nothing makes it again; remove the store"
-    ):
-        TileStore(path).resume(REFERENCE)
