@@ -125,9 +125,8 @@ def fill(
         Blend the filled pixels with the picture up to this many pixels around the holes. Values without a mean
         (categories, few different pixels) change half-way instead.
     light : {"keep", "even"}, optional
-        Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row and
-        column, which is then added at their new place (even). None: even if the picture is smooth for the most part,
-        such as a sky; keep with a reach or ``finish=0``.
+        Take pixels as they are (keep), or without a quadratic of row and column, which is added at their new place
+        (even). None: even if the picture is smooth for the most part, as a sky; keep with a reach or ``finish=0``.
     sample : array of the image's type, or a list of such, optional
         The texture to fill with. None: the rest of the picture.
     reach : int, 1 or more, optional
@@ -136,15 +135,13 @@ def fill(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -265,11 +262,20 @@ def extend(
         Replace this many pixels along each edge that no pixels are added to, so that the output tiles. None: the size
         of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side.
     light : {"keep", "even"}
-        Whether the light of the picture is kept, or pixels are taken without a smooth trend of each channel, a
-        quadratic of row and column. New parts get the picture's light again; where the result wraps around, it has
-        even light.
-    channel_axis, rng, device, callback, checkpoint, full_output
-        As in `fill`.
+        Take pixels as they are (keep), or without a quadratic of row and column, which is added at their new place
+        (even), except where the result wraps around.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed: the same one gives the same bytes on every device. None draws one at random.
+    device : str or Machine, optional
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
     **options
         Those of the method, see `simdtex.methods.mrf.Options`, but for ``boundary``.
 

@@ -63,15 +63,13 @@ def mix(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -207,15 +205,13 @@ def synthesize_solid(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options

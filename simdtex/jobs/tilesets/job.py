@@ -73,20 +73,17 @@ def tileset(
         Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81. None: 2; with several samples their
         number.
     light : {"keep", "even"}
-        Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic
-        of row and column.
+        Keep the light of the sample, or make it even: remove a quadratic of row and column from each channel.
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
