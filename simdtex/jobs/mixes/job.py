@@ -51,7 +51,8 @@ def mix(
     shape : (int, int)
         Rows and columns of the output.
     palette : int, optional
-        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.
+        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has. Channels of the
+        transform in which the pattern is flat, as in a grey one, have the palette's mean.
     pattern : int, optional
         The sample whose subband histograms are matched.
     average : sequence of float, optional

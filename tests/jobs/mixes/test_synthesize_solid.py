@@ -12,7 +12,7 @@ from tolerances import SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
 import simdtex
 from simdtex.methods.pyramid.solid import FAMILIES
 
-SIDE = 32
+SIDE, ON = 32, {"rng": 3, "device": REFERENCE}
 WAYS = {
     "together": {"solids": "turns", "slices": "together"},
     "each": {"solids": "turns", "slices": "each"},
@@ -21,7 +21,7 @@ WAYS = {
 
 
 def solid(sample, shape, **options):
-    return simdtex.synthesize_solid(sample, shape, **({"rng": 3, "device": REFERENCE} | options))
+    return simdtex.synthesize_solid(sample, shape, **(ON | options))
 
 
 def slices_of(volume, name):
@@ -196,3 +196,15 @@ def test_a_callback_sees_every_part_of_a_turn():
 def test_what_is_wrong_is_one_sentence(shape, options, error, words):
     with pytest.raises(error, match=words):
         solid(texture((9, 9)), shape, **options)
+
+
+def test_a_grey_pattern_has_the_colours_of_a_palette_along_one_axis():
+    """Without a pattern the other two axes would be noise; and a flat band has no deviation of its own."""
+    samples = [texture((16, 16), 3) // 2 + 64, texture((16, 16), seed=1)]
+    made, output = simdtex.mix(samples, (16, 16), palette=0, pattern=1, channel_axis=-1, full_output=True, **ON)
+    spread = np.linalg.svd(made.reshape(-1, 3) - made.mean((0, 1)))[1]
+    assert spread[1] < 16 * 0.5 < spread[0], "no more than rounding"
+    assert max(output.statistics["iterations"][-1]["distances"].values()) < 1
+    stripes = np.tile(np.arange(32, dtype=np.uint8) % 5, (32, 1))
+    _, output = simdtex.synthesize(stripes, (16, 16), method="pyramid", full_output=True, **ON)
+    assert max(output.statistics["iterations"][-1]["distances"].values()) < 5
