@@ -147,11 +147,7 @@ def synthesize(
 
 @dataclass(frozen=True)
 class Synthesis:
-    """The job of `synthesize`: one run of a method.
-
-    ``pictures`` are the samples, ``shape`` (rows, cols) is that of the output, ``given`` are known values of the output
-    and ``guide`` leads a run; ``remedy`` is the user's remedy if the memory does not suffice.
-    """
+    """The job of `synthesize`: one run of a method; ``remedy`` is the user's if the memory does not suffice."""
 
     pictures: Pictures
     shape: tuple[int, int]

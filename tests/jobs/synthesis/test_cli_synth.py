@@ -82,13 +82,28 @@ def test_several_samples_and_maps_of_them(folder):
         assert np.array_equal(carried[here], other[source[here][:, 0], source[here][:, 1]])
 
 
-def test_a_mask_says_what_may_be_used(folder):
-    out = made("sample.png", "-o", "out.tif", "--size", "16x12", "--sample-mask", "left.png")
-    mask = pixels("left.png") > 0
-    assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (12, 16), mask=mask, **OPTIONS))
+def numbered(picture):
+    return (picture[..., 2] > 0).astype(np.uint8)
 
 
-def test_a_sample_may_be_unknown_in_parts(folder):
+def test_masks_known_pictures_and_guides_are_those_of_the_function(folder):
+    files = ("sample.png", "second.png", "labels.png", "labels2.png", "wanted.png", "strange.png", "known.tif")
+    sample, second, labels, labels2, wanted, strange, known = map(pixels, files)
+    open_ = np.where(np.arange(18) < 12, numbered(wanted), np.nan)
+    cases = [
+        (["--size", "18x16", "--sample-mask", "left.png"], {"mask": pixels("left.png") > 0}),
+        (["--known", "known.png"], {"known": known}),
+        (["--known", "known.tif"], {"known": known}),
+        (["--guide", "labels.png=wanted.png"], {"guide": (numbered(labels), numbered(wanted))}),
+        (["--guide", "labels.png=strange.png", "--no-labels"], {"guide": (labels, strange), "labels": False}),
+        (["--guide", "labels.png=open.png"], {"guide": (numbered(labels), open_), "labels": True}),
+    ]
+    for args, how in cases:
+        made_by = simdtex.synthesize(sample, (14, 20) if "known" in how else (16, 18), **how, **OPTIONS)
+        assert np.array_equal(made("sample.png", "-o", "out.tif", *args), made_by), args
+    out = made("sample.png", "second.png", "-o", "out.tif", "--guide", "labels.png,labels2.png=wanted.png")
+    guide = [numbered(labels), numbered(labels2)], numbered(wanted)
+    assert np.array_equal(out, simdtex.synthesize([sample, second], (16, 18), guide=guide, **OPTIONS))
     out = made("unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--size", "16x12")
     assert np.array_equal(out, simdtex.synthesize(pixels("unknown.tif"), (12, 16), **OPTIONS)) and (out == 7.5).all()
 
@@ -100,12 +115,6 @@ def test_a_table_is_kept(folder):
     known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")[::-1]
     assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (14, 20), known=known, **OPTIONS))
     assert (load_source_map(folder / "s.npz")[-1 - 4, 3] == -1).all()
-
-
-def test_a_picture_says_what_is_known_and_how_large_the_output_is(folder):
-    out, known = made("sample.png", "-o", "out.tif", "--known", "known.png"), pixels("known.tif")
-    assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (14, 20), known=known, **OPTIONS))
-    assert np.array_equal(out, made("sample.png", "-o", "out.tif", "--known", "known.tif"))
 
 
 def indexed(path, indices, colours, **options):
@@ -158,34 +167,6 @@ def test_guides_with_palettes_are_labels_by_their_colours(folder):
     image.write(folder / "labels.tif", numbered(labels))
     found = simdtex.synthesize(sample, (16, 18), guide=(numbered(labels), numbered(wanted)), **options)
     assert np.array_equal(made(*args, "labels.tif=wanted.png"), found)
-
-
-def numbered(picture):
-    return (picture[..., 2] > 0).astype(np.uint8)
-
-
-def test_colours_are_labels_or_numbers_where_it_says_so(folder):
-    args = ["sample.png", "-o", "out.tif", "--guide"]
-    sample, labels, wanted, strange = map(pixels, ("sample.png", "labels.png", "wanted.png", "strange.png"))
-    found = simdtex.synthesize(sample, (16, 18), guide=(numbered(labels), numbered(wanted)), **OPTIONS)
-    assert np.array_equal(made(*args, "labels.png=wanted.png"), found)
-    found = simdtex.synthesize(sample, (16, 18), guide=(labels, strange), labels=False, **OPTIONS)
-    assert np.array_equal(made(*args, "labels.png=strange.png", "--no-labels"), found)
-
-
-def test_what_is_transparent_in_the_guide_of_the_output_is_left_open(folder):
-    out = made("sample.png", "-o", "out.tif", "--guide", "labels.png=open.png")
-    wanted = numbered(pixels("wanted.png")).astype(float)
-    wanted[:, 12:] = np.nan
-    guide = numbered(pixels("labels.png")), wanted
-    assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (16, 18), guide=guide, labels=True, **OPTIONS))
-
-
-def test_each_sample_has_its_guide(folder):
-    out = made("sample.png", "second.png", "-o", "out.tif", "--guide", "labels.png,labels2.png=wanted.png")
-    guide = [numbered(pixels(name)) for name in ("labels.png", "labels2.png")], numbered(pixels("wanted.png"))
-    samples = [pixels("sample.png"), pixels("second.png")]
-    assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), guide=guide, **OPTIONS))
 
 
 OUT = ["-o", "out.tif"]
