@@ -20,11 +20,7 @@ from simdtex.methods.pyramid.stretched import Stretched
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture of pictures (rows, cols, channels) before it has a machine and a seed.
-
-    ``average`` are the weights of the pictures in the pattern, and ``sides`` the pictures of low and high frequencies
-    and the split between them.
-    """
+    """A mixture of pictures (rows, cols, channels); ``sides`` are those of low and high frequencies, and the split."""
 
     pictures: list[NDArray[Any]]
     shape: tuple[int, int]
