@@ -242,7 +242,7 @@ def film(job: Job, machine: Machine) -> tuple[dict[str, Any], list[bytes]]:
         raise ValueError(f"a film has an output and a sample of at most {FILM_SIDE} x {FILM_SIDE} pixels; give fewer")
     replay = job.replay(machine)
     own = [(n, one) for n, one in enumerate(replay.sweeps) if one.level == 0]
-    if type(replay) is not Replay or not own:
+    if not isinstance(replay, Replay) or not own:
         raise ValueError("a film shows sweeps of a texture at its full size, and this run has none; give another one")
     first = own[0][1]
     moments = [(n, k) for n, one in own for k in range(1, one.sets + 1)]

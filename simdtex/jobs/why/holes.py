@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simdtex.jobs.filling.job import Filling, paste, shifted
 from simdtex.jobs.why.replay import Instant, Replay
@@ -48,6 +49,10 @@ class HoleReplay(Replay):
         if not self._hole[row, col]:
             raise ValueError("this pixel is not in the hole: its value is given")
         return super().explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets, **other)
+
+    def together(self, now: Instant) -> NDArray[np.bool_]:
+        """Return whether each site of the last set of an instant has a neighbour in that set."""
+        return super().together(replace(now, relaxed=now.relaxed[self._at][:: 2**now.level, :: 2**now.level]))
 
     def _explained(self, *moment: Any, **other: Any) -> Explanation:
         why = super()._explained(*moment, **other)

@@ -7,7 +7,9 @@ from skimage import data
 
 import simdtex
 from simdtex import random
+from simdtex.jobs.filling.job import plan_filling
 from simdtex.jobs.why import replay as module
+from simdtex.jobs.why.holes import HoleReplay
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
 from simdtex.methods.mrf.neighbourhood import Field
@@ -202,3 +204,19 @@ def test_a_pixel_that_keeps_its_value_is_explained_on_the_level_above():
             replay.explain_pixel(*pixel, n, 0)
     with pytest.raises(IndexError):
         replay.at(1000)
+
+
+def test_the_replay_of_a_hole_is_in_pixels_of_the_picture():
+    image, hole = texture((20, 26)), np.zeros((20, 26), bool)
+    hole[6:13, 8:17] = True
+    how = {"order": 2, "schedule": "synchronous", "finish": 0.0}
+    replay = HoleReplay(plan_filling(image, hole, **how), REFERENCE, 3)
+    made, output = simdtex.fill(image, hole, **how, rng=3, device=REFERENCE, full_output=True)
+    assert_same_bits(replay.at(-1).image, made[..., None])
+    np.testing.assert_array_equal(replay.at(-1).source, output.source)
+    why = replay.explain_pixel(9, 12)
+    np.testing.assert_array_equal(why.candidates.place[why.taken], output.source[9, 12])
+    assert replay.explain(why.site).table() == why.table()
+    assert replay.together(replay.at(-1, 1)).all(), "all sites at once"
+    with pytest.raises(ValueError, match="not in the hole"):
+        replay.explain_pixel(0, 12)
