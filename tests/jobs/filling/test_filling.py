@@ -122,14 +122,6 @@ def test_a_hole_does_not_depend_on_what_is_beyond_its_reach():
     assert (fill(near, mask, reach=6)[mask] != one[mask]).any()
 
 
-def test_levels_are_those_that_are_asked_for():
-    for levels in (1, 2):
-        _, output = fill(texture(SHAPE), MIDDLE, levels=levels, full_output=True)
-        assert len(output.statistics["levels"]) == levels
-    with pytest.raises(ValueError, match=f"levels={2**31 - 1} is too many"):
-        fill(texture(SHAPE), MIDDLE, levels=2**31 - 1)
-
-
 def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level():
     for side, radius, levels in ((1, 1, 1), (3, 1, 2), (4, 1, 2), (5, 1, 3), (9, 2, 3), (9, 5, 1)):
         mask = hole_at(np.s_[60 : 60 + side, 50 : 50 + side], shape=(200, 200))
@@ -226,12 +218,13 @@ def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls():
 
 
 def test_statistics_are_of_every_window():
-    _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7)
+    _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7, levels=2)
     told = output.statistics
     assert (told["device"], told["seed"]) == (REFERENCE.name, 7)
     options = {name: told["options"][name] for name in ("boundary", "balance", "novelty", "chance", "data_weight")}
     assert options == {"boundary": "open", "balance": 0, "novelty": 0, "chance": 16, "data_weight": 4}
     assert told["device_seconds"] is None and told["levels"] == told["windows"][0]["levels"]
+    assert len(told["levels"]) == 2
     assert len(told["windows"]) == 3 and told["seconds"] >= sum(one["seconds"] for one in told["windows"])
     for one in told["windows"]:
         top, bottom, left, right = one["window"]
@@ -240,7 +233,6 @@ def test_statistics_are_of_every_window():
 
 
 def shaded(rows, cols):
-    """Fine grain on a shade from black at the left to white at the right."""
     return (np.arange(cols) * 200 / cols + np.random.default_rng(8).integers(0, 40, (rows, cols))).astype(np.uint8)
 
 
@@ -380,6 +372,7 @@ BAD = [
     (fill, {"mask": np.ones(SHAPE, bool)}, "nothing of the picture is known; give a mask"),
     (fill, {"mask": MIDDLE.astype(np.uint8)}, "mask holds uint8 values; give True and False"),
     (fill, {"mask": MIDDLE[:-1]}, "mask is 15x20 and the picture 16x20 .*; give one size"),
+    (fill, {"levels": 2**31 - 1}, f"levels={2**31 - 1} is too many"),
     (fill, {"reach": 0}, "reach is 0; give 1 or more"),
     (fill, {"sample": FLOAT}, "sample has 1 channel of float32 and the picture 1 channel of uint8; convert"),
     (fill, {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, "no known pixel"),
@@ -396,9 +389,8 @@ BAD = [
 @pytest.mark.parametrize(("function", "change", "words"), BAD)
 def test_bad_input_is_refused_with_a_remedy(function, change, words):
     usual = {"image": texture(SHAPE), "mask": MIDDLE} if function is fill else {"image": texture(SHAPE)}
-    with pytest.raises((ValueError, TypeError), match=words) as caught:
+    with pytest.raises((ValueError, TypeError), match=words):
         function(**usual | change)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_remedy_for_a_picture_with_scattered_holes_works():
