@@ -53,13 +53,13 @@ def classify(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name, an index of ``simdtex devices``, or ``"reference"``; None: see `simdtex.synthesize`.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run, from which the same call continues after an interruption.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -204,10 +204,10 @@ class TextureClassifier:
     ----------
     channel_axis : int, optional
         The axis of pictures that holds bands; None for grey ones.
-    rng : int or Generator, optional
-        The seed of the exemplars, as in `simdtex.synthesize`.
+    rng : int or numpy.random.Generator, optional
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        As in `simdtex.synthesize`.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     **options
         See `simdtex.jobs.classification.options.Options`.
 

@@ -43,16 +43,20 @@ from simdtex.model.pictures import unknown_in
 
 SIDES = ("left", "right", "top", "bottom")
 
-
-REPORTED = "its pictures, and how evenly it uses the picture"
-"""What the page of a run shows."""
-
-BAND = option(
-    "--band",
-    type=int,
-    help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  [the size "
-    "of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side]",
+CONTINUED = together(
+    option(
+        "--band",
+        type=int,
+        help="Replace this many pixels along each edge that no pixels are added to, so that the output tiles.  [the "
+        "size of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side]",
+    ),
+    LIGHT,
+    material_options,
+    PREVIEW,
+    stages_option("every level and sweep"),
+    report_option("its pictures, and how evenly it uses the picture"),
 )
+"""The options that `extend` and `tile` share."""
 
 
 @job(
@@ -76,12 +80,7 @@ BAND = option(
     help="Make the output tile: left and right (x), top and bottom (y), or both, like `simdtex tile`.  "
     "[both, if no direction is given]",
 )
-@BAND
-@LIGHT
-@material_options
-@PREVIEW
-@stages_option("every level and sweep")
-@report_option(REPORTED)
+@CONTINUED
 def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
@@ -111,12 +110,7 @@ def extend(size: str | None, seamless: Any, **options: Any) -> Task:
     show_default=True,
     help="Join left and right (x), top and bottom (y), or both.",
 )
-@BAND
-@LIGHT
-@material_options
-@PREVIEW
-@stages_option("every level and sweep")
-@report_option(REPORTED)
+@CONTINUED
 def tile(direction: Any, **options: Any) -> Task:
     """Make PICTURE tile, or all maps of a material.
 

@@ -50,9 +50,6 @@ FEW = 16
 ENOUGH = 512
 """Rows and columns of a picture that determine the size of its parts; of a larger one every n-th pixel is taken."""
 
-TENTH = 0.1
-"""The autocorrelation at a lag of the size of a picture's parts."""
-
 EACH = 2**18
 """Pixels of a window with all holes that take about as long as the window of a small hole, which has one level."""
 
@@ -64,34 +61,24 @@ class Window(NamedTuple):
     cols: slice
     levels: int
 
-    @property
-    def at(self) -> tuple[slice, slice]:
-        """Its rows and columns."""
-        return self.rows, self.cols
-
 
 def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
-    """Return windows that hold the holes of a picture and the neighbourhoods of their sites, from top to bottom.
-
-    ``hole`` (rows, cols) is True somewhere, ``radius`` is that of a neighbourhood, and ``levels`` the number of levels.
-    With None, the neighbourhood of a site in the middle of its hole reaches the rim at the coarsest level. Overlapping
-    windows are joined.
-    """
+    """Return windows, which do not overlap, that hold the holes of a picture and the neighbourhoods of their sites."""
+    # without levels, the neighbourhood in the middle of a hole reaches the rim at the coarsest level
     deepest = ndimage.distance_transform_cdt(np.pad(hole, 1), metric="chessboard")[1:-1, 1:-1]
     wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
     around = radius * 2 ** min(wanted - 1, 32) + 1  # larger than any picture
     near = ndimage.distance_transform_cdt(~hole, metric="chessboard") <= around
-    found: list[tuple[slice, slice]] = []
-    while len(boxes := ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])) != len(found):
-        found = boxes
-        for box in found:
+    apart: list[tuple[slice, slice]] = []
+    while len(boxes := ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])) != len(apart):
+        apart = boxes
+        for box in apart:
             near[box] = True  # the bend of a hole may contain another hole
-    around_all = ndimage.find_objects(near.astype(np.uint8))
-    area, all_of_it = (sum((r.stop - r.start) * (c.stop - c.start) for r, c in boxes) for boxes in (found, around_all))
-    cheaper = wanted == 1 and MANY < all_of_it < len(found) * EACH
-    if len(found) > FEW or area > near.size // 2 or cheaper:
-        found = around_all
-    return [Window(r, c, wanted) for r, c in found]
+    joined = ndimage.find_objects(near.astype(np.uint8))
+    area, area_joined = (sum((r.stop - r.start) * (c.stop - c.start) for r, c in boxes) for boxes in (apart, joined))
+    cheaper = wanted == 1 and MANY < area_joined < len(apart) * EACH
+    several = len(apart) <= FEW and area <= near.size // 2 and not cheaper
+    return [Window(r, c, wanted) for r, c in (apart if several else joined)]
 
 
 def fill(
@@ -125,9 +112,8 @@ def fill(
         Blend the filled pixels with the picture up to this many pixels around the holes. Values without a mean
         (categories, few different pixels) change half-way instead.
     light : {"keep", "even"}, optional
-        Whether pixels are taken as they are (keep), or without a smooth trend of each channel, a quadratic of row and
-        column, which is then added at their new place (even). None: even if the picture is smooth for the most part,
-        such as a sky; keep with a reach or ``finish=0``.
+        Take pixels as they are (keep), or without a quadratic of row and column, which is added at their new place
+        (even). None: even if the picture is smooth for the most part, as a sky; keep with a reach or ``finish=0``.
     sample : array of the image's type, or a list of such, optional
         The texture to fill with. None: the rest of the picture.
     reach : int, 1 or more, optional
@@ -136,15 +122,13 @@ def fill(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -165,12 +149,11 @@ def fill(
 
     Notes
     -----
-    Known pixels are sites of temperature 0 that are never relaxed. Each hole, with the surroundings in reach of its
-    sites, has a separate lattice, unless the picture wraps around (``boundary="torus"``) or there are many holes. The
-    smooth colours around a hole, continued into it, and the place in the picture are a guide
-    (`simdtex.model.guide.Surroundings`), so that the hole gets the texture of its surroundings. There is no such guide
-    with a `sample`, with categories or with few different pixels (see `finish`). Cost: that of `simdtex.synthesize` for
-    the holes' pixels, and of a sample of the surroundings' size.
+    Each hole, with the surroundings in reach of its sites, has a separate lattice, unless the picture wraps around
+    (``boundary="torus"``) or there are many holes. The smooth colours around a hole, continued into it, and the place
+    in the picture are a guide (`simdtex.model.guide.Surroundings`), except with a `sample`, with categories or with few
+    different pixels (see `finish`). Cost: that of `simdtex.synthesize` for the holes' pixels, and of a sample of the
+    surroundings' size.
 
     Examples
     --------
@@ -221,15 +204,14 @@ def plan_filling(
     if hole.all():
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     chosen = resolve(Options, "fill", options, fill)
-    found = None
+    lit = Light({"light": "keep"})
     if light == "even" or (light is None and _may_be_lit(reach, chosen, pixels[~hole][None])):
-        (found,) = trends([pixels], [~hole], chosen.categorical)
-        found = found if light or found.explains(pixels, ~hole) else None
-    if not found:
-        return Filling(pixels, hole, pictures, reach, chosen, share, Light({"light": "keep"}), channel_axis)
-    lit = Light({"light": "even"}, Relit(pixels, hole, found))
-    pictures = pictures and in_light(pictures, "even", chosen.categorical)[0]
-    return Filling(found.removed(pixels), hole, pictures, reach, chosen, share, lit, channel_axis)
+        (trend,) = trends([pixels], [~hole], chosen.categorical)
+        if light or trend.explains(pixels, ~hole):
+            lit = Light({"light": "even"}, Relit(pixels, hole, trend))
+            pixels = trend.removed(pixels)
+            pictures = pictures and in_light(pictures, "even", chosen.categorical)[0]
+    return Filling(pixels, hole, pictures, reach, chosen, share, lit, channel_axis)
 
 
 def extend(
@@ -265,11 +247,20 @@ def extend(
         Replace this many pixels along each edge that no pixels are added to, so that the output tiles. None: the size
         of the picture's parts, such as stones or bricks: between an eighth and a fifth of the shorter side.
     light : {"keep", "even"}
-        Whether the light of the picture is kept, or pixels are taken without a smooth trend of each channel, a
-        quadratic of row and column. New parts get the picture's light again; where the result wraps around, it has
-        even light.
-    channel_axis, rng, device, callback, checkpoint, full_output
-        As in `fill`.
+        Take pixels as they are (keep), or without a quadratic of row and column, which is added at their new place
+        (even), except where the result wraps around.
+    channel_axis : int, optional
+        The axis of pictures that holds channels; None for grey pictures.
+    rng : int or numpy.random.Generator, optional
+        The seed: the same one gives the same bytes on every device. None draws one at random.
+    device : str or Machine, optional
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
+    full_output : bool
+        Return a `simdtex.run.Output` too.
     **options
         Those of the method, see `simdtex.methods.mrf.Options`, but for ``boundary``.
 
@@ -345,12 +336,12 @@ def plan_extension(
     one_of("light", light, LIGHTS)
     lit = Light({"light": light, **unevenness(pixels)})
     if light == "even":
-        (found,) = trends([pixels], [np.ones((rows, cols), bool)], chosen.categorical)
+        (trend,) = trends([pixels], [np.ones((rows, cols), bool)], chosen.categorical)
         wraps = (0,) * tall + (1,) * wide
         whole_picture = canvas.copy()
-        whole_picture[at] = found.removed(pixels, wraps)
-        lit = replace(lit, relit=Relit(whole_picture, hole, found, (top, left), wraps))
-        pixels = found.removed(pixels)
+        whole_picture[at] = trend.removed(pixels, wraps)
+        lit = replace(lit, relit=Relit(whole_picture, hole, trend, (top, left), wraps))
+        pixels = trend.removed(pixels)
     canvas[at] = pixels
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
@@ -366,29 +357,21 @@ def plan_extension(
 
 
 def band_of(pixels: NDArray[Any]) -> int:
-    """Return the width of the bands that make a picture (rows, cols, C) seamless: the size of its parts, in pixels.
-
-    That is the longer vector of its lattice, or the lag at which its autocorrelation has fallen to a tenth, but a
-    fifth of the shorter side at most. It is at least 8, and an eighth of the shorter side up to 64.
-    """
+    """Return the width of the bands that make a picture (rows, cols, C) seamless: the size of its parts, in pixels."""
     side: int = min(pixels.shape[:2])
     factor: int = -(-max(pixels.shape[:2]) // ENOUGH)
     (reduced,), (known,) = plain(Pictures((pixels[::factor, ::factor],)))
-    found = regular(reduced, known)
-    if found:
-        size = float(np.hypot(*found.basis.T).max())
-    else:
+    if lattice := regular(reduced, known):
+        size = float(np.hypot(*lattice.basis.T).max())  # the longer vector
+    else:  # the lag at which the autocorrelation has fallen to a tenth
         values = autocorrelation(reduced, known).values
         row, col = (n // 2 for n in values.shape)
-        size = max(int(np.argmax(np.append(line, 0) < TENTH)) for line in (values[row:, col], values[row, col:]))
+        size = max(int(np.argmax(np.append(line, 0) < 0.1)) for line in (values[row:, col], values[row, col:]))
     return max(8, min(64, side // 8), min(round(factor * size), side // 5))
 
 
 class Made(NamedTuple):
-    """The result of a window: values, temperatures and sources of its hole, and the statistics of its run.
-
-    ``corner`` is the first pixel of its sample in the picture.
-    """
+    """The result of a window: the corner of its sample, and values, temperatures and sources of its hole."""
 
     corner: tuple[int, int]
     values: NDArray[Any]
@@ -406,11 +389,7 @@ class Whole(NamedTuple):
 
 
 class WindowSample(NamedTuple):
-    """The sample of a window.
-
-    ``corner`` is its first pixel in the picture; ``place`` is the position of the window's pixels in it, None for a
-    separate sample.
-    """
+    """The sample of a window, its first pixel in the picture, and where the window is in it, None if elsewhere."""
 
     pictures: Pictures
     corner: tuple[int, int]
@@ -419,11 +398,7 @@ class WindowSample(NamedTuple):
 
 @dataclass(frozen=True)
 class Filling:
-    """The job of `fill`: a sequence of runs, one for each window.
-
-    ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample`` or, if it is
-    None, from their surroundings up to ``reach`` pixels around a hole; ``share`` is from `widened`.
-    """
+    """The job of `fill`: a run for each window of ``pixels`` (rows, cols, C); ``share`` is from `widened`."""
 
     pixels: NDArray[Any]
     hole: Mask
@@ -437,19 +412,16 @@ class Filling:
     def make(
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
-        """Fill one window after the other, and return the result.
-
-        The state is the results of finished windows, and the state of the current run.
-        """
-        whole = self.begin()
-        parts = self.windows()
-        done, inside = checkpointing.found or ([], None)
-        finished = [Made(*made) for made in done]
+        """Fill one window after the other; the state is the finished windows, and the state of the current run."""
+        whole, parts = self.begin(), self.windows()
+        saved, inside = checkpointing.found or ([], None)
+        finished = [Made(*made) for made in saved]
         for number, window in enumerate(parts):
-            at, hole = window.at, self.hole[window.at]
+            at = window[:2]
+            hole = self.hole[at]
             if number == len(finished):
                 sample = self.sample_of(window)
-                seen = callback and partial(self._show, callback, whole, window, sample, number, len(parts))
+                seen = callback and partial(self._show, callback, whole, at, sample, (number, len(parts)))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
                 plan, account = self.plan(window, sample), observers(self.options.array)
                 made, output = drive(plan, machine, seed, seen, now, account)
@@ -458,11 +430,11 @@ class Filling:
                 finished.append(Made(sample.corner, made[hole], output.temperature[hole], output.source[hole], about))
                 inside = None
                 checkpointing.offer(None, lambda: (finished, None))
-            found = finished[number]
-            whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
-            whole.source[at][hole] = shifted(found.source, found.corner)
+            done = finished[number]
+            whole.image[at][hole], whole.temperature[at][hole] = done.values, done.temperature
+            whole.source[at][hole] = shifted(done.source, done.corner)
         self._blend(whole)
-        runs = [found.statistics for found in finished]
+        runs = [done.statistics for done in finished]
         seconds = [run["device_seconds"] for run in runs]
         statistics = {name: runs[0][name] for name in ("device", "seed", "options", "levels")}
         statistics |= {"seconds": sum(run["seconds"] for run in runs), "windows": runs}
@@ -470,24 +442,17 @@ class Filling:
         return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
-        self,
-        callback: Callback,
-        whole: Whole,
-        window: Window,
-        sample: WindowSample,
-        number: int,
-        count: int,
-        progress: Progress,
+        self, callback: Callback, whole: Whole, at: Any, sample: WindowSample, part: tuple[int, int], now: Progress
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
-        pasted = partial(paste, at=window.at, hole=self.hole[window.at], level=progress.level)
-        read: Any = progress.source
+        pasted = partial(paste, at=at, hole=self.hole[at], level=now.level)
+        read: Any = now.source
         return callback(
             replace(
-                progress,
-                fraction=(number + progress.fraction) / count,
-                image=lambda: pasted(whole.image, progress.image()),
-                maps={"temperature": lambda: pasted(whole.temperature, progress.temperature())},
+                now,
+                fraction=(part[0] + now.fraction) / part[1],
+                image=lambda: pasted(whole.image, now.image()),
+                maps={"temperature": lambda: pasted(whole.temperature, now.temperature())},
                 source=lambda: pasted(whole.source, shifted(read(), sample.corner)),
             )
         )
@@ -522,7 +487,7 @@ class Filling:
         """Return the sample of a window: its surroundings, or the sample of the job."""
         if self.sample is not None:
             return WindowSample(self.sample, (0, 0), None)
-        at = window.at
+        at = window[:2]
         ((rows, cols),) = ndimage.find_objects(self.hole[at].astype(np.uint8))
         reach = self.reach or max(REACH, 2 * (rows.stop - rows.start), 2 * (cols.stop - cols.start))
         top, left = (max(0, side.start - reach) for side in at)
@@ -535,8 +500,9 @@ class Filling:
 
     def plan(self, window: Window, sample: WindowSample) -> mrf.MrfPlan:
         """Return the plan of a window's run, guided by the colours around its hole unless the sample is separate."""
-        at, options, guide = window.at, self.options, None
-        pictures, hole, least = sample.pictures, self.hole[at], window.levels and options.levels is None
+        at, options, guide = window[:2], self.options, None
+        pictures, hole, free = sample.pictures, self.hole[at], window.levels and options.levels is None
+        least = 1 + max(0, ceil(log2(prod(pictures.pixels[0].shape[:2]) / MANY) / 2))
         known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
         values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
         if sample.place is not None and pictures.known and _has_tones(options, pictures):
@@ -545,10 +511,10 @@ class Filling:
         return mrf.plan(
             pictures,
             hole.shape,
-            replace(options, overview=FEWEST_CANDIDATES) if least else options,
+            replace(options, overview=FEWEST_CANDIDATES) if free else options,
             Given(values, known, sample.place, suggests=False),
             guide,
-            most=max(window.levels, _fewest_levels(pictures)) if window.levels else None,
+            most=max(window.levels, least) if window.levels else None,
         ).keyed(window.rows.start * self.hole.shape[1] + window.cols.start, self.hole.shape[1])
 
 
@@ -566,24 +532,16 @@ def _has_tones(options: Options, pictures: Pictures) -> bool:
 
 
 def _may_be_lit(reach: int | None, options: Options, known: NDArray[Any]) -> bool:
-    """Return whether the known pixels (1, n, C) of a picture to fill may lose their trend without being asked.
-
-    The trend is of the whole picture, does not wrap around, and changes pixels.
-    """
+    """Return whether the known pixels (1, n, C) of a picture to fill may lose their trend without being asked."""
     whole, tones = reach is None and options.boundary == "open", _has_tones(options, Pictures((known,)))
     return whole and tones and options.finish != 0 and max(float(known.max()), -float(known.min())) <= EXACT
 
 
-def _fewest_levels(pictures: Pictures) -> int:
-    """Return the least number of levels whose coarsest level has at most `MANY` candidates."""
-    return 1 + max(0, ceil(log2(prod(pictures.pixels[0].shape[:2]) / MANY) / 2))
-
-
 def shifted(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
     """Return sources (..., 2 or 3) relative to ``corner`` as positions in the whole picture; -1 stays -1."""
-    found = source.copy()
-    found[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
-    return found
+    moved = source.copy()
+    moved[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
+    return moved
 
 
 def paste(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], hole: Mask, level: int) -> NDArray[Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.command import EITHER, OUTPUTS, READ, WRITE
+from simdtex.cli.command import OUTPUTS, READ, WRITE
 from simdtex.cli.inputs import channels, last_iteration, output_shape, read_material, size_text
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import NUMBERS, PROFILE, given, option, output_option, size_option, stages_option
@@ -56,11 +56,11 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, **options: An
     image.check_writable(output, pixels[0].dtype, max(map(channels, pixels)), metadata=metadata)
     return Task(
         partial(mix, pixels, (rows, cols), channel_axis=axis, **given(options)),
-        f"{cols}x{rows} from {len(pixels)} {'sample' if len(pixels) == 1 else 'samples'}",
+        f"{cols}x{rows} from {len(pixels)} sample{'s' * (len(pixels) > 1)}",
         str(output),
         [lambda made, run: image.write(output, made, metadata)],
         material.limits,
-        lambda made, output: click.echo(last_iteration(output.statistics)),
+        lambda made, run: click.echo(last_iteration(run.statistics)),
     )
 
 
@@ -70,29 +70,21 @@ def _number(name: str, text: str, samples: tuple[Path, ...]) -> int:
         return samples.index(Path(text))
     if text.isdecimal() and 1 <= int(text) <= len(samples):
         return int(text) - 1
-    raise ValueError(
-        f"--{name} {text} is none of the samples; give the path of one as in the command, or its number, 1 to "
-        f"{len(samples)}"
-    )
+    remedy = f"give the path of one as in the command, or its number, 1 to {len(samples)}"
+    raise ValueError(f"--{name} {text} is none of the samples; {remedy}")
 
 
 @job(
     ("solid marble.png -o block.npz --size 64 --view block.png", "Make a cube of 64^3 voxels, and a picture of it."),
     ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
-    usual="outputs size picture seed iterations pyramid dry_run device quiet",
+    usual="output size picture seed iterations pyramid dry_run device quiet",
     methods=[solids.Options],
 )
 @click.argument("sample", type=READ)
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    multiple=True,
-    required=True,
-    type=EITHER,
-    help="Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.",
+@output_option(
+    "Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.", multiple=True
 )
-@click.option(
+@option(
     "--size",
     default="128",
     show_default=True,
@@ -109,7 +101,7 @@ def _number(name: str, text: str, samples: tuple[Path, ...]) -> int:
 )
 @stages_option("the middle slice of every iteration")
 @PROFILE
-def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
+def solid(sample: Path, output: tuple[Path, ...], size: str, picture: Path | None, **options: Any) -> Task:
     """Make a solid block whose slices have the texture of SAMPLE.
 
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
@@ -122,17 +114,17 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str, picture: Path | No
     material = read_material([sample])
     pixels = material.pixels[0]
     writers: list[Any] = []
-    for output in outputs:
-        volume.check_writable(output, pixels.dtype, channels(pixels))
-        writers.append(lambda block, run, output=output: volume.write(output, block))
+    for path in output:
+        volume.check_writable(path, pixels.dtype, channels(pixels))
+        writers.append(lambda block, run, path=path: volume.write(path, block))
     if picture:
         image.check_writable(picture, suffixes=(".png",))
         writers.append(lambda block, run: view(np.asarray(block), picture))
     return Task(
         partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
         f"{'x'.join(map(str, shape))} from {size_text(pixels)}",
-        ", ".join(str(path) for path in (*outputs, picture) if path),
+        ", ".join(str(path) for path in (*output, picture) if path),
         writers,
         material.limits,
-        lambda made, output: click.echo(last_iteration(output.statistics)),
+        lambda block, run: click.echo(last_iteration(run.statistics)),
     )

@@ -41,10 +41,6 @@ def mix(
 ) -> Any:
     """Return a mixture of several textures, by pyramid matching.
 
-    Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
-    frequencies of one sample with the high frequencies of another (`low`, `high`). Its colours are those of its
-    pattern, or of another sample (`palette`).
-
     Parameters
     ----------
     samples : sequence of (rows, cols) or, with `channel_axis`, three-dimensional arrays
@@ -52,9 +48,10 @@ def mix(
     shape : (int, int)
         Rows and columns of the output.
     palette : int, optional
-        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.
+        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has. Channels of the
+        transform in which the pattern is flat, as in a grey one, have the palette's mean. None: those of the pattern.
     pattern : int, optional
-        The sample whose subband histograms are matched.
+        The sample whose subband histograms are matched. None: the average of all.
     average : sequence of float, optional
         A weight for every sample, 0 or more. By default all weights are equal.
     low, high : int, optional
@@ -64,15 +61,13 @@ def mix(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -102,8 +97,25 @@ def mix(
     >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
     (96, 96)
     """
-    about: dict[str, Any] = {"palette": palette, "pattern": pattern, "average": average, "split": split}
-    job = plan_mix(samples, shape, low=low, high=high, channel_axis=channel_axis, **about, **options)
+    pictures, size = _check_samples(samples, channel_axis), check_shape(shape)
+    parts = {name: n for name, n in (("pattern", pattern), ("low", low), ("high", high)) if n is not None}
+    for name, index in {**parts, "palette": palette}.items():
+        integer = isinstance(index, Integral) and not isinstance(index, bool)
+        if index is not None and not (integer and 0 <= int(index) < len(pictures)):
+            raise ValueError(f"{name} is {index!r}; give the number of a sample, 0 to {len(pictures) - 1}")
+    sides = None if low is None or high is None else (low, high, split)
+    if not sides and {"low", "high"} & {*parts}:
+        raise ValueError("low and high go together; give both, or neither")
+    if (pattern is not None) + (average is not None) + (sides is not None) > 1:
+        raise ValueError("a mixture has one pattern; give pattern, average, or low and high")
+    if split is not None:
+        whole("split", split, 0)
+        if not sides:
+            raise ValueError("split parts low from high; give these two, or leave split out")
+    used = [float(n in parts.values()) for n in range(len(pictures))]
+    weights = used if parts else _check_weights(average, len(pictures))
+    chosen = resolve(Options, "mix", with_channels_last(options, channel_axis), mix)
+    job = Mix(pictures, size, chosen, weights, sides, palette, channel_axis)
     picture, output = run("mix", job, rng, device, callback, checkpoint)
     return (picture, output) if full_output else picture
 
@@ -115,57 +127,21 @@ class Mix(SingleRun, Mixture):
     channel_axis: int | None = field(compare=False)
 
 
-def plan_mix(
-    samples: Sequence[ArrayLike],
-    shape: tuple[int, int],
-    *,
-    palette: int | None = None,
-    pattern: int | None = None,
-    average: Sequence[float] | None = None,
-    low: int | None = None,
-    high: int | None = None,
-    split: int | None = None,
-    channel_axis: int | None = None,
-    **options: Any,
-) -> Mix:
-    """Check the arguments of `mix`, and return its job."""
-    pictures, size = _check_samples(samples, channel_axis), check_shape(shape)
-    numbers = {name: n for name, n in (("pattern", pattern), ("low", low), ("high", high)) if n is not None}
-    for name, number in {**numbers, "palette": palette}.items():
-        integer = isinstance(number, Integral) and not isinstance(number, bool)
-        if number is not None and not (integer and 0 <= int(number) < len(pictures)):
-            raise ValueError(f"{name} is {number!r}; give the number of a sample, 0 to {len(pictures) - 1}")
-    sides = None if low is None or high is None else (low, high, split)
-    if not sides and {"low", "high"} & {*numbers}:
-        raise ValueError("low and high go together; give both, or neither")
-    if (pattern is not None) + (average is not None) + (sides is not None) > 1:
-        raise ValueError("a mixture has one pattern; give pattern, average, or low and high")
-    if split is not None:
-        whole("split", split, 0)
-        if not sides:
-            raise ValueError("split parts low from high; give these two, or leave split out")
-    used = [float(n in numbers.values()) for n in range(len(pictures))]
-    weights = used if numbers else _check_weights(average, len(pictures))
-    chosen = resolve(Options, "mix", with_channels_last(options, channel_axis), mix)
-    return Mix(pictures, size, chosen, weights, sides, palette, channel_axis)
-
-
 def _check_samples(samples: Sequence[ArrayLike], channel_axis: int | None) -> list[NDArray[Any]]:
     """Return the samples as (rows, cols, channels), grey ones with the number of channels of colour ones."""
     if not isinstance(samples, Sequence):
-        what = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
-        raise TypeError(f"samples is {what}; give a list of samples")
+        kind = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
+        raise TypeError(f"samples is {kind}; give a list of samples")
     pictures = [check_sample(sample, None if np.ndim(sample) == 2 else channel_axis) for sample in samples]
     if not pictures:
         raise ValueError("there is no sample; give one or more")
-    channels = max(p.shape[-1] for p in pictures)
-    for number, p in enumerate(pictures):
-        if p.dtype != (first := pictures[0].dtype):
-            raise TypeError(f"sample {number} is of {p.dtype} and the first of {first}; convert them to one type")
+    dtype, channels = pictures[0].dtype, max(p.shape[-1] for p in pictures)
+    for index, p in enumerate(pictures):
+        if p.dtype != dtype:
+            raise TypeError(f"sample {index} is of {p.dtype} and the first of {dtype}; convert them to one type")
         if p.shape[-1] not in (1, channels):
-            raise ValueError(
-                f"sample {number} has {p.shape[-1]} channels and another {channels}; give all the same, or grey ones"
-            )
+            counts = f"{p.shape[-1]} channels and another {channels}"
+            raise ValueError(f"sample {index} has {counts}; give all the same, or grey ones")
     return [np.broadcast_to(p, (*p.shape[:2], channels)) for p in pictures]
 
 
@@ -206,15 +182,13 @@ def synthesize_solid(
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -245,22 +219,15 @@ def synthesize_solid(
     >>> block.shape
     (16, 24, 32)
     """
-    job = plan_solid(sample, shape, channel_axis=channel_axis, **options)
+    pixels, (depth, rows, cols) = check_sample(sample, channel_axis), check_sides(shape, ("depth", "rows", "columns"))
+    chosen = resolve(solid.Options, "solid", options, synthesize_solid)
+    job = Solid(pixels, (depth, rows, cols), chosen, None if channel_axis is None else -1)
     volume, output = run("synthesize_solid", job, rng, device, callback, checkpoint)
     return (volume, output) if full_output else volume
 
 
 @dataclass(frozen=True)
 class Solid(SingleRun, solid.SolidPlan):
-    """The job of `synthesize_solid`."""
+    """The job of `synthesize_solid`; its channels are last."""
 
     channel_axis: int | None = field(compare=False)
-
-
-def plan_solid(
-    sample: ArrayLike, shape: tuple[int, int, int], *, channel_axis: int | None = None, **options: Any
-) -> Solid:
-    """Check the arguments of `synthesize_solid`, and return its job; its channels are last."""
-    pixels, (depth, rows, cols) = check_sample(sample, channel_axis), check_sides(shape, ("depth", "rows", "columns"))
-    chosen = resolve(solid.Options, "solid", options, synthesize_solid)
-    return Solid(pixels, (depth, rows, cols), chosen, None if channel_axis is None else -1)

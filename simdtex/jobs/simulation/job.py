@@ -123,8 +123,14 @@ def simulate(
         Make this many realisations at a time. None: one for each core, at most 4; on a GPU 1.
     channel_axis : int, optional
         The axis of training images that holds variables; None for a single one.
-    rng, device, callback, checkpoint
-        As in `simdtex.synthesize`.
+    rng : int or numpy.random.Generator, optional
+        The seed: the same one gives the same bytes on every device. None draws one at random.
+    device : str or Machine, optional
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
+    checkpoint : path or simdtex.Checkpoint, optional
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     **options
         Those of the method, see `simdtex.methods.mrf.Options`.
 

@@ -65,8 +65,7 @@ def synthesize(
     shape : (int, int)
         Rows and columns of the output, each 1 or more; smaller or larger than the sample.
     method : {"mrf", "multires", "pyramid"}
-        Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1; De Bonet's
-        multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).
+        The method of Paget and Longstaff (1998), of De Bonet (1997), or of Heeger and Bergen (1995).
     mask : (rows, cols) bool array, or a list of such, optional
         ``mrf``: True for pixels of the sample that may be taken; all other pixels are still neighbours.
     known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
@@ -81,20 +80,17 @@ def synthesize(
         output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
         guide. With several samples, the first is a list of pictures.
     light : {"keep", "even"}
-        Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic
-        of row and column.
+        Keep the light of the sample, or make it even: remove a quadratic of row and column from each channel.
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     store : simdtex.TileStore, optional
         ``mrf``: make the output in tiles in this Zarr store, for outputs larger than one machine. The store keeps the
         state of the run, which `TileStore.resume` continues.
@@ -151,11 +147,7 @@ def synthesize(
 
 @dataclass(frozen=True)
 class Synthesis:
-    """The job of `synthesize`: one run of a method.
-
-    ``pictures`` are the samples, ``shape`` (rows, cols) is that of the output, ``given`` are known values of the output
-    and ``guide`` leads a run; ``remedy`` is the user's remedy if the memory does not suffice.
-    """
+    """The job of `synthesize`: one run of a method; ``remedy`` is the user's if the memory does not suffice."""
 
     pictures: Pictures
     shape: tuple[int, int]
@@ -255,8 +247,8 @@ def lcpdf(
         neighbours with a temperature of 1 need not match.
     boundary : {"torus", "open"}
         Boundary of the image. Neighbours outside an open boundary have no weight.
-    device : str, optional
-        As in `synthesize`.
+    device : str or Machine, optional
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
 
     Returns
     -------

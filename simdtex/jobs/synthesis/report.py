@@ -39,13 +39,7 @@ def write_synthesis(
     *,
     continued: bool = False,
 ) -> None:
-    """Write the report of a run: ``index.html``, PNG pictures, ``results.json``.
-
-    ``picture.png`` shows sample and output, both (rows, cols[, channels]). If there is a source map, ``use.png`` shows
-    how often each pixel of the sample was taken, and ``arrangement.png`` from where each pixel of the output was taken.
-    Image and source map are arrays, or of a store; they are read part by part. ``continued``: the image contains the
-    sample, so that figures of the whole image say little.
-    """
+    """Write the report of a run, whose image and source map may be of a store; ``continued``: they hold the sample."""
     statistics = dict(output.statistics)
     limits = float(sample.min()), float(sample.max())
 
@@ -77,10 +71,10 @@ def write_synthesis(
 
 def _views(name: str, array: Any, show: Any) -> list[tuple[str, Picture]]:
     """Return the picture of an array, (rows, cols[, ...]), with its label; if it is reduced, a corner of it, too."""
-    found = [(f"the {name}", read_fitted(array, show))]
+    views = [(f"the {name}", read_fitted(array, show))]
     if reduction(array.shape) > 1:
-        found.append(("its upper left corner, not reduced", show(array[:CORNER, :CORNER])))
-    return found
+        views.append(("its upper left corner, not reduced", show(array[:CORNER, :CORNER])))
+    return views
 
 
 def _sheet(pictures: list[tuple[str, Picture]], columns: int) -> Picture:
@@ -90,10 +84,7 @@ def _sheet(pictures: list[tuple[str, Picture]], columns: int) -> Picture:
 
 
 def _counted(source: Any, shape: tuple[int, int]) -> tuple[NDArray[np.intp], float | None]:
-    """Return `counts` of a source map, and the share of its windows that are one piece of the sample.
-
-    The windows have `WINDOW` x `WINDOW` pixels; None if the map is smaller.
-    """
+    """Return `counts` of a source map, and the share of its windows that are one piece of the sample, if it has any."""
     uses, whole, more = np.zeros(shape, np.intp), 0, WINDOW - 1
     for rows, cols in parts(source.shape):
         part = source[rows.start : rows.stop + more, cols.start : cols.stop + more]
@@ -152,11 +143,11 @@ def _use(
 
 def _shares(results: dict[str, Any]) -> list[str]:
     """Return sentences on how much of the sample was taken at all, and how much of the output in whole pieces."""
-    found = [f"{results['taken']:.0%} of the sample's pixels are taken at least once."] if "taken" in results else []
+    shares = [f"{results['taken']:.0%} of the sample's pixels are taken at least once."] if "taken" in results else []
     if results.get("copied") is not None:
         size = f"{WINDOW} x {WINDOW}"
-        found.append(f"Of the output's windows of {size} pixels, {results['copied']:.1%} are one piece of the sample.")
-    return found
+        shares.append(f"Of the output's windows of {size} pixels, {results['copied']:.1%} are one piece of the sample.")
+    return shares
 
 
 def _frame(picture: Picture, piece: dict[str, Any], factor: int) -> None:

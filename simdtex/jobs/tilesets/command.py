@@ -57,8 +57,8 @@ def tileset(
         whole("--colours", colours, 2, 3)
     how = Reading(palette=bool(options["categorical"]))
     leads = [read_lead([path], output, {"roles": roles}, how) for path in samples]
-    lead = leads[0][1] if len(leads) == 1 else read_material([one.paths[0] for _, one in leads], how)
-    folders = [one for one, _ in leads if isinstance(one, Folder)]
+    lead = leads[0][1] if len(leads) == 1 else read_material([material.paths[0] for _, material in leads], how)
+    folders = [target for target, _ in leads if isinstance(target, Folder)]
     maps = read_maps(folders, lead)
     rows, cols = output_shape("256" if size is None else size, lead.pixels[0])
     normals = bool(folders) and folders[0].found.files[folders[0].lead] in NORMALS
@@ -67,9 +67,9 @@ def tileset(
     if len({*names}) < len(names):
         names = [f"{name} {n}" for n, name in enumerate(names, 1)]
     corners = ["".join(map(str, place)) for place in np.ndindex(*[colours] * 4)]
-    own = {f"{one.out.stem}{which}{one.out.suffix}" for one in maps for which in ("", *(f"-{c}" for c in corners))}
-    own |= {"tiles.tsx", "tiles.tres", "tiles.glsl", "plane.tmx", "plane.png"}
-    earlier_files(output, "the tiles", own.__contains__)
+    files = {f"{also.out.stem}{which}{also.out.suffix}" for also in maps for which in ("", *(f"-{c}" for c in corners))}
+    files |= {"tiles.tsx", "tiles.tres", "tiles.glsl", "plane.tmx", "plane.png"}
+    earlier_files(output, "the tiles", files.__contains__)
     return Task(
         partial(tileset, lead.array, (rows, cols), colours=colours, channel_axis=lead.channel_axis, **given(options)),
         f"{colours**4} tiles of {cols}x{rows}",
@@ -81,15 +81,12 @@ def tileset(
 
 
 def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
-    """Return the maps of all samples by role, and the name of each in the output; ``lead`` is the first.
-
-    ``folders`` are those of the samples that have several maps.
-    """
+    """Return the maps of all samples, ``lead`` first, and then those of the other roles of ``folders``."""
     from simdtex.io.image import suitable_suffix
 
     if folders and len(folders) < len(lead.paths):
         raise ValueError(f"{folders[0].lead} is a map of a material and not all samples are; give one kind of sample")
-    found = [lead]
+    materials = [lead]
     for folder in folders:
         for has, lacks in ((folders[0], folder), (folder, folders[0])):
             if role := min({*has.found.files.values()} - {*lacks.found.files.values()}, default=""):
@@ -97,18 +94,16 @@ def read_maps(folders: list[Folder], lead: Material) -> list[Also]:
     for path, role in sorted(folders[0].found.files.items()) if folders else ():
         if path == folders[0].lead:
             continue
-        those = [path]
-        for other in folders[1:]:
-            those.append(next(one for one, known in other.found.files.items() if known == role))
-        found.append(read_material(those))
-        if found[-1].sizes != lead.sizes:
+        others = [next(p for p, r in folder.found.files.items() if r == role) for folder in folders[1:]]
+        materials.append(read_material([path, *others]))
+        if materials[-1].sizes != lead.sizes:
             raise ValueError(f"{path} has another size than {lead.paths[0].name}; scale it, or move it elsewhere")
     maps = []
-    for one in found:
-        plain = bool(one.metadata and one.metadata.plain)
-        suffix = suitable_suffix(one.pixels[0].dtype, channels(one.pixels[0]), plain=plain)
-        one = one._replace(metadata=one.metadata and one.metadata.at())
-        maps.append(Also(one, Path("-".join(path.stem for path in one.paths) + suffix)))
+    for material in materials:
+        plain = bool(material.metadata and material.metadata.plain)
+        suffix = suitable_suffix(material.pixels[0].dtype, channels(material.pixels[0]), plain=plain)
+        material = material._replace(metadata=material.metadata and material.metadata.at())
+        maps.append(Also(material, Path("-".join(path.stem for path in material.paths) + suffix)))
     return maps
 
 
@@ -127,13 +122,13 @@ def write(output: Path, maps: list[Also], names: list[str], normals: bool, made:
         made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
     corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))
     with atomic_folder(output) as folder:
-        for number, one in enumerate(maps):
-            packed = one.carried(run.source) if number else made
-            image.write(folder / one.out, packed, one.maps.metadata)
+        for number, also in enumerate(maps):
+            packed = also.carried(run.source) if number else made
+            image.write(folder / also.out, packed, also.maps.metadata)
             for row, col in np.ndindex(grid.shape[:2]):
                 which = "".join(map(str, grid[row, col]))
                 tile = packed[row * rows : (row + 1) * rows, col * cols : (col + 1) * cols]
-                image.write(folder / f"{one.out.stem}-{which}{one.out.suffix}", tile, one.maps.metadata)
+                image.write(folder / f"{also.out.stem}-{which}{also.out.suffix}", tile, also.maps.metadata)
         shown = image.coloured(plane(made, corners, colours), maps[0].maps.metadata and maps[0].maps.metadata.palette)
         image.write(folder / "plane.png", fitted(rgb(shown), SHEET))
         about = maps[0].out.name, (rows, cols), names, grid

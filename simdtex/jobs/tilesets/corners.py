@@ -34,19 +34,15 @@ def corners_of(grid: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def numbers(colours: int) -> NDArray[np.intp]:
-    """Return the numbers of the tiles in the torus, row by row from 0, (colours,) * 4.
-
-    The indices are the colours of the corners in the order of `corners_of`.
-    """
-    found = np.empty([colours] * 4, np.intp)
-    found[tuple(corners_of(torus(colours)).reshape(-1, 4).T)] = np.arange(colours**4)
-    return found
+    """Return the numbers (colours,) * 4 of the tiles in the torus, row by row, by the colours of their corners."""
+    tiles = np.empty([colours] * 4, np.intp)
+    tiles[tuple(corners_of(torus(colours)).reshape(-1, 4).T)] = np.arange(colours**4)
+    return tiles
 
 
 def laid(corners: NDArray[np.intp], colours: int) -> NDArray[np.intp]:
     """Return the numbers (m, n) of the tiles of a plane from the colours (m + 1, n + 1) of their corners."""
-    found: NDArray[np.intp] = numbers(colours)[tuple(np.moveaxis(corners_of(corners)[:-1, :-1], -1, 0))]
-    return found
+    return np.asarray(numbers(colours)[tuple(np.moveaxis(corners_of(corners)[:-1, :-1], -1, 0))])
 
 
 def plane(packed: ArrayLike, corners: ArrayLike, colours: int = 2) -> NDArray[Any]:
@@ -77,5 +73,4 @@ def plane(packed: ArrayLike, corners: ArrayLike, colours: int = 2) -> NDArray[An
     rows, cols = (side // colours**2 for side in image.shape[:2])
     tiles = image.reshape(colours**2, rows, colours**2, cols, *image.shape[2:])
     row, col = np.divmod(laid(grid, colours), colours**2)
-    found: NDArray[Any] = tiles[row, :, col].swapaxes(1, 2)
-    return found.reshape(found.shape[0] * rows, -1, *image.shape[2:])
+    return np.asarray(tiles[row, :, col].swapaxes(1, 2).reshape(len(row) * rows, -1, *image.shape[2:]))

@@ -44,20 +44,13 @@ vec4 cornerTiles(sampler2D tiles, vec2 at) {{
 
 
 def glsl(numbers: NDArray[Any]) -> str:
-    """Return a function in GLSL that looks up an endless plane in the packed picture.
-
-    ``numbers`` (colours,) * 4 are those of the tiles by the colours of their corners, row by row in the packed picture.
-    """
+    """Return a function in GLSL that looks up an endless plane; ``numbers`` are those of `corners.numbers`."""
     side, places = len(numbers) ** 2, ", ".join(map(str, numbers.ravel()))
     return GLSL.format(colours=len(numbers), side=side, count=side**2, places=places)
 
 
 def tiled_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: NDArray[Any]) -> str:
-    """Return a set of tiles for Tiled, with a terrain set of corners, whose terrains have these names.
-
-    ``picture`` is the name of the packed picture, ``tile`` the rows and columns of a tile, and ``grid`` (n, n, 4) the
-    colours of the tiles' corners: top left, top right, bottom left and bottom right.
-    """
+    """Return a set for Tiled: ``tile`` (rows, cols), ``names`` of terrains, ``grid`` (n, n, 4) of `corners_of`."""
     (rows, cols), side = tile, len(names) ** 2
     size = {"tilewidth": cols, "tileheight": rows, "tilecount": side**2, "columns": side}
     root = _element(None, "tileset", version="1.10", name="-".join(dict.fromkeys(names)), **size)
@@ -82,7 +75,7 @@ def tiled_map(tiles: str, tile: tuple[int, int], numbers: NDArray[Any]) -> str:
 
 
 def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: NDArray[Any]) -> str:
-    """Return a TileSet of Godot 4, with a terrain set that matches corners; the parameters are those of `tiled_set`."""
+    """Return a TileSet of Godot 4 with a terrain set that matches corners; parameters as those of `tiled_set`."""
     size = f"Vector2i({tile[1]}, {tile[0]})"
     lines = ['[gd_resource type="TileSet" load_steps=3 format=3]', ""]
     lines += [f'[ext_resource type="Texture2D" path={dumps(picture, ensure_ascii=False)} id="1"]', ""]

@@ -73,20 +73,17 @@ def tileset(
         Make tiles with so many colours of corners: 2 for 16 tiles, 3 for 81. None: 2; with several samples their
         number.
     light : {"keep", "even"}
-        Whether the light of the sample is kept, or made even: a smooth trend of each channel is removed, a quadratic
-        of row and column.
+        Keep the light of the sample, or make it even: remove a quadratic of row and column from each channel.
     channel_axis : int, optional
         The axis of pictures that holds channels; None for grey pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None draws a random seed.
+        The seed: the same one gives the same bytes on every device. None draws one at random.
     device : str or Machine, optional
-        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU.
+        Part of a name, index of ``simdtex devices``, or ``"reference"``. None: SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
-        Called several times a second with a `simdtex.run.Progress`. An error that it raises ends the run.
+        Called several times a second with a `simdtex.run.Progress`; an error that it raises ends the run.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
-        run continues from it, to the same bytes. The file is removed when the function returns.
+        Keep the state of the run in this file, from which the same call continues it; removed when the run has ended.
     full_output : bool
         Return a `simdtex.run.Output` too.
     **options
@@ -120,21 +117,6 @@ def tileset(
     >>> tiles.shape
     (128, 128)
     """
-    job = plan_tileset(sample, size, colours=colours, light=light, channel_axis=channel_axis, **options)
-    picture, output = run("tileset", job, rng, device, callback, checkpoint)
-    return (picture, output) if full_output else picture
-
-
-def plan_tileset(
-    sample: Any,
-    size: int | tuple[int, int] = 256,
-    *,
-    colours: int | None = None,
-    light: str = "keep",
-    channel_axis: int | None = None,
-    **options: Any,
-) -> Tileset:
-    """Check the arguments of `tileset`, and return its job."""
     pictures, tile = check_samples(sample, channel_axis), check_shape(size if np.ndim(size) else (size, size), 16)
     several = len(pictures.pixels)
     if colours is not None:
@@ -149,11 +131,13 @@ def plan_tileset(
     if chosen.pixel == "density":
         raise ValueError('tiles continue the sources of their borders, and a density has none; give pixel="source"')
     pictures, lit = in_light(pictures, light, chosen.categorical)
-    return Tileset(pictures, tile, colours, replace(chosen, labels=True), lit, channel_axis)
+    job = Tileset(pictures, tile, colours, replace(chosen, labels=True), lit, channel_axis)
+    picture, output = run("tileset", job, rng, device, callback, checkpoint)
+    return (picture, output) if full_output else picture
 
 
 class Canvas(NamedTuple):
-    """Pixels (rows, cols, C) on a torus, and their positions in the sample (rows, cols, 2 or 3), -1 where unknown."""
+    """Pixels (rows, cols, C) on a torus, and their places in the sample (rows, cols, 2 or 3), -1 where unknown."""
 
     values: NDArray[Any]
     place: NDArray[np.int32]
@@ -175,10 +159,7 @@ class Canvas(NamedTuple):
 
 @dataclass(frozen=True)
 class Tileset:
-    """The job of `tileset`: three runs, which make the horizontal borders, the vertical ones, and all tiles.
-
-    ``tile`` are the rows and columns of a tile.
-    """
+    """The job of `tileset`: three runs, which make the horizontal borders, the vertical ones, and all tiles."""
 
     pictures: Pictures
     tile: tuple[int, int]
@@ -204,8 +185,8 @@ class Tileset:
         (rows, cols), regular = self.tile, self.regular()
         pieces, packed = self.pieces(regular and regular.pictures, seed), torus(self.colours)
         cycle = np.array([[int(letter) for letter in CYCLE[self.colours]]])
-        done, inside = checkpointing.found or ([], None)
-        finished = [(Canvas(*made), about) for made, about in done]
+        saved, inside = checkpointing.found or ([], None)
+        finished = [(Canvas(*made), about) for made, about in saved]
         jobs = {"borders from left to right": cycle, "borders from top to bottom": cycle.T, "tiles": packed}
         begin, every = 0, sum(grid.size for grid in jobs.values())
         for number, (job, grid) in enumerate(jobs.items()):
@@ -243,45 +224,40 @@ class Tileset:
         options = self.options.resolved(self.options.of(self.pictures))
         lattice = parse_lattice(options.lattice)
         planes, masks = plain(self.pictures)
-        own = regular(planes[0], masks[0]) if isinstance(lattice, str) else lattice
-        if own and own.fitted(self.tile) is None:
-            (rows, cols), (high, wide) = own.fitting(self.tile), self.tile
-            if own is lattice:
+        pattern = regular(planes[0], masks[0]) if isinstance(lattice, str) else lattice
+        if pattern and pattern.fitted(self.tile) is None:
+            (rows, cols), (high, wide) = pattern.fitting(self.tile), self.tile
+            if pattern is lattice:
                 raise ValueError(f"no cells of the lattice fit tiles of {wide}x{high}; make tiles of {cols}x{rows}")
             message = f"no whole cells of the sample's pattern fit tiles of {wide}x{high}; {cols}x{rows} fit better"
             warnings.warn(message, DataWarning, stacklevel=2)
         return None if lattice is None else phases(self.pictures, self.tile, True, lattice)
 
     def pieces(self, lattices: tuple[Lattice, ...] | None, seed: int) -> list[Canvas]:
-        """Return the piece of the sample around a corner of each colour, without unknown pixels.
-
-        On a lattice all pieces have one phase. Other pieces of one sample do not overlap, if it has room.
-        """
+        """Return the piece of the sample around a corner of each colour: on a lattice with one phase, else apart."""
         planes, masks = plain(self.pictures)
         reach, pieces, several = self.wide, [], len(planes) > 1
-        turn: Any = None
+        phase: Any = None
         taken = np.zeros(masks[0].shape, bool)
         for colour in range(self.colours):
             number = colour if several else 0
             usable = ndimage.minimum_filter(masks[number], 2 * reach, mode="constant", cval=0)  # of -reach..reach - 1
-            if turn is not None and lattices:
-                apart = np.moveaxis(lattices[number].phases(*np.indices(usable.shape)), 0, -1) - turn
+            if phase is not None and lattices:
+                apart = np.moveaxis(lattices[number].phases(*np.indices(usable.shape)), 0, -1) - phase
                 away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
                 usable &= away <= max(NEAR, away.min(initial=np.inf, where=usable))
             elif not several and (usable & ~taken).any():
                 usable &= ~taken
             if not usable.any():
-                raise ValueError(
-                    f"a corner needs {2 * reach}x{2 * reach} known pixels, which the sample has nowhere; give smaller "
-                    "tiles or a larger sample"
-                )
+                size, remedy = f"{2 * reach}x{2 * reach}", "give smaller tiles or a larger sample"
+                raise ValueError(f"a corner needs {size} known pixels, which the sample has nowhere; {remedy}")
             squares = (planes[number] - round(planes[number].mean())) ** 2
             off = np.abs(sums_around(squares, reach) - round(squares.mean() * (2 * reach + 1) ** 2))
             places = np.argwhere(usable)[np.argsort(off[usable], kind="stable")[: -(-usable.sum() // USUAL)]]
             bits = random.draw4(seed, 0, 0, np.array([colour]), random.START)
             row, col = places[int(random.below(bits[0], bits[1], len(places))[0])].tolist()
             taken[max(0, row - 2 * reach) : row + 2 * reach, max(0, col - 2 * reach) : col + 2 * reach] = True
-            turn = lattices[number].phases(row, col) if lattices and turn is None else turn
+            phase = lattices[number].phases(row, col) if lattices and phase is None else phase
             at = np.mgrid[row - reach : row + reach, col - reach : col + reach]
             place = np.stack([*at, np.full_like(at[0], number)], -1)[..., : 3 if several else 2]
             pieces.append(Canvas(self.pictures.pixels[number][tuple(at)], place.astype(np.int32)))

@@ -44,20 +44,16 @@ def explain(
 
     Parameters
     ----------
-    sample, shape
-        As in `synthesize`.
+    sample, shape, mask, known, known_source, guide, light, channel_axis, device, **options
+        As in `synthesize`; the options are those of `simdtex.methods.mrf.Options`.
     site : (int, int)
         (row, column) on the level's lattice: pixel (2**level row, 2**level column) of the output.
     level : int
         0 is the finest.
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last such sweep, which made the pixel.
-    mask, known, known_source, guide, light, channel_axis, device
-        As in `synthesize`.
     rng : int or numpy.random.Generator, optional
         The seed of the run to explain.
-    **options
-        Those of `simdtex.methods.mrf.Options`.
 
     Returns
     -------

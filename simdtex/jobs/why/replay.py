@@ -74,13 +74,6 @@ class Instant(Brief):
     relaxed: NDArray[np.uint8]
 
 
-class Played(NamedTuple):
-    """A part of a sweep: the field after it, and the decisions of the schedule, with their sites on the host."""
-
-    field: Field
-    decided: list[schedules.Info]
-
-
 class Replay:
     """A replay of a run of the method ``mrf``: its field after any set of sites that relax together.
 
@@ -93,7 +86,7 @@ class Replay:
     nearest earlier state.
     """
 
-    origin = (0, 0)
+    origin: tuple[int, int] = (0, 0)
     """The first row and column of the lattice in the output, pixels."""
 
     def __init__(self, plan: MrfPlan, machine: Machine, seed: int, kept: int = KEPT) -> None:
@@ -116,18 +109,15 @@ class Replay:
     def at(self, sweep: int, sets: int | None = None) -> Instant:
         """Return the field after the first ``sets`` sets of a sweep, None: all. Negative sweeps count from the end."""
         sweep = range(len(self.sweeps))[sweep]
-        played = self._play(sweep, sets)
+        field, chosen = self._play(sweep, sets)
         level = self._sweeps[sweep].level
         run, grid = self._twin.of(level), self._twin.grid(level)
-        field = Field(*map(self._run.machine.get, played.field))
-        done = np.zeros(grid.shape, np.uint8)
-        chosen = [info.sites[begin:end] for info in played.decided for begin, end in info.ranges]
-        for each in chosen:
-            done.flat[each] = 1
-        if chosen:
-            done.flat[chosen[-1]] = 2
-        seen = picture(run, grid, field), sources(run, grid, field), temperatures(run, grid, field)
-        return Instant(level, *seen, done)
+        relaxed = np.zeros(grid.shape, np.uint8)
+        groups = [info.sites[begin:end] for info in chosen for begin, end in info.ranges]
+        for mark, sites in [*((1, sites) for sites in groups), *((2, sites) for sites in groups[-1:])]:
+            relaxed.flat[sites] = mark
+        maps = picture(run, grid, field), sources(run, grid, field), temperatures(run, grid, field)
+        return Instant(level, *maps, relaxed)
 
     def explain(
         self,
@@ -140,29 +130,22 @@ class Replay:
     ) -> Explanation:
         """Return an explanation of the value that a site of a level took in a sweep of the level.
 
-        ``sweep`` counts from 1; None is the last sweep in which the site relaxes. Raises ValueError if there is no such
-        site or level, or if the site does not relax there.
-
-        With ``order``, the explanation describes what the site would take with a neighbourhood of that order, and with
-        ``trust``, 0 to 1, what it would take if the other sites' temperatures were 1 - ``trust`` times theirs: with 1,
-        as if all neighbours were certain. The field, the seed and all else stay as in the run. Raises ValueError if the
-        search at the level is not exact, or the level's sample does not hold the order (`largest_order`).
+        ``sweep`` counts from 1; None is the last sweep in which the site relaxes. ``order`` and ``trust`` ask what the
+        site would take with a neighbourhood of that order, which requires an exact search, and with temperatures of the
+        other sites that are 1 - ``trust`` times theirs: with 1, as if all neighbours were certain. Raises ValueError if
+        the site does not relax there, or the level's sample does not hold the order.
         """
         if not 0 <= level < self._run.levels:
-            raise ValueError(
-                f"level is {level} and the levels of this run are 0 to {self._run.levels - 1}; give one of these"
-            )
+            levels = f"0 to {self._run.levels - 1}"
+            raise ValueError(f"level is {level} and the levels of this run are {levels}; give one of these")
         pixel = site_number(self._run, level, site)
-        asked = (level, sweep)
-        while self._state.level >= level and all(one[:2] != asked for one in self._sweeps) and self._record():
+        while self._state.level >= level and (level, sweep) not in [s[:2] for s in self._sweeps] and self._record():
             pass
-        for n, one in reversed(list(enumerate(self._sweeps))):
-            if one.level == level and sweep in (None, one.sweep) and (moment := self._moment(n, pixel)):
+        for n, kept in reversed(list(enumerate(self._sweeps))):
+            if kept.level == level and sweep in (None, kept.sweep) and (moment := self._moment(n, pixel)):
                 return self._explained(moment, site, order, trust)
-        where = f"level {level}" + (f", sweep {sweep}" if sweep else "")
-        raise ValueError(
-            f"site {site} does not relax at {where}: it keeps its value; give another site, sweep or level"
-        )
+        where = f"site {site} does not relax at level {level}" + (f", sweep {sweep}" if sweep else "")
+        raise ValueError(f"{where}: it keeps its value; give another site, sweep or level")
 
     def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None, **other: Any) -> Explanation:
         """Return an explanation of the value of an output pixel after the first ``sets`` sets of a sweep, None: all.
@@ -208,11 +191,10 @@ class Replay:
         run, state = self._run, self._state
         if run.ended(state):
             return False
-        number, grid = len(self._sweeps), run.grid(state.level)
-        saved = run.save(state)
-        size = sum(one.nbytes for one in saved.values() if isinstance(one, np.ndarray))
-        if not number or size <= self._room:
-            self._states[number] = saved
+        grid, saved = run.grid(state.level), run.save(state)
+        size = sum(array.nbytes for array in saved.values() if isinstance(array, np.ndarray))
+        if not self._sweeps or size <= self._room:
+            self._states[len(self._sweeps)] = saved
             self._room -= size
         after, info = run.step(state)
         ranges = np.concatenate([chosen.ranges for chosen in info.chosen])
@@ -227,34 +209,33 @@ class Replay:
             state, _ = self._run.step(state)
         return state
 
-    def _before(self, number: int) -> MrfState:
+    def _before(self, sweep: int) -> MrfState:
         """Return the state before a sweep, on the machine."""
-        first = max(n for n in self._states if n <= number)
+        first = max(n for n in self._states if n <= sweep)
         state = self._run.load(self._states[first])
-        for _ in range(first, number):
+        for _ in range(first, sweep):
             state = self._sweeping(self._run.step(state)[0])
         return state
 
-    def _play(self, number: int, sets: int | None) -> Played:
-        """Run the first ``sets`` sets of a sweep, None: all; return the field and the decisions of the schedule."""
-        state = self._before(number)
-        most = self._sweeps[number].sets if sets is None else max(0, sets)
-        field, _, decided = run_steps(self._run.level(state.level), state, sets=most)
-        here = (one.sites if isinstance(one.sites, np.ndarray) else self._run.machine.get(one.sites) for one in decided)
-        return Played(field, [one._replace(sites=sites) for one, sites in zip(decided, here, strict=True)])
+    def _play(self, sweep: int, sets: int | None) -> tuple[Field, list[schedules.Info]]:
+        """Return the field after ``sets`` sets of a sweep, None: all, and the choices of the schedule, on the host."""
+        state, get = self._before(sweep), self._run.machine.get
+        most = self._sweeps[sweep].sets if sets is None else max(0, sets)
+        field, _, chosen = run_steps(self._run.level(state.level), state, sets=most)
+        here = [c if isinstance(c.sites, np.ndarray) else c._replace(sites=get(c.sites)) for c in chosen]
+        return Field(*map(get, field)), here
 
-    def _moment(self, number: int, pixel: int, sets: int | None = None) -> Moment | None:
+    def _moment(self, sweep: int, pixel: int, sets: int | None = None) -> Moment | None:
         """Return the last moment at which a site relaxes in the first ``sets`` sets of a sweep; None without any."""
-        found, done = None, 0
-        for info in self._play(number, sets).decided:
+        last, done = None, 0
+        for info in self._play(sweep, sets)[1]:
             for place in np.flatnonzero(info.sites == pixel):
-                for number_of_set in np.flatnonzero((info.ranges[:, 0] <= place) & (place < info.ranges[:, 1])):
-                    found = done + int(number_of_set), info.turn
+                for group in np.flatnonzero((info.ranges[:, 0] <= place) & (place < info.ranges[:, 1])):
+                    last = done + int(group), info.turn
             done += len(info.ranges)
-        if found is None:
+        if last is None:
             return None
-        before, turn = found
-        field = Field(*map(self._run.machine.get, self._play(number, before).field))
-        sweep = self._sweeps[number]
-        penalty = self._states[number]["penalty"] if number in self._states else self._before(number).penalty
-        return Moment(sweep.level, sweep.sweep, field, penalty, turn)
+        before, turn = last
+        field, level = self._play(sweep, before)[0], self._sweeps[sweep]
+        penalty = self._states[sweep]["penalty"] if sweep in self._states else self._before(sweep).penalty
+        return Moment(level.level, level.sweep, field, penalty, turn)

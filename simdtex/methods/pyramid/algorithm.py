@@ -180,8 +180,8 @@ class PyramidRun:
         self.matcher = Matcher(machine, options, seed)
         found = texture.histograms
         self.busy = [c for c, own in enumerate(found) if own.pixels[0, 0] < own.pixels[0, -1]]  # others are flat
-        self._pixels = [self.matcher.wanted(found[c].pixels) for c in self.busy]
-        self._subbands = [[self.matcher.wanted(band) for band in found[c].subbands] for c in self.busy]
+        self._pixels = [self.matcher.wanted(found[c].pixels, found[c].pixels) for c in self.busy]
+        self._subbands = [[self.matcher.wanted(band, found[c].pixels) for band in found[c].subbands] for c in self.busy]
 
     def begin(self) -> PyramidState:
         """Return noise with the histograms of the sample's pixels: Match-Histogram(noise, texture)."""

@@ -92,7 +92,7 @@ class Wanted:
     """The target histograms of bands, on a machine.
 
     ``table`` is sorted values (bands, m), or the inverse of their cumulative distribution (bands, 257), int32;
-    ``deviations`` (bands,) are standard deviations, 1 where there is none.
+    ``deviations`` (bands,) are standard deviations.
     """
 
     table: Array
@@ -111,10 +111,10 @@ class Matcher:
         self._first: dict[int, Array] = {}
         self.moved: list[tuple[str, Array, NDArray[np.float64]]] = []
 
-    def wanted(self, values: NDArray[np.int32]) -> Wanted:
-        """Return the histogram of sorted values (bands, m), for `match`."""
+    def wanted(self, values: NDArray[np.int32], pixels: Sorted) -> Wanted:
+        """Return the histogram of sorted values (bands, m), for `match`; flat bands have the deviation of `pixels`."""
         deviations = values.std(1, dtype=np.float64)
-        deviations[deviations == 0] = 1.0
+        deviations[deviations == 0] = pixels.std(dtype=np.float64)
         if self._options.match == "lookup":
             values = np.stack([inverse_cdf(band) for band in values])
         return Wanted(self._machine.put(values), deviations)

@@ -20,11 +20,7 @@ from simdtex.methods.pyramid.stretched import Stretched
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture of pictures (rows, cols, channels) before it has a machine and a seed.
-
-    ``average`` are the weights of the pictures in the pattern, and ``sides`` the pictures of low and high frequencies
-    and the split between them.
-    """
+    """A mixture of pictures (rows, cols, channels); ``sides`` are those of low and high frequencies, and the split."""
 
     pictures: list[NDArray[Any]]
     shape: tuple[int, int]
@@ -64,9 +60,11 @@ class Mixture:
             found = [spliced(a, b, finest) for a, b in zip(every[low], every[high], strict=True)]
         else:
             found = [averaged(channel, weights) for channel in zip(*every.values(), strict=True)]
-        if shown:  # the pixels of the palette
-            own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in scale.channels[-1]]
-            found = [Histograms(pixels, one.subbands) for pixels, one in zip(own, found, strict=True)]
+        if shown:  # the pixels of the palette; a channel in which the pattern is flat, as in grey, has their mean
+            pixels: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in scale.channels[-1]]
+            for c, pattern in enumerate(found):
+                varies = any((band[:, 0] < band[:, -1]).any() for band in pattern.subbands)
+                found[c] = Histograms(pixels[c] if varies else np.zeros((1, 1), np.int32), pattern.subbands)
         texture = pyramid.Texture(found, palette, scale, stretched)
         return pyramid.picture_run(machine, texture, self, levels, seed)
 

@@ -1,5 +1,7 @@
 """`simdtex.fill` and `simdtex.extend`: what they keep, where the rest is from, and what they refuse."""
 
+import itertools
+
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl, texture
@@ -11,13 +13,11 @@ import simdtex
 from simdtex.jobs.filling.job import FEW, band_of, windows
 from simdtex.model.source_map import apply_source_map
 
-TYPES = [np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64]
 SHAPE = (16, 20)
 QUICK = {"order": 2, "rng": 1, "xi": -8.0, "device": REFERENCE}
 
 
 def hole_at(*parts, shape=SHAPE):
-    """A mask that is True in each part, (rows, columns) as slices."""
     mask = np.zeros(shape, bool)
     for part in parts:
         mask[part] = True
@@ -36,7 +36,6 @@ def extend(image, **options):
 
 
 def planes(axis, image):
-    """The picture with its channels last, (rows, cols, C)."""
     return image[..., None] if axis is None else np.moveaxis(image, axis, -1)
 
 
@@ -47,7 +46,7 @@ def with_axis(axis, dtype=np.uint8, shape=SHAPE, seed=0):
     return np.ascontiguousarray(np.moveaxis(texture(shape, 3, dtype, seed), -1, axis))
 
 
-@pytest.mark.parametrize(("axis", "dtype"), [*((None, dtype) for dtype in TYPES), (0, np.uint8), (-1, np.float32)])
+@pytest.mark.parametrize(("axis", "dtype"), [(None, np.bool_), (0, np.uint16), (-1, np.float32)])
 def test_outside_the_hole_is_the_image_to_the_bit(dtype, axis):
     image = with_axis(axis, dtype)
     before = image.copy()
@@ -59,29 +58,14 @@ def test_outside_the_hole_is_the_image_to_the_bit(dtype, axis):
     assert (ours[MIDDLE] != theirs[MIDDLE]).any()
 
 
-@pytest.mark.parametrize(("axis", "dtype"), [(None, np.float64), (0, np.float32), (-1, np.float64)])
-def test_nan_is_a_hole(dtype, axis):
-    image = with_axis(axis, dtype)
-    holed = image.copy()
-    planes(axis, holed)[MIDDLE] = np.nan
-    found = fill(holed, channel_axis=axis)
-    assert np.isfinite(found).all()
-    assert_same_bits(found, fill(image, MIDDLE, channel_axis=axis))
-    assert_same_bits(found, fill(holed, MIDDLE, channel_axis=axis))
-
-
-def test_nan_in_one_channel_is_a_hole_in_all():
+def test_what_is_nan_or_masked_is_a_hole_whatever_it_holds():
     image = texture(SHAPE, 3, np.float32)
-    image[5:9, 6:11, 1] = np.nan
-    found, output = fill(image, channel_axis=-1, finish=0.0, full_output=True)
-    assert_same_bits(found, image[output.source[..., 0], output.source[..., 1]])
-    assert_same_bits(found[~MIDDLE], image[~MIDDLE])
-
-
-def test_what_a_hole_holds_makes_no_difference():
-    image, other = texture(SHAPE), texture(SHAPE)
-    other[MIDDLE] = 255 - other[MIDDLE]
-    assert_same_bits(fill(image, MIDDLE), fill(other, MIDDLE))
+    known, holed = fill(image, MIDDLE, channel_axis=-1), image.copy()
+    holed[MIDDLE, 1] = np.nan
+    assert_same_bits(fill(holed, channel_axis=-1), known)
+    assert_same_bits(fill(holed, MIDDLE, channel_axis=-1), known)
+    masked = np.ma.array(image, mask=np.repeat(MIDDLE[..., None], 3, -1))
+    assert_same_bits(fill(masked, channel_axis=-1), known)
 
 
 def test_a_hole_is_widened_and_its_rim_blended():
@@ -100,38 +84,25 @@ def test_a_hole_is_widened_and_its_rim_blended():
     assert_same_bits(output.source[share < 0.5], kept[share < 0.5])
 
 
-@pytest.mark.parametrize("few", [{"categorical": True}, {}], ids=["categories", "few"])
-def test_values_without_a_mean_change_half_way(few):
+def test_values_without_a_mean_change_half_way():
     image = np.where(texture((30, 40)) > 128, 200, 7).astype(np.uint8)
-    found, output = fill(image, hole_at(np.s_[12:16, 15:21], shape=image.shape), feather=4, full_output=True, **few)
-    assert set(np.unique(found)) == {7, 200}
-    assert_same_bits(found, apply_source_map(output.source, image))
+    for few in ({"categorical": True}, {}):
+        found, output = fill(image, hole_at(np.s_[12:16, 15:21], shape=image.shape), feather=4, full_output=True, **few)
+        assert set(np.unique(found)) == {7, 200}
+        assert_same_bits(found, apply_source_map(output.source, image))
 
 
-EDGES = {
-    "top": np.s_[:3, 7:12],
-    "bottom": np.s_[-3:, 7:12],
-    "left": np.s_[5:9, :3],
-    "right": np.s_[5:9, -3:],
-    "top left": np.s_[:4, :3],
-    "top right": np.s_[:4, -3:],
-    "bottom left": np.s_[-4:, :3],
-    "bottom right": np.s_[-4:, -3:],
-    "a pixel": np.s_[8:9, 8:9],
-    "a corner": np.s_[-1:, -1:],
-    "rows across": np.s_[6:8, :],
-    "columns down": np.s_[:, 9:11],
-}
+LEFT = np.s_[5:9, :3]
 
 
 @pytest.mark.parametrize("boundary", ["open", "torus"])
-@pytest.mark.parametrize("where", EDGES)
-def test_a_hole_may_be_anywhere(where, boundary):
-    image, mask = texture(SHAPE), hole_at(EDGES[where])
-    found, output = fill(image, mask, boundary=boundary, finish=0.0, full_output=True)
-    assert_same_bits(found[~mask], image[~mask])
-    assert not mask[output.source[..., 0], output.source[..., 1]].any()
-    assert not output.temperature.any()
+def test_a_hole_may_be_anywhere(boundary):
+    for part in (np.s_[-3:, 7:12], LEFT, np.s_[:4, -3:], np.s_[-1:, -1:], np.s_[6:8, :], np.s_[:, 9:11]):
+        image, mask = texture(SHAPE), hole_at(part)
+        found, output = fill(image, mask, boundary=boundary, finish=0.0, full_output=True)
+        assert_same_bits(found[~mask], image[~mask])
+        assert not mask[output.source[..., 0], output.source[..., 1]].any()
+        assert not output.temperature.any()
 
 
 FAR = hole_at(np.s_[3:6, 3:7], np.s_[20:24, 50:54], np.s_[2:5, 54:58], shape=(30, 60))
@@ -151,74 +122,40 @@ def test_a_hole_does_not_depend_on_what_is_beyond_its_reach():
     assert (fill(near, mask, reach=6)[mask] != one[mask]).any()
 
 
-@pytest.mark.parametrize("reach", [1, 3, None])
-def test_nothing_is_from_beyond_the_reach(reach):
-    image, mask = texture((20, 40)), hole_at(np.s_[8:11, 4:8], shape=(20, 40))
-    _, output = fill(image, mask, reach=reach, full_output=True)
-    top, bottom, left, right = output.statistics["windows"][0]["window"]
-    reach = 128 if reach is None else reach
-    row, col = output.source[mask].T
-    assert top - reach <= row.min() and row.max() < bottom + reach
-    assert left - reach <= col.min() and col.max() < right + reach
+def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level():
+    for side, radius, levels in ((1, 1, 1), (3, 1, 2), (4, 1, 2), (5, 1, 3), (9, 2, 3), (9, 5, 1)):
+        mask = hole_at(np.s_[60 : 60 + side, 50 : 50 + side], shape=(200, 200))
+        around = radius * 2 ** (levels - 1) + 1
+        rows, cols = (slice(first - around, first + side + around) for first in (60, 50))
+        assert windows(mask, radius, None) == [(rows, cols, levels)]
 
 
-def test_levels_are_those_that_are_asked_for():
-    image = texture(SHAPE)
-    for levels in (1, 2):
-        _, output = fill(image, MIDDLE, levels=levels, order=2, full_output=True)
-        assert len(output.statistics["levels"]) == levels
-    for levels in (9, 2**31 - 1):
-        with pytest.raises(ValueError, match=f"levels={levels} is too many"):
-            fill(image, MIDDLE, levels=levels)
-
-
-@pytest.mark.parametrize(("side", "radius", "levels"), [(1, 1, 1), (2, 1, 1), (3, 1, 2), (4, 1, 2), (5, 1, 3),
-                                                        (9, 1, 4), (9, 2, 3), (9, 4, 2), (9, 5, 1)])  # fmt: skip
-def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, levels):
-    mask = hole_at(np.s_[60 : 60 + side, 50 : 50 + side], shape=(200, 200))
-    ((rows, cols, found),) = windows(mask, radius, None)
-    around = radius * 2 ** (levels - 1) + 1
-    assert found == levels
-    assert (rows, cols) == (slice(60 - around, 60 + side + around), slice(50 - around, 50 + side + around))
-
-
-@pytest.mark.parametrize("options", [{"levels": 1}, {"levels": 1, "schedule": "luby"}, {"levels": 3}], ids=str)
-def test_equal_holes_get_different_pixels_and_each_those_that_it_gets_alone(options):
-    """The random numbers of a site are those of its place in the picture."""
-    parts = [np.s_[10:22, first : first + 12] for first in (12, 60, 108)]
-    given = {"sample": np.random.default_rng(3).integers(0, 256, (20, 20), np.uint8), "order": 1, "xi": -1.0} | options
-    flat = np.full((32, 132), 128, np.uint8)
-    filled = fill(flat, hole_at(*parts, shape=flat.shape), **given)
+def test_equal_holes_get_different_pixels_and_each_those_that_it_gets_alone():
+    parts = [np.s_[6:16, first : first + 10] for first in (8, 48, 88)]
+    sample = np.random.default_rng(3).integers(0, 256, (16, 16), np.uint8)
+    how = {"sample": sample, "order": 1, "xi": -1.0, "levels": 2, "schedule": "luby"}
+    flat = np.full((24, 108), 128, np.uint8)
+    filled = fill(flat, hole_at(*parts, shape=flat.shape), **how)
     first, second, third = (filled[part] for part in parts)
     assert max(np.mean(first == second), np.mean(second == third), np.mean(first == third)) < 0.5
-    assert_same_bits(fill(flat, hole_at(parts[1], shape=flat.shape), **given)[parts[1]], second)
+    assert_same_bits(fill(flat, hole_at(parts[1], shape=flat.shape), **how)[parts[1]], second)
 
 
 def test_many_holes_are_in_one_window():
     mask = np.zeros((100, 100), bool)
     mask.flat[[k * 2000 + 10 + 20 * j for k in range(4) for j in range(4)]] = True
-    assert mask.sum() == FEW
-    assert len(windows(mask, 1, None)) == FEW
+    assert len(windows(mask, 1, None)) == mask.sum() == FEW
     mask[90, 90] = True
     assert windows(mask, 1, None) == [(slice(0, 93), slice(8, 93), 1)]
-
-
-@pytest.mark.parametrize(("side", "count"), [(300, 16), (900, 1), (3000, 16)])
-def test_spots_are_in_one_window_if_that_is_cheaper(side, count):
-    """It has several levels where a picture is large, but its preparation takes longer the larger it is."""
-    mask = np.zeros((side, side), bool)
-    for row in range(side // 8, side, side // 4):
-        for col in range(side // 8, side, side // 4):
+    for side, count in ((300, 16), (900, 1), (2800, 16)):  # of spots if it is cheaper: it has levels, and is prepared
+        mask, first = np.zeros((side, side), bool), range(side // 8, side, side // 4)
+        for row, col in itertools.product(first, first):
             mask[row : row + 5, col : col + 5] = True
-    assert len(windows(mask, 7, None)) == count
+        assert len(windows(mask, 7, None)) == count
 
 
 @given(
-    st.lists(
-        st.tuples(st.integers(0, 59), st.integers(0, 59), st.integers(1, 12), st.integers(1, 12)),
-        min_size=1,
-        max_size=8,
-    ),
+    st.lists(st.tuples(*[st.integers(0, 59)] * 2, *[st.integers(1, 12)] * 2), min_size=1, max_size=8),
     st.integers(1, 3),
     st.sampled_from([None, 1, 2]),
 )
@@ -238,144 +175,112 @@ def test_every_hole_is_in_one_window_with_what_its_sites_look_at(parts, radius, 
     assert len(found) <= FEW
 
 
-@pytest.mark.parametrize("axis", [None, 0])
-def test_a_sample_is_all_that_a_hole_is_filled_from(axis):
-    image = with_axis(axis) // 2
-    sample = with_axis(axis, shape=(12, 14), seed=4) // 2 + 128  # no pixel of the picture is one of the sample
-    found, output = fill(image, MIDDLE, sample=sample, channel_axis=axis, finish=0.0, full_output=True)
-    ours = planes(axis, found)
-    assert_same_bits(ours[~MIDDLE], planes(axis, image)[~MIDDLE])
+def test_a_sample_is_all_that_a_hole_is_filled_from():
+    image = with_axis(0) // 2
+    sample = with_axis(0, shape=(12, 14), seed=4) // 2 + 128  # no pixel of the picture is one of the sample
+    found, output = fill(image, MIDDLE, sample=sample, channel_axis=0, finish=0.0, full_output=True)
+    ours = planes(0, found)
+    assert_same_bits(ours[~MIDDLE], planes(0, image)[~MIDDLE])
     assert (output.source[~MIDDLE] == -1).all()
     row, col = output.source[MIDDLE].T
-    assert_same_bits(ours[MIDDLE], planes(axis, sample)[row, col])
+    assert_same_bits(ours[MIDDLE], planes(0, sample)[row, col])
 
 
 def test_several_samples_are_told_apart():
     image, samples = texture(SHAPE), [texture((10, 12), seed=5), texture((14, 9), seed=6)]
     found, output = fill(image, MIDDLE, sample=samples, finish=0.0, shares=[1, 1], full_output=True)
-    assert output.source.shape == (*SHAPE, 3)
-    assert (output.source[~MIDDLE] == -1).all()
-    row, col, number = output.source[MIDDLE].T
-    assert set(number.tolist()) == {0, 1}
-    values = [int(samples[n][i, j]) for i, j, n in zip(row, col, number, strict=True)]
-    assert found[MIDDLE].tolist() == values
+    assert output.source.shape == (*SHAPE, 3) and (output.source[~MIDDLE] == -1).all()
+    places = output.source[MIDDLE].tolist()
+    assert {number for *_, number in places} == {0, 1}
+    assert found[MIDDLE].tolist() == [samples[n][i, j] for i, j, n in places]
 
 
-@pytest.mark.parametrize(("axis", "sample"), [(None, None), (0, (17, 19))])
-def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls(axis, sample):
-    image = with_axis(axis, shape=FAR.shape)
-    other = sample and with_axis(axis, shape=sample)
-    seen = []
+def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls():
+    image, seen = texture(FAR.shape), []
 
     def look(progress):
         seen.append((progress.fraction, progress.image(), progress.temperature(), progress.source()))
 
-    found, output = fill(image, FAR, sample=other, reach=4, channel_axis=axis, callback=look, full_output=True, xi=-1.0)
+    found, output = fill(image, FAR, reach=4, callback=look, full_output=True, xi=-1.0)
     fractions = [one[0] for one in seen]
     assert fractions == sorted(fractions)
     assert 0 < fractions[0] < 0.34 and 0.95 < fractions[-1] <= 1
-    known, first = ~FAR, hole_at(np.s_[2:6, 3:7], shape=FAR.shape)
-    at_home = np.full((*FAR.shape, 2), -1) if sample else np.moveaxis(np.indices(FAR.shape), 0, -1)
+    first, at_home = hole_at(np.s_[2:6, 3:7], shape=FAR.shape), np.moveaxis(np.indices(FAR.shape), 0, -1)
     for _, picture, temperature, source in seen:
-        assert (picture.shape, picture.dtype) == (image.shape, image.dtype)
-        assert_same_bits(planes(axis, picture)[known], planes(axis, image)[known])
-        assert temperature.shape == FAR.shape and (temperature[known] == 0).all() and temperature.max() <= 1
-        assert np.array_equal(source[known], at_home[known])
-        assert source.shape == (*FAR.shape, 2) and (source < (sample or FAR.shape)).all()
+        assert_same_bits(picture[~FAR], image[~FAR])
+        assert temperature.shape == FAR.shape and (temperature[~FAR] == 0).all() and temperature.max() <= 1
+        assert np.array_equal(source[~FAR], at_home[~FAR]) and (source < FAR.shape).all()
     assert max(one[2].max() for one in seen) > 0.5, "what is relaxed is warm"
     _, picture, _, source = seen[-1]  # windows that are finished are in the picture
-    assert_same_bits(planes(axis, picture)[first], planes(axis, found)[first])
-    assert np.array_equal(source[first], output.source[first])
+    assert_same_bits(picture[first], found[first])
     assert np.array_equal(source[FAR], output.source[FAR]), "and the last sweep has found where all is from"
-    assert_same_bits(fill(image, FAR, sample=other, reach=4, channel_axis=axis, xi=-1.0), found)
+    assert_same_bits(fill(image, FAR, reach=4, xi=-1.0), found)
 
 
 def test_statistics_are_of_every_window():
-    _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7)
+    _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7, levels=2)
     told = output.statistics
     assert (told["device"], told["seed"]) == (REFERENCE.name, 7)
     options = {name: told["options"][name] for name in ("boundary", "balance", "novelty", "chance", "data_weight")}
     assert options == {"boundary": "open", "balance": 0, "novelty": 0, "chance": 16, "data_weight": 4}
-    assert told["device_seconds"] is None
-    assert len(told["windows"]) == 3 and told["levels"] == told["windows"][0]["levels"]
+    assert told["device_seconds"] is None and told["levels"] == told["windows"][0]["levels"]
+    assert len(told["levels"]) == 2
+    assert len(told["windows"]) == 3 and told["seconds"] >= sum(one["seconds"] for one in told["windows"])
     for one in told["windows"]:
         top, bottom, left, right = one["window"]
         assert FAR[top:bottom, left:right].any()
         assert (one["levels"][-1]["rows"], one["levels"][-1]["cols"]) == (bottom - top, right - left)
-    assert told["seconds"] >= sum(one["seconds"] for one in told["windows"])
-    assert output.temperature.shape == FAR.shape and not output.temperature.any()
 
 
 def shaded(rows, cols):
-    """Fine grain on a shade from black at the left to white at the right."""
     return (np.arange(cols) * 200 / cols + np.random.default_rng(8).integers(0, 40, (rows, cols))).astype(np.uint8)
 
 
-def test_a_hole_takes_the_colours_of_its_rim(any_device):
-    picture, hole = shaded(60, 90), np.zeros((60, 90), bool)
-    hole[15:45, 30:60] = True
-    made = simdtex.fill(picture, hole, rng=1, order=4, device=opencl(any_device))
-    error = np.abs(made[15:45, 30:60].mean(0) - picture[15:45, 30:60].mean(0))
-    assert error.mean() < 6
+def test_a_hole_takes_the_colours_of_its_rim():
+    picture, hole = shaded(40, 60), hole_at(np.s_[12:28, 20:40], shape=(40, 60))
+    made = simdtex.fill(picture, hole, rng=1, order=2, device=REFERENCE)
+    assert np.abs(made[12:28, 20:40].mean(0) - picture[12:28, 20:40].mean(0)).mean() < 6
 
 
-def test_rows_go_on_as_rows_and_columns_as_columns(any_device):
-    picture = shaded(48, 60)
-    below = simdtex.extend(picture, bottom=24, rng=1, order=4, device=opencl(any_device))[48:]
-    beside = simdtex.extend(picture.T, right=24, rng=1, order=4, device=opencl(any_device))[:, 48:]
+def test_rows_go_on_as_rows_and_columns_as_columns():
+    picture, how = shaded(32, 40), {"rng": 1, "order": 2, "device": REFERENCE}
+    below = simdtex.extend(picture, bottom=16, **how)[32:]
+    beside = simdtex.extend(picture.T, right=16, **how)[:, 32:]
     for made in (below.mean(0), beside.mean(1)):
-        assert np.abs(made - picture.mean(0)).mean() < 14
+        assert np.abs(made - picture.mean(0)).mean() < 8
 
 
 def test_on_a_torus_a_hole_at_an_edge_sees_the_other_side():
-    image, mask = texture(SHAPE), hole_at(EDGES["left"])
+    image, mask = texture(SHAPE), hole_at(LEFT)
     other = image.copy()
     other[:, -1] = 255 - other[:, -1]
-    results = {
-        boundary: [fill(one, mask, boundary=boundary, reach=2)[mask] for one in (image, other)]
-        for boundary in ("open", "torus")
-    }
-    assert (results["torus"][0] != results["torus"][1]).any()
-    assert_same_bits(*results["open"])
+    for boundary, same in (("open", True), ("torus", False)):
+        found = [fill(one, mask, boundary=boundary, reach=2)[mask] for one in (image, other)]
+        assert (found[0] == found[1]).all() == same
 
 
-@pytest.mark.parametrize(("axis", "dtype"), [(None, np.bool_), (0, np.uint8), (-1, np.float32)])
-def test_the_picture_is_in_its_place_to_the_bit(dtype, axis):
-    image = with_axis(axis, dtype)
-    found = extend(image, top=2, bottom=1, left=3, right=4, channel_axis=axis)
-    assert found.dtype == image.dtype
-    ours, theirs = planes(axis, found), planes(axis, image)
-    assert ours.shape == (19, 27, theirs.shape[-1])
-    assert_same_bits(ours[2:18, 3:23].copy(), theirs.copy())
-
-
-@pytest.mark.parametrize("side", ["top", "bottom", "left", "right"])
-def test_each_side_alone(side):
-    image = texture(SHAPE)
-    found, output = extend(image, **{side: 3}, finish=0.0, full_output=True)
-    rows = slice(3 * (side == "top"), 3 * (side == "top") + 16)
-    cols = slice(3 * (side == "left"), 3 * (side == "left") + 20)
-    assert found.shape == (16 + 3 * (side in ("top", "bottom")), 20 + 3 * (side in ("left", "right")))
-    assert_same_bits(found[rows, cols].copy(), image)
-    assert np.array_equal(output.source[rows, cols], np.moveaxis(np.indices(SHAPE), 0, -1))
+def test_the_picture_is_in_its_place_to_the_bit():
+    image = with_axis(-1, np.float32)
+    found, output = extend(image, top=2, bottom=1, left=3, right=4, channel_axis=-1, finish=0.0, full_output=True)
+    assert (found.dtype, found.shape) == (np.float32, (19, 27, 3))
+    assert_same_bits(found[2:18, 3:23].copy(), image)
+    assert np.array_equal(output.source[2:18, 3:23], np.moveaxis(np.indices(SHAPE), 0, -1))
     assert_same_bits(found, apply_source_map(output.source, image, SHAPE))
     assert output.statistics["options"]["boundary"] == "open"
 
 
-@pytest.mark.parametrize(("tile", "inner"), [(True, np.s_[3:-3, 3:-3]), ("x", np.s_[:, 3:-3]), ("y", np.s_[3:-3, :])])
-@pytest.mark.parametrize("axis", [None, 0])
+@pytest.mark.parametrize(
+    ("tile", "axis", "inner"), [(True, 0, np.s_[3:-3, 3:-3]), ("x", None, np.s_[:, 3:-3]), ("y", None, np.s_[3:-3, :])]
+)
 def test_a_tile_keeps_all_but_its_bands(tile, inner, axis):
     image = with_axis(axis)
     found, output = extend(image, seamless=tile, band=3, channel_axis=axis, finish=0.0, full_output=True)
     ours, theirs = planes(axis, found), planes(axis, image)
     assert ours.shape == theirs.shape
     assert_same_bits(ours[inner].copy(), theirs[inner].copy())
-    assert (ours != theirs).any()
     assert np.array_equal(ours, apply_source_map(output.source, theirs, SHAPE))
-    if tile != "y":
-        assert (ours[:, :3] != theirs[:, :3]).any() and (ours[:, -3:] != theirs[:, -3:]).any()
-    if tile != "x":
-        assert (ours[:3] != theirs[:3]).any() and (ours[-3:] != theirs[-3:]).any()
+    for one, unlike in ((ours != theirs, tile != "x"), ((ours != theirs).swapaxes(0, 1), tile != "y")):
+        assert (one[:3].any() and one[-3:].any()) or not unlike
 
 
 def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
@@ -387,7 +292,7 @@ def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
 
 
 def wall(shape, brick, joint, seed=0):
-    """Bricks of two sides, (rows, columns), with dark joints; every second course is shifted by half a brick."""
+    """Bricks of two sides with dark joints; every second course is shifted by half a brick."""
     rng, (y, x) = np.random.default_rng(seed), np.indices(shape)
     course = y // brick[0]
     x = x + course % 2 * (brick[1] // 2)
@@ -413,10 +318,10 @@ def test_the_default_band_is_replaced():
     assert not changed[band_of(image[..., None]) : -band_of(image[..., None])].any()
 
 
-@pytest.mark.parametrize("shape", [(16, 16), (4, 5), (9, 17), (16, 60)])
-def test_half_of_a_small_picture_is_kept_by_default(shape):
-    image, middle = texture(shape), tuple(slice(side // 4, side - side // 4) for side in shape)
-    assert np.array_equal(extend(image, seamless=True, finish=0.0, order=1)[middle], image[middle])
+def test_half_of_a_small_picture_is_kept_by_default():
+    for shape in ((16, 16), (4, 5), (9, 17)):
+        image, middle = texture(shape), tuple(slice(side // 4, side - side // 4) for side in shape)
+        assert np.array_equal(extend(image, seamless=True, finish=0.0, order=1)[middle], image[middle])
 
 
 @pytest.mark.slow
@@ -437,6 +342,7 @@ def test_joints_go_on_through_a_hole(any_device):
     assert (made[joints] < 80).mean() > 0.97
 
 
+@pytest.mark.slow
 def test_the_bands_beside_a_picture_take_pixels_of_about_the_same_rows(any_device):
     """Of noise, 14 pixels away on average; 60 to 90 without a guide, which puts grass into a sky."""
     image, device = np.random.default_rng(1).integers(0, 256, (400, 40)).astype(np.uint8), opencl(any_device)
@@ -445,89 +351,53 @@ def test_the_bands_beside_a_picture_take_pixels_of_about_the_same_rows(any_devic
     assert np.abs(rows - np.arange(400)[:, None]).mean() < 30
 
 
-def step(image, axis):
-    """The mean absolute step across the seam of a tile."""
-    found = image.astype(float)
-    return np.abs(np.take(found, 0, axis) - np.take(found, -1, axis)).mean()
-
-
-@pytest.mark.parametrize(("finish", "most"), [pytest.param(0.0, 0.8, marks=pytest.mark.slow), (None, 0.55)])
-def test_a_tile_wraps(any_device, finish, most):
+@pytest.mark.slow
+def test_a_tile_wraps(any_device):
     """Of stripes that do not fit their picture the step across the seam is 93; a tile has 58, and finished 34."""
+
+    def step(image, axis):
+        return np.abs(np.take(image, 0, axis).astype(float) - np.take(image, -1, axis)).mean()
+
     for axis in (0, 1):
         images = [texture((32, 40), seed=seed) for seed in range(2)]
-        how = {"seamless": True, "band": 5, "finish": finish, "xi": -1.0, "device": opencl(any_device)}
+        how = {"seamless": True, "band": 5, "xi": -1.0, "device": opencl(any_device)}
         tiles = [extend(image, rng=seed, **how) for seed, image in enumerate(images)]
-        assert np.mean([step(tile, axis) for tile in tiles]) < most * np.mean([step(image, axis) for image in images])
+        assert np.mean([step(tile, axis) for tile in tiles]) < 0.55 * np.mean([step(image, axis) for image in images])
 
 
-IMAGE = texture(SHAPE)
 FLOAT = texture(SHAPE, dtype=np.float32)
+NAN = np.where(hole_at(np.s_[3:4, 4:5]), np.float32(np.nan), FLOAT)
+BAD = [
+    (fill, {"mask": np.zeros(SHAPE, bool)}, "nothing to fill; give a mask that is True"),
+    (fill, {"mask": np.ones(SHAPE, bool)}, "nothing of the picture is known; give a mask"),
+    (fill, {"mask": MIDDLE.astype(np.uint8)}, "mask holds uint8 values; give True and False"),
+    (fill, {"mask": MIDDLE[:-1]}, "mask is 15x20 and the picture 16x20 .*; give one size"),
+    (fill, {"levels": 2**31 - 1}, f"levels={2**31 - 1} is too many"),
+    (fill, {"reach": 0}, "reach is 0; give 1 or more"),
+    (fill, {"sample": FLOAT}, "sample has 1 channel of float32 and the picture 1 channel of uint8; convert"),
+    (fill, {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, "no known pixel"),
+    (extend, {}, "nothing to add; give top, bottom, left or right, or seamless=True"),
+    (extend, {"top": -3}, "top is -3; give 0 or more"),
+    (extend, {"seamless": "z"}, "seamless is 'z'; give True, False"),
+    (extend, {"seamless": True, "band": 0}, "band is 0; give 1 or more"),
+    (extend, {"seamless": True, "band": 8}, "band=8 leaves nothing of 16x20 .* narrower"),
+    (extend, {"image": NAN, "left": 2}, "NaN or infinite, the first at row 3.*: fill them"),
+    (extend, {"seamless": True, "band": 3, "boundary": "open"}, "follows from seamless; leave boundary out"),
+]
 
 
-def holding(value):
-    found = FLOAT.copy()
-    found[3, 4] = value
-    return found
-
-
-BAD_FILL = {
-    "nothing to fill": ({"mask": np.zeros(SHAPE, bool)}, ValueError, "nothing to fill; give a mask that is True"),
-    "nothing known": ({"mask": np.ones(SHAPE, bool)}, ValueError, "nothing of the picture is known; give a mask"),
-    "a mask of numbers": ({"mask": MIDDLE.astype(np.uint8)}, TypeError, "mask holds uint8 values; give True and False"),
-    "another size": ({"mask": MIDDLE[:-1]}, ValueError, "mask is 15x20 and the picture 16x20 .*; give one size"),
-    "no reach": ({"reach": 0}, ValueError, "reach is 0; give 1 or more"),
-    "a sample of another type": (
-        {"sample": FLOAT}, ValueError, "sample has 1 channel of float32 and the picture 1 channel of uint8; convert"),
-    "a sample with colour": ({"sample": texture(SHAPE, 3)}, ValueError, "the sample is 3-dimensional"),
-    "a sample of nothing": (
-        {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, ValueError, "no known pixel"),
-    "an unknown option": ({"method": "mrf"}, TypeError, "unknown option 'method'"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BAD_FILL)
-def test_bad_input_to_fill_is_refused_with_a_remedy(case):
-    change, error, words = BAD_FILL[case]
-    arguments = {"image": IMAGE, "mask": MIDDLE} | change
-    with pytest.raises(error, match=words) as caught:
-        fill(**arguments)
-    assert "\n" not in str(caught.value)
+@pytest.mark.parametrize(("function", "change", "words"), BAD)
+def test_bad_input_is_refused_with_a_remedy(function, change, words):
+    usual = {"image": texture(SHAPE), "mask": MIDDLE} if function is fill else {"image": texture(SHAPE)}
+    with pytest.raises((ValueError, TypeError), match=words):
+        function(**usual | change)
 
 
 def test_the_remedy_for_a_picture_with_scattered_holes_works():
-    image, hole = texture((48, 48)), np.random.default_rng(0).random((48, 48)) < 0.75
+    image, hole = texture((24, 24)), np.random.default_rng(7).random((24, 24)) < 0.7
     with pytest.raises(ValueError, match="give more of it, order=1 or 2, or"):
         fill(image, hole, order=18)
     assert (fill(image, hole, order=2)[~hole] == image[~hole]).all()
-
-
-BAD_EXTEND = {
-    "nothing to add": ({}, ValueError, "nothing to add; give top, bottom, left or right, or seamless=True"),
-    **{side: ({side: -3}, ValueError, f"{side} is -3; give 0 or more") for side in ("top", "bottom", "left", "right")},
-    "a tile in z": ({"seamless": "z"}, ValueError, "seamless is 'z'; give True, False"),
-    "no band": ({"seamless": True, "band": 0}, ValueError, "band is 0; give 1 or more"),
-    "all a band": (
-        {"seamless": True, "band": 8},
-        ValueError,
-        "band=8 leaves nothing of 16x20 .* narrower",
-    ),
-    "NaN": ({"image": holding(np.nan), "left": 2}, ValueError, "NaN or infinite, the first at row 3.*: fill them"),
-    "a boundary": (
-        {"seamless": True, "band": 3, "boundary": "open"},
-        ValueError,
-        "follows from seamless; leave boundary out",
-    ),
-    "an unknown option": ({"left": 2, "reach": 3}, TypeError, "unknown option 'reach'"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_EXTEND)
-def test_bad_input_to_extend_is_refused_with_a_remedy(case):
-    change, error, words = BAD_EXTEND[case]
-    with pytest.raises(error, match=words) as caught:
-        extend(**({"image": IMAGE} | change))
-    assert "\n" not in str(caught.value)
 
 
 def test_of_a_picture_that_is_mostly_unknown_fewer_levels_are_made():
@@ -536,8 +406,3 @@ def test_of_a_picture_that_is_mostly_unknown_fewer_levels_are_made():
     assert (filled[~hole] == picture[~hole]).all()
     with pytest.raises(ValueError, match="fewer levels"):
         fill(picture, hole, levels=3)
-
-
-def test_a_masked_picture_is_filled_where_it_is_masked():
-    masked = np.ma.array(texture(SHAPE), mask=MIDDLE)
-    assert_same_bits(fill(masked), fill(texture(SHAPE), MIDDLE))

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, assert_same_bits, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,52 +14,36 @@ from simdtex.jobs.synthesis.job import plan_synthesis
 from simdtex.methods import mrf
 
 QUICK = {"order": 2, "levels": 1, "xi": -8.0, "device": REFERENCE}
-TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int32, np.int64, np.float16, np.float32, np.float64]
 
 
 def quick(sample, shape, **options):
     return simdtex.synthesize(sample, shape, **({"rng": 1} | QUICK | options))
 
 
-@pytest.mark.parametrize("dtype", TYPES)
+@pytest.mark.parametrize("dtype", [np.bool_, np.int8, np.uint16, np.float16])
 def test_the_type_is_the_samples_and_every_pixel_is_one_of_its_own(dtype):
     sample = texture((9, 10), dtype=dtype)
     image = quick(sample, (7, 8), finish=0.0)
     assert (image.dtype, image.shape) == (sample.dtype, (7, 8))
     assert np.isin(image, sample).all()
     finished = quick(sample, (7, 8))
-    assert finished.dtype == sample.dtype
-    assert sample.min() <= finished.min() <= finished.max() <= sample.max()
+    assert finished.dtype == sample.dtype and sample.min() <= finished.min() <= finished.max() <= sample.max()
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.bool_])
-def test_levels_drawn_from_the_density_stay_in_the_range_of_the_type(dtype):
-    sample = texture((9, 10), dtype=dtype)
-    image = quick(sample, (9, 8), pixel="density", relaxation="gibbs", bandwidth=2.0)
-    assert image.dtype == sample.dtype
-    if dtype not in (np.bool_, np.uint8):  # whose levels are all there are
-        assert sample.min() <= image.min() <= image.max() <= sample.max()
+def test_levels_drawn_from_the_density_stay_in_the_range_of_the_type():
+    for dtype in (np.bool_, np.uint16, np.float32):
+        sample = texture((9, 10), dtype=dtype)
+        image = quick(sample, (9, 8), pixel="density", relaxation="gibbs", bandwidth=2.0)
+        assert image.dtype == sample.dtype and sample.min() <= image.min() <= image.max() <= sample.max()
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-def test_the_channel_axis_is_kept(axis):
+def test_the_channel_axis_is_kept_and_one_channel_is_as_good_as_none():
     last = texture((9, 10), 3)
-    image = quick(np.moveaxis(last, -1, axis), (6, 7), channel_axis=axis)
-    assert image.shape[axis] == 3
+    image = quick(np.moveaxis(last, -1, 1), (6, 7), channel_axis=1)
     expected = quick(last, (6, 7), channel_axis=-1)
-    assert_same_bits(np.ascontiguousarray(np.moveaxis(image, axis, -1)), expected)
-
-
-def test_one_channel_is_as_good_as_none():
+    assert_same_bits(np.ascontiguousarray(np.moveaxis(image, 1, -1)), expected)
     sample = texture((9, 10))
     assert_same_bits(quick(sample[..., None], (6, 7), channel_axis=-1)[..., 0], quick(sample, (6, 7)))
-
-
-def test_any_memory_layout_and_byte_order_gives_the_same():
-    sample = texture((9, 10), dtype=np.uint16)
-    plain = quick(sample, (6, 7))
-    for other in (np.asfortranarray(sample), sample.astype(">u2"), sample[::-1][::-1], sample.tolist()):
-        assert np.array_equal(quick(other, (6, 7)), plain)
 
 
 @given(
@@ -70,7 +54,7 @@ def test_any_memory_layout_and_byte_order_gives_the_same():
     st.sampled_from(["torus", "open"]),
     st.sampled_from(["icm", "gibbs"]),
 )
-@settings(max_examples=12)
+@settings(max_examples=8)
 def test_any_sample_that_fits_any_size_and_any_order(sample_shape, shape, order, channels, boundary, relaxation):
     if min(sample_shape) <= 2 * math.isqrt(order):
         return
@@ -82,184 +66,100 @@ def test_any_sample_that_fits_any_size_and_any_order(sample_shape, shape, order,
     assert not output.temperature.any()
 
 
-def test_a_sample_that_barely_fits_has_one_candidate():
+def test_a_sample_that_barely_fits_has_one_candidate_and_a_constant_gives_a_constant():
     sample = texture((5, 5))
-    image = quick(sample, (4, 4), order=8, edges="whole", finish=0.0)
-    assert (image == sample[2, 2]).all()
+    assert (quick(sample, (4, 4), order=8, edges="whole", finish=0.0) == sample[2, 2]).all()
+    for dtype, pixel in ((np.uint8, "source"), (np.float64, "density")):
+        assert (quick(np.full((6, 7), 3, dtype), (5, 6), relaxation="gibbs", pixel=pixel) == 3).all()
 
 
-def test_a_constant_sample_gives_a_constant():
-    for dtype in (np.uint8, np.uint16, np.float64):
-        for pixel in ("source", "density"):
-            image = quick(np.full((6, 7), 3, dtype), (5, 6), relaxation="gibbs", pixel=pixel)
-            if pixel == "source" or dtype != np.uint8:
-                assert (image == 3).all()
-
-
-def test_no_seed_is_a_fresh_seed_that_the_statistics_tell():
+def test_no_seed_is_a_fresh_seed_that_the_statistics_tell_and_the_whole_seed_counts():
     sample = texture((10, 10))
     image, output = quick(sample, (9, 9), rng=None, full_output=True)
-    seed = output.statistics["seed"]
-    assert_same_bits(quick(sample, (9, 9), rng=seed), image)
-    assert (quick(sample, (9, 9), rng=None) != quick(sample, (9, 9), rng=None)).any()
-
-
-def test_the_whole_seed_counts():
-    sample = texture((10, 10))
-    images = [quick(sample, (9, 9), rng=seed).tobytes() for seed in (1, 1 + 2**32, 1 + 2**63)]
-    assert len(set(images)) == 3
+    assert_same_bits(quick(sample, (9, 9), rng=output.statistics["seed"]), image)
+    images = [quick(sample, (9, 9), rng=seed).tobytes() for seed in (None, None, 1, 1 + 2**32, 1 + 2**63)]
+    assert len(set(images)) == 5
 
 
 def test_adding_a_constant_to_the_levels_changes_no_arrangement():
     dark = texture((12, 11)) // 2
-    for options in ({}, {"relaxation": "gibbs"}):
-        plain, output = quick(dark, (10, 9), full_output=True, **options)
-        bright, other = quick(dark + 100, (10, 9), full_output=True, **options)
-        assert np.array_equal(output.source, other.source)
-        assert np.array_equal(plain.astype(int) + 100, bright)
+    plain, output = quick(dark, (10, 9), full_output=True, relaxation="gibbs")
+    bright, other = quick(dark + 100, (10, 9), full_output=True, relaxation="gibbs")
+    assert np.array_equal(output.source, other.source)
+    assert np.array_equal(plain.astype(int) + 100, bright)
 
 
-@pytest.mark.parametrize("axis", [None, 0])
-def test_the_stages_are_the_levels_coarsest_first(axis):
-    sample = texture((17, 18), None if axis is None else 2)
-    given = sample if axis is None else np.moveaxis(sample, -1, axis)
-    image, output = simdtex.synthesize(
-        given, (13, 10), order=1, levels=3, channel_axis=axis, rng=2, device=REFERENCE, full_output=True, finish=0.0
-    )
-    assert [stage.level for stage in output.stages] == [2, 1, 0]
-    sizes = [stage.image.shape for stage in output.stages]
-    channels = () if axis is None else (2,)
-    assert sizes == [(*channels, *size) for size in [(4, 3), (7, 5), (13, 10)]]
+def test_the_stages_are_the_levels_coarsest_first():
+    sample = np.moveaxis(texture((17, 18), 2), -1, 0)
+    how = {"order": 1, "levels": 3, "channel_axis": 0, "finish": 0.0, "full_output": True}
+    image, output = quick(sample, (13, 10), **how)
+    assert [(stage.level, stage.image.shape) for stage in output.stages] == [
+        (2, (2, 4, 3)), (1, (2, 7, 5)), (0, (2, 13, 10))
+    ]  # fmt: skip
     assert all(stage.image.dtype == sample.dtype for stage in output.stages)
     assert_same_bits(output.stages[-1].image, image)
 
 
 def test_the_statistics_count_what_was_done():
-    _, output = simdtex.synthesize(
-        texture((15, 14)),
-        (9, 12),
-        order=2,
-        levels=2,
-        free_sweeps=1,
-        search="exact",
-        rng=7,
-        device=REFERENCE,
-        full_output=True,
-    )
+    how = {"levels": 2, "free_sweeps": 1, "search": "exact", "rng": 7, "full_output": True}
+    _, output = quick(texture((15, 14)), (9, 12), **how)
     told = output.statistics
-    assert told["device"] == REFERENCE.name
-    assert told["seed"] == 7
+    assert (told["device"], told["seed"], told["options"]["order"]) == (REFERENCE.name, 7, 2)
     assert {option.name for option in fields(mrf.Options)} == set(told["options"])
-    assert told["options"]["order"] == 2
-    assert [level["level"] for level in told["levels"]] == [1, 0]
-    assert [(level["rows"], level["cols"]) for level in told["levels"]] == [(5, 6), (9, 12)]
+    assert [(level["level"], level["rows"], level["cols"]) for level in told["levels"]] == [(1, 5, 6), (0, 9, 12)]
     for level in told["levels"]:
         sites = level["rows"] * level["cols"]
         assert level["fma"] == level["relaxations"] * level["candidates"] * 8 * 2 * 2  # 8 neighbours, 2 channels
         assert sites < level["relaxations"] <= sites * level["sweeps"]
-        assert level["seconds"] >= 0
-    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
+    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"]) > 0
 
 
-def record(sample, shape, **options):
+def test_progress_never_falls_and_tells_level_sweep_and_phase():
     seen = []
-    image = simdtex.synthesize(sample, shape, callback=seen.append, rng=1, device=REFERENCE, **options)
-    return image, seen
-
-
-def test_progress_never_falls():
-    for options in ({"order": 2, "levels": 2}, {"order": 1, "levels": 1, "free_sweeps": 0}, {"order": 8}):
-        _, seen = record(texture((16, 16)), (12, 13), **options)
-        fractions = [progress.fraction for progress in seen]
-        assert fractions == sorted(fractions)
-        assert 0 < fractions[0] < 0.5
-        assert fractions[-1] <= 1
-    _, seen = record(texture((16, 16)), (12, 13), order=2, levels=2, free_sweeps=2)
-    assert seen[-1].fraction > 0.95
-
-
-def test_progress_tells_level_sweep_and_phase():
-    _, seen = record(texture((16, 16)), (12, 13), order=2, levels=2, free_sweeps=2)
+    quick(texture((16, 16)), (12, 13), levels=2, free_sweeps=2, xi=-1.0, callback=seen.append)
+    fractions = [progress.fraction for progress in seen]
+    assert fractions == sorted(fractions)
+    assert 0 < fractions[0] < 0.5 and 0.95 < fractions[-1] <= 1
     assert {progress.levels for progress in seen} == {2}
     assert [progress.level for progress in seen] == sorted((p.level for p in seen), reverse=True)
     for level in (1, 0):
         here = [progress for progress in seen if progress.level == level]
         sweeps = [progress.sweep for progress in here]
-        assert sweeps == sorted(sweeps)
-        assert set(sweeps) == set(range(1, max(sweeps) + 1))
+        assert sweeps == sorted(sweeps) and {*sweeps} == {*range(1, max(sweeps) + 1)}
         ends = [f"level{level}-sweep{sweep:02d}" for sweep in range(1, max(sweeps) + 1)]
-        assert [p.stage for p in here if p.stage] == ends, "one end for each"
+        assert [p.stage for p in here if p.stage] == ends and here[-1].stage == ends[-1], "one end for each"
         phases = [progress.phase for progress in here if progress.stage]
         assert phases == ["relax"] * (len(phases) - 2) + ["free"] * 2
         assert 0 < here[0].temperature_left <= 1
         assert all(progress.temperature_left == 0 for progress in here if progress.phase == "free")
-        assert here[-1].stage == ends[-1]
         assert here[0].doing == f"level {level}, sweep 1, temperature {here[0].temperature_left:.3f}"
 
 
-@pytest.mark.parametrize("axis", [None, 0])
-def test_progress_shows_the_picture_and_its_temperature(axis):
-    sample = texture((12, 12), None if axis is None else 2)
-    given = sample if axis is None else np.moveaxis(sample, -1, axis)
-    pictures = []
+def test_progress_shows_the_picture_and_its_temperature():
+    pictures, how = [], {"order": 1, "levels": 2, "channel_axis": 0, "finish": 0.0}
 
     def look(progress):
         if progress.stage:
             pictures.append((progress.level, progress.image(), progress.temperature()))
 
-    image = simdtex.synthesize(
-        given, (7, 10), order=1, levels=2, channel_axis=axis, rng=1, device=REFERENCE, callback=look, finish=0.0
-    )
-    sizes = {0: (7, 10), 1: (4, 5)}
+    image = quick(np.moveaxis(texture((12, 12), 2), -1, 0), (7, 10), callback=look, **how)
     for level, picture, temperature in pictures:
-        assert picture.shape == ((2,) if axis == 0 else ()) + sizes[level]
-        assert temperature.shape == sizes[level]
+        assert picture.shape == (2, *temperature.shape) and temperature.shape == {0: (7, 10), 1: (4, 5)}[level]
         assert 0 <= temperature.min() <= temperature.max() <= 1
     assert_same_bits(pictures[-1][1], image)
     assert not pictures[-1][2].any()
 
 
-def test_an_interrupt_gets_through_and_the_next_run_works(any_device):
-    sample, machine = texture((12, 12)), opencl(any_device)
-    options = {"order": 2, "rng": 1, "device": machine}
-    before = simdtex.synthesize(sample, (9, 9), **options)
-    calls = []
-
-    def interrupt(progress):
-        calls.append(progress)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        simdtex.synthesize(sample, (9, 9), callback=interrupt, **options)
-    assert len(calls) == 3
-    assert_same_bits(simdtex.synthesize(sample, (9, 9), **options), before)
-
-
 SAMPLE = texture((9, 10))
-FLOAT = texture((9, 10), dtype=np.float64)
-
-
-def with_value(value):
-    sample = FLOAT.copy()
-    sample[4, 5] = value
-    return sample
-
-
+NAN = np.where(np.arange(90).reshape(9, 10) == 45, np.nan, SAMPLE)
 BAD = [
-    # the sample
-    ({"sample": with_value(np.nan), "method": "multires"}, ValueError, "known everywhere"),
+    ({"sample": NAN, "method": "multires"}, ValueError, "known everywhere"),
     ({"sample": SAMPLE.astype(complex)}, TypeError, "real"),
     ({"sample": texture((4, 30)), "order": 8}, ValueError, "the largest order that fits is 3"),
     ({"sample": texture((1, 1)), "order": 1}, ValueError, "give at least 3x3 pixels"),
-    # the size
     ({"shape": (0, 5)}, ValueError, "rows of the output is 0; give 1 or more"),
-    ({"shape": (5, -1)}, ValueError, "columns of the output is -1; give 1 or more"),
     ({"shape": (5.0, 5)}, TypeError, "rows of the output must be an integer"),
-    ({"shape": 5}, ValueError, "shape must be two integers"),
-    ({"shape": "12"}, TypeError, "must be an integer"),
     ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size, or make it in tiles: --tiles 2048"),
-    # the options
     ({"levels": 20}, ValueError, "levels=20 is too many .* give at most"),
     ({"reduction": 4, "levels": 2}, ValueError, "too much for 2 levels and this sample; give at most 2"),
     ({"sample": SAMPLE // 64, "reduction": 2, "levels": 2, "categorical": True}, ValueError, "takes means, .* leave"),
@@ -268,7 +168,6 @@ BAD = [
     ({"schedule": "rows"}, ValueError, "choose one of: coloring"),
     ({"temperature": 1}, TypeError, "unknown option 'temperature' .* choose from: preset, order, structure"),
     ({"method": "magic"}, ValueError, "unknown method 'magic'; choose one of: mrf"),
-    # the seed and the device
     ({"rng": -1}, ValueError, r"give an integer from 0 to 2\*\*64 - 1"),
     ({"rng": 0.5}, TypeError, "an integer or a numpy.random.Generator"),
     ({"device": "no such device"}, simdtex.DeviceError, "choose one of: .*reference"),
@@ -284,15 +183,15 @@ def test_bad_input_is_refused_with_a_remedy(change, error, words):
     assert len(str(caught.value)) < 500
 
 
-@pytest.mark.parametrize("side", range(3, 10))
-def test_the_largest_order_that_is_named_works_and_the_next_does_not(side):
-    sample = texture((side, 14))
-    with pytest.raises(ValueError, match="the largest order that fits is") as caught:
-        quick(sample, (4, 4), order=100)
-    largest = int(str(caught.value).rpartition(" ")[2])
-    assert quick(sample, (4, 4), order=largest).shape == (4, 4)
-    with pytest.raises(ValueError, match=f"the largest order that fits is {largest}"):
-        quick(sample, (4, 4), order=largest + 1)
+def test_the_largest_order_that_is_named_works_and_the_next_does_not():
+    for side in (3, 6, 8):
+        sample = texture((side, 14))
+        with pytest.raises(ValueError, match="the largest order that fits is") as caught:
+            quick(sample, (4, 4), order=100)
+        largest = int(str(caught.value).rpartition(" ")[2])
+        assert quick(sample, (4, 4), order=largest).shape == (4, 4)
+        with pytest.raises(ValueError, match=f"the largest order that fits is {largest}"):
+            quick(sample, (4, 4), order=largest + 1)
 
 
 def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
@@ -305,53 +204,40 @@ def test_only_large_samples_are_reduced_and_a_cell_keeps_20_pixels():
     assert [reduction(large[:n, :n], lattice="none") for n in (170, 250, 400)] == [1, 2, 4]
     assert [reduction(large, lattice=((0, n), (n, 0))) for n in (90, 41, 30)] == [4, 2, 1]
     paper = {"preset": "paper"}, {"search": "exact"}, {"phases": 64}, {"categorical": True}
-    assert [reduction(large // 64, **options) for options in ({}, *paper)] == [1] * 5
-    assert reduction(large, reduction=8) == reduction(large, reduction=15) == 8
-    holes = large.astype(float)
+    assert [reduction(large[:260, :270] // 64, **options) for options in ({}, *paper)] == [1] * 5
+    assert [reduction(large[:260], reduction=n, lattice="none") for n in (4, 7)] == [4, 4]
+    holes = large[:260, :270].astype(float)
     holes[::2, ::2] = np.nan  # no square of 2x2 is known
     assert reduction(holes, lattice="none", order=2) == 1
 
 
 @pytest.mark.parametrize("edges", ["whole", "reflect"])
 def test_the_most_levels_that_are_named_work_and_one_more_does_not(edges):
-    for sample, shape in [((9, 10), (20, 20)), ((30, 31), (5, 9)), ((17, 40), (40, 17))]:
-        options = {"order": 2, "edges": edges, "device": REFERENCE, "rng": 1}
+    for sample, shape in [((9, 10), (20, 20)), ((30, 31), (5, 9))]:
+        options = {"edges": edges, "xi": -1.0}
         with pytest.raises(ValueError, match="give at most") as caught:
-            simdtex.synthesize(texture(sample), shape, levels=30, **options)
+            quick(texture(sample), shape, levels=30, **options)
         most = int(str(caught.value).rpartition(" ")[2])
-        image = simdtex.synthesize(texture(sample), shape, levels=most, **options)
-        assert image.shape == shape
+        assert quick(texture(sample), shape, levels=most, **options).shape == shape
         with pytest.raises(ValueError, match="give at most"):
-            simdtex.synthesize(texture(sample), shape, levels=most + 1, **options)
+            quick(texture(sample), shape, levels=most + 1, **options)
 
 
-@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1.0, 1e300, 8e307])
+@pytest.mark.parametrize("scale", [1e-320, 1e300, 8e307])
 def test_float_pixels_of_any_magnitude(scale):
     sample = texture((9, 10), dtype=np.float64) * scale
-    image = quick(sample, (5, 6), finish=0.0)
-    assert np.isin(image, sample).all()
+    assert np.isin(quick(sample, (5, 6), finish=0.0), sample).all()
     image = quick(sample, (5, 6))
     assert sample.min() <= image.min() <= image.max() <= sample.max()
-    image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
-    assert np.isfinite(image).all()
+    assert np.isfinite(quick(sample, (5, 6), pixel="density", relaxation="gibbs")).all()
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint64])
-def test_the_ends_of_64_bit_types_are_within_reach_of_a_draw(dtype):
+def test_the_ends_of_64_bit_types_are_within_reach(dtype):
     bounds = np.iinfo(dtype)
     near = bounds.max - np.random.default_rng(0).integers(0, bounds.max // 400, (12, 12), dtype=dtype)
     near[0, :2] = bounds.min, bounds.max
     image = quick(near, (24, 24), order=1, pixel="density", relaxation="gibbs", bandwidth=3.0)
     assert (image > 0).mean() > 0.9
-
-
-@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.int8])
-def test_integer_pixels_of_any_magnitude(dtype):
-    bounds = np.iinfo(dtype)
-    sample = texture((9, 10), dtype=np.int8).astype(dtype)
-    sample[4, 4:6] = bounds.min, bounds.max
-    image = quick(sample, (5, 6), finish=0.0)
-    assert np.isin(image, sample).all()
-    assert quick(sample, (5, 6)).dtype == dtype
-    image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
-    assert image.dtype == dtype
+    image = quick(near, (5, 6), finish=0.0)
+    assert image.dtype == dtype and np.isin(image, near).all()

@@ -7,7 +7,9 @@ from skimage import data
 
 import simdtex
 from simdtex import random
+from simdtex.jobs.filling.job import plan_filling
 from simdtex.jobs.why import replay as module
+from simdtex.jobs.why.holes import HoleReplay
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import first_state, sweep
 from simdtex.methods.mrf.neighbourhood import Field
@@ -26,8 +28,12 @@ SEARCHES = {
 }
 
 
-def test_these_schedules_claim_windows():
+def test_these_schedules_claim_windows_and_a_window_that_does_not_fit_is_refused():
     assert WINDOWS == ["coloring", "coloring-fixed", "checkerboard", "synchronous"]
+    closed = Grid.of((8, 9), 1, False)
+    for grid, window in ((Grid((8, 9)), (0, 0, 9, 3)), (closed, (6, 0, 3, 3)), (closed, (-1, 0, 3, 3))):
+        with pytest.raises(ValueError, match="window"):
+            grid.window(*window)
 
 
 def cut(saved, window):
@@ -72,41 +78,21 @@ def test_a_window_relaxes_as_the_whole(any_device, name, number, how, boundary):
     assert compared > 200
 
 
-@pytest.mark.parametrize("machine_", ["reference", "device"])
-def test_a_window_begins_as_the_whole(request, machine_):
-    machine = REFERENCE if machine_ == "reference" else opencl(request.getfixturevalue("any_device"))
-    run = laid_out(machine, texture((12, 13))[..., None], (22, 27), mrf.Options(order=2, levels=2), 3)
-    everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
+def test_a_window_begins_as_the_whole():
+    run = laid_out(REFERENCE, texture((12, 13))[..., None], (22, 27), mrf.Options(order=2, levels=2), 3)
+    everywhere = run.sample.places(np.zeros((1, 2), np.int32), 1).positions
     for number in (0, 1):
-        grid = run.grid(number)
-        whole = [np.array(machine.get(plane)) for plane in run.enter(number, None).field]
-        window = grid.window(-3, 5, 8, 6)
-        ours = [machine.get(a) for a in start(machine, run.planes, everywhere, window, run.seed)]
-        assert_same_bits(ours, [np.ascontiguousarray(window.cut(a)) for a in whole])
+        whole, window = run.enter(number, None).field, run.grid(number).window(-3, 5, 8, 6)
+        ours = start(REFERENCE, run.planes, everywhere, window, run.seed)
+        assert_same_bits([*ours], [np.ascontiguousarray(window.cut(plane)) for plane in whole])
 
 
 def test_a_window_of_a_window_lies_where_it_should():
     grid = Grid.of((40, 50), 2)
-    outer = grid.window(15, -4, 12, 9)
-    inner = outer.window(3, 2, 4, 5)
-    assert inner == grid.window(18, -2, 4, 5)
-    assert inner.whole == grid
+    inner = grid.window(15, -4, 12, 9).window(3, 2, 4, 5)
+    assert inner == grid.window(18, -2, 4, 5) and inner.whole == grid
     places = grid.places(np.arange(grid.size)).reshape(grid.shape)
     assert_same_bits(inner.places(np.arange(inner.size)), inner.cut(places).ravel())
-
-
-@pytest.mark.parametrize(
-    ("grid", "window"),
-    [
-        (Grid((8, 9)), (0, 0, 9, 3)),
-        (Grid.of((8, 9), 1, False), (6, 0, 3, 3)),
-        (Grid.of((8, 9), 1, False), (-1, 0, 3, 3)),
-    ],
-    ids=str,
-)
-def test_a_window_that_does_not_fit_is_refused(grid, window):
-    with pytest.raises(ValueError, match="window"):
-        grid.window(*window)
 
 
 def test_places_beyond_32_bits_draw_numbers_of_their_own(machine):
@@ -127,45 +113,37 @@ def test_places_beyond_32_bits_draw_numbers_of_their_own(machine):
 # -- A replay has the fields of the run, after any set of sites, and explains any pixel at any moment.
 
 BRICK = data.brick()[:24, :24]
-SHAPE, SMALL = (18, 21), (9, 11)
+SMALL = (9, 11)
 RULES = {"order": 4, "levels": 2, "free_sweeps": 1, "rng": 3}
-SCHEDULES_REPLAY = ["coloring", "luby", "synchronous", "random-scan", "block:6x7"]
 
 
-def run(schedule, shape, device):
-    """The fields at the end of every sweep of a run, in order."""
+@pytest.mark.parametrize(("schedule", "on"), [("coloring", "reference"), ("random-scan", "device")])
+def test_fields_are_those_of_the_run(any_device, schedule, on):
+    rules = RULES | {"schedule": schedule, "device": opencl(any_device) if on == "device" else REFERENCE}
     seen = []
 
     def watch(progress):
         if progress.stage:
             seen.append((progress.level, progress.sweep, progress.image(), progress.source(), progress.temperature()))
 
-    simdtex.synthesize(BRICK, shape, schedule=schedule, **RULES, device=device, callback=watch)
-    return seen
-
-
-@pytest.mark.parametrize("schedule", SCHEDULES_REPLAY)
-def test_fields_are_those_of_the_run(any_device, schedule):
-    machine = opencl(any_device) if schedule in ("coloring", "random-scan") else REFERENCE
-    seen = run(schedule, SMALL, machine)
-    replay = simdtex.replay(BRICK, SMALL, schedule=schedule, **RULES, device=machine)
-    assert [(one.level, one.sweep) for one in replay.sweeps] == [one[:2] for one in seen]
-    for n in {0, len(seen) // 2, len(seen) - 1}:
+    simdtex.synthesize(BRICK, SMALL, **rules, callback=watch)
+    replay = simdtex.replay(BRICK, SMALL, **rules)
+    assert [one[:2] for one in replay.sweeps] == [one[:2] for one in seen]
+    for n in (0, len(seen) // 2, -1):
         found = replay.at(n)
         for one, other in zip((found.image[..., 0], found.source, found.temperature), seen[n][2:], strict=True):
             np.testing.assert_array_equal(one, other)
-        np.testing.assert_array_equal(replay.at(n - len(seen)).image, found.image)
 
 
-@pytest.mark.parametrize("schedule", ["coloring", "checkerboard", "synchronous", "random-subset"])
+@pytest.mark.parametrize("schedule", ["coloring", "random-subset"])
 def test_a_set_changes_its_own_sites_alone(schedule):
-    replay = simdtex.replay(BRICK, SHAPE, schedule=schedule, **RULES, device="reference")
+    replay = simdtex.replay(BRICK, SMALL, schedule=schedule, **RULES, device="reference")
     n = len(replay.sweeps) - 1
     sweep = replay.sweeps[n]
     before, relaxed = replay.at(n, 0), 0
     assert not before.relaxed.any()
     np.testing.assert_array_equal(before.image, replay.at(n - 1).image)
-    for sets in range(1, min(12, sweep.sets) + 1):
+    for sets in range(1, min(40, sweep.sets) + 1):
         after = replay.at(n, sets)
         last = after.relaxed == 2
         np.testing.assert_array_equal(after.relaxed > 0, last | (before.relaxed > 0))
@@ -173,7 +151,7 @@ def test_a_set_changes_its_own_sites_alone(schedule):
         relaxed += int(last.sum())
         before = after
     if sweep.sets == sets and schedule != "random-subset":
-        assert relaxed == sweep.sites == 18 * 21  # a free sweep relaxes all
+        assert relaxed == sweep.sites == 9 * 11  # a free sweep relaxes all
 
 
 def test_checkerboard_has_two_sets_and_raster_one_for_each_site():
@@ -188,17 +166,15 @@ def test_states_that_are_not_kept_are_computed_again(monkeypatch):
     n = len(kept.sweeps) - 3
     assert len(bare.sweeps) == n + 3
     assert list(bare._states) == [0] and len(kept._states) == n + 3
-    for one, other in zip(vars(kept.at(n, 2)).values(), vars(bare.at(n, 2)).values(), strict=True):
-        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(kept.at(n, 2).source, bare.at(n, 2).source)
     assert kept.explain_pixel(3, 5, n).table() == bare.explain_pixel(3, 5, n).table()
 
 
-@pytest.mark.parametrize("schedule", ["coloring", "random-scan", "block:6x7"])
+@pytest.mark.parametrize("schedule", ["coloring", "random-scan"])
 def test_a_pixel_is_explained_by_its_last_relaxation(schedule):
-    sample = texture((24, 24), 3)
     rules = RULES | {"schedule": schedule, "channel_axis": -1, "device": "reference", "xi": -8.0}
-    replay = simdtex.replay(sample, SMALL, **rules)
-    n, rng = len(replay.sweeps) - 1, np.random.default_rng(1)
+    replay = simdtex.replay(texture((16, 16), 3), SMALL, **rules)
+    n, rng, explained = len(replay.sweeps) - 1, np.random.default_rng(1), 0
     for _ in range(4):
         number = int(rng.integers(n // 2, n + 1))
         sets = int(rng.integers(replay.sweeps[number].sets + 1))
@@ -206,28 +182,41 @@ def test_a_pixel_is_explained_by_its_last_relaxation(schedule):
         try:
             why = replay.explain_pixel(*site, number, sets)
         except ValueError as error:
-            assert "has not relaxed yet" in str(error)
-            assert any(n % 2 for n in site)  # a pixel without a site above
+            assert "has not relaxed yet" in str(error) and any(n % 2 for n in site)  # a pixel without a site above
             continue
-        now = replay.at(number, sets)
-        level = now.level
-        shown = now.source[site[0] >> level, site[1] >> level]
+        now, explained = replay.at(number, sets), explained + 1
+        shown = now.source[site[0] >> now.level, site[1] >> now.level]
         np.testing.assert_array_equal(why.candidates.place[why.taken], shown)
         if schedule != "random-scan":  # which may relax the site once more in the same sweep
             assert replay.explain(why.site, why.level, why.sweep).table() == why.table()
-        if level == 0 and why.level == 0:
+        if now.level == why.level == 0:
             assert why.cooled == now.temperature[site]
+    assert explained
 
 
 def test_a_pixel_that_keeps_its_value_is_explained_on_the_level_above():
-    replay = simdtex.replay(BRICK, SHAPE, **RULES, device="reference")
+    replay = simdtex.replay(BRICK, SMALL, **RULES, device="reference")
     first = next(n for n, one in enumerate(replay.sweeps) if one.level == 0)
     why = replay.explain_pixel(4, 6, first)
-    assert (why.level, why.site) == (1, (2, 3))
-    assert why.sweep == replay.sweeps[first - 1].sweep
-    with pytest.raises(ValueError, match="has not relaxed yet"):
-        replay.explain_pixel(3, 5, first, 0)
-    with pytest.raises(ValueError, match="has not relaxed yet"):
-        replay.explain_pixel(0, 0, 0, 0)
+    assert (why.level, why.site, why.sweep) == (1, (2, 3), replay.sweeps[first - 1].sweep)
+    for pixel, n in (((3, 5), first), ((0, 0), 0)):
+        with pytest.raises(ValueError, match="has not relaxed yet"):
+            replay.explain_pixel(*pixel, n, 0)
     with pytest.raises(IndexError):
         replay.at(1000)
+
+
+def test_the_replay_of_a_hole_is_in_pixels_of_the_picture():
+    image, hole = texture((20, 26)), np.zeros((20, 26), bool)
+    hole[6:13, 8:17] = True
+    how = {"order": 2, "schedule": "synchronous", "finish": 0.0}
+    replay = HoleReplay(plan_filling(image, hole, **how), REFERENCE, 3)
+    made, output = simdtex.fill(image, hole, **how, rng=3, device=REFERENCE, full_output=True)
+    assert_same_bits(replay.at(-1).image, made[..., None])
+    np.testing.assert_array_equal(replay.at(-1).source, output.source)
+    why = replay.explain_pixel(9, 12)
+    np.testing.assert_array_equal(why.candidates.place[why.taken], output.source[9, 12])
+    assert replay.explain(why.site).table() == why.table()
+    assert replay.together(replay.at(-1, 1)).all(), "all sites at once"
+    with pytest.raises(ValueError, match="not in the hole"):
+        replay.explain_pixel(0, 12)
