@@ -185,6 +185,12 @@ def test_as_many_steps_as_may_be_go_together(most, expected):
     assert [(here.tolist(), begun, last) for here, begun, last in found] == expected
 
 
+def test_kept_sites_are_swept_at_the_finest_of_several_levels_alone():
+    for levels, sites, expected in ((3, "all", [2, 2, 2]), (2, "kept", [2, 0]), (1, "kept", [0])):
+        run = prepared(levels=levels, free_sites=sites)
+        assert [run.free_sweeps(number) for number in range(levels)] == expected
+
+
 def test_a_site_always_cools():
     assert [prepared(xi=xi).level(0).relaxation.xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
 
