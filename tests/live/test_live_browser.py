@@ -225,10 +225,14 @@ def test_a_run_pauses_resumes_and_is_cancelled(made, wall):
     until(lambda: made.script("return page.running"))
     made.button("Pause").click()
     until(lambda: made.status == "Paused.")
-    made.script("return new Promise((done) => setTimeout(done, 300))")  # what was on its way arrives
-    before = made.script("return page.frames")
-    made.script("return new Promise((done) => setTimeout(done, 700))")
-    assert (made.script("return page.frames"), made.results) == (before, 1)
+
+    def still():
+        before = made.script("return page.frames")
+        made.script("return new Promise((done) => setTimeout(done, 700))")
+        return made.script("return page.frames") == before
+
+    until(still)  # once what was on its way has arrived
+    assert made.results == 1
     Select(made.labelled("Layer")).select_by_value("temperature")
     until(lambda: made.script("return page.seen") == "temperature")
     made.button("Resume").click()
