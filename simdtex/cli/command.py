@@ -93,9 +93,7 @@ class Command(click.Command):
         groups: dict[str, list[tuple[str, str]]] = {title: [] for title in FIRST}
         for title, record in (entry for one in entries.values() for entry in one):
             groups.setdefault(title, []).append(record)
-        of_methods = {title: groups.pop(title) for title in sorted(groups, key=_method) if _method(title)}
-        last = {title: groups.pop(title) for title in LAST if title in groups}
-        groups |= of_methods | last
+        groups = {title: groups[title] for title in sorted(groups, key=_rank)}
         if sum(map(len, groups.values())) <= FEW:
             groups = {"Options": [record for group in groups.values() for record in group]}
         for title, records in groups.items():
@@ -104,9 +102,9 @@ class Command(click.Command):
                     formatter.write_dl(records)
 
 
-def _method(title: str) -> str:
-    """Return the method that a title names, if it names one."""
-    return title.partition(":")[0] if title.startswith("Method ") else ""
+def _rank(title: str) -> tuple[int, str]:
+    """Return the key by which titles are sorted: those of methods come after others, and `LAST` at the end."""
+    return LAST.index(title) + 1 if title in LAST else 0, title.partition(":")[0] if title[:7] == "Method " else ""
 
 
 ALL, WORDS = f"{__name__}.all", f"{__name__}.words"
