@@ -237,7 +237,7 @@ def test_a_region_is_the_white_parts_of_a_picture(folder, maps):
 
 
 def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
-    result = simulate("facies.png", "--region", "region.png", "--categorical", "-o", "out.gslib")
+    result = simulate("facies.png", "--region", "region.gslib", "--categorical", "-o", "out.gslib")
     assert result.exit_code == 0, result.output
     with pytest.warns(DataWarning, match="128 of 320 values are -9966699"):
         values = read_grid(folder / "out.gslib").values["simulation__real0"][0]
