@@ -64,8 +64,10 @@ def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path):
 
 def test_slices_are_pictures_and_pages(tmp_path):
     """Of which a folder is replaced as a whole, and whose numbers have as many digits as they need."""
-    volume.write(tmp_path / "a", noise((1001, 1, 1)))
-    assert len(os.listdir(tmp_path / "a")) == 1001 and (tmp_path / "a" / "slice-1000.png").exists()
+    (tmp_path / "many").mkdir()
+    volume._encode(tmp_path / "many", "", noise((1001, 1, 1)))
+    assert {"slice-0000.png", "slice-1000.png"} <= {*os.listdir(tmp_path / "many")}
+    volume.write(tmp_path / "a", noise((5, 2, 2)))
     values = noise((3, 4, 5, 3))
     volume.write(tmp_path / "a.tif", values)
     volume.write(tmp_path / "a", values)

@@ -179,6 +179,14 @@ def test_what_does_not_fit_is_left_alone_or_refused():
         phases(pictures, (30, 200), True, lattice)
 
 
+def test_harmonics_are_the_amplitudes_of_the_shortest_waves():
+    y, x = np.mgrid[:32, :24] / 8
+    for n, (k, m) in enumerate(((0, 1), (1, 0), (1, 1), (1, -1))):
+        picture = np.rint(100 * np.cos(2 * np.pi * (k * y + m * x))).astype(np.int64)
+        found = np.abs(harmonics(picture, np.ones(picture.shape, bool), Lattice((8, 0), (0, 8))))
+        assert_allclose(found / picture.size, 50 * (np.arange(4) == n), atol=1)
+
+
 @pytest.mark.parametrize("moved", [(5.2, 9.1), (-4.1, 2.2)])
 def test_pictures_are_brought_into_phase(moved):
     lattice = Lattice((11, 2), (-3, 13))

@@ -77,6 +77,19 @@ def scale(*variables, values=64, **kinds):
     return found, found.levels(pixels)[:, 0]
 
 
+def test_variables_have_spreads_of_their_weights():
+    """Three categories differ in two channels by a height; two in one."""
+    found, levels = scale([0.0, 1, 2, 3], [0.0, 0, 1, 2], categorical=(False, True), weights=(1, 2))
+    differing, deviation = 1 - (4 + 1 + 1) / 16, np.std([0, 1, 2, 3]) / 3
+    height = round(found.top * 2 * np.sqrt(1 / differing) * deviation)
+    assert levels[0].tolist() == [round(found.top * k / 3) for k in range(4)]
+    assert (levels[1:] == np.array([[1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) * height).all() and height < found.top
+    assert found.owners == [0, 1, 1, 1] and found.units[1:].tolist() == [0, 0, 0]
+    assert found.units[0] == pytest.approx(3 / found.top, rel=1e-6)
+    found, levels = scale([5, 7, 7], categorical=(True,))
+    assert levels.tolist() == [[0, found.top, found.top]]
+
+
 def test_the_highest_level_keeps_sums_exact():
     for values, top in ((1, 4095), (2**9, 4095), (2**11, 2047), (2**13, 1023)):
         assert highest(values) == top and np.log2(top) * 2 + 20 + np.log2(values) <= 53
