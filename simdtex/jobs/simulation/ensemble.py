@@ -91,6 +91,11 @@ def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) 
     -------
     ndarray, (K,)
         The categories, in the order of ``categories`` or ascending; empty if the values are continuous.
+
+    Raises
+    ------
+    ValueError
+        The training image is not (rows, cols), or holds a value that is none of the categories.
     """
     image = checked(training, "training image")
     if categories is not None and len(categories):
@@ -139,6 +144,11 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
     max_lag : int
         The largest distance, pixels, less than a side of the image.
 
+    Raises
+    ------
+    ValueError
+        The image has other axes, or is too small.
+
     Notes
     -----
     Pixels are connected by their sides, because flow is computed through the common sides of cells; by corners, a
@@ -185,6 +195,11 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     -------
     ndarray of int, (n, 2)
         Rows and columns where the skeleton ends, about a half-width before the channel does, in raster order.
+
+    Raises
+    ------
+    ValueError
+        The image is not (rows, cols), or has a side of 16 pixels or less.
 
     Notes
     -----
@@ -254,6 +269,11 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
         For the window at each upper left pixel, the pixel index (in C order) of the upper left pixel of the first equal
         window of the training image; -1 if there is none, and -2 for windows with a single value, which do not count as
         copies.
+
+    Raises
+    ------
+    ValueError
+        The arrays have another number of axes, or a side of fewer pixels than a window.
 
     Notes
     -----
@@ -346,6 +366,12 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
     categories : sequence of int, optional
         As in `categories_of`; those of the training image by default. Continuous values are cut into three classes, by
         quantiles of the training image. A value that is frequent enough to be such a quantile is a class of its own.
+
+    Raises
+    ------
+    ValueError
+        The arrays have another number of axes or are too small, a value is no category, or there are too many different
+        patterns for their counts to fit 0.5 GB.
 
     Notes
     -----
@@ -493,6 +519,11 @@ def summary(
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
         As in `categories_of`: the training image's own by default, none for continuous values.
+
+    Raises
+    ------
+    ValueError
+        The arrays have other shapes, a value is no category or beyond 1e100, or a datum lies outside.
     """
     array, image = checked(ensemble, "ensemble", ENSEMBLE), checked(training, "training image")
     known = categories_of(image, categories)

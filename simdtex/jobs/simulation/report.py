@@ -66,6 +66,11 @@ def write_ensemble(
         The values that are categories, as in `simdtex.jobs.simulation.ensemble.categories_of`.
     command : str
         The command line, if there is one.
+
+    Raises
+    ------
+    ValueError
+        The folder cannot be written, the arrays do not match, or a datum lies outside.
     """
     check_folder(folder)
     found = summary(np.asarray(ensemble), training, data=data, categories=categories)

@@ -60,6 +60,11 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     DataArray, (realisation,)
         Cells, connected by their sides, times the size of a cell, of a map an area; 0 where no well meets the category.
         ``.quantile([0.1, 0.5, 0.9])`` gives P10, P50 and P90. P10 is the small one, which is P90 of many reserves.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A point is outside of the cells, or the realisations have other dimensions.
     """
     field, wells = _field(realisations, category), np.atleast_2d(np.asarray(well, np.float64))
     axes = [axis for axis in "zyx" if axis in realisations.dims]
