@@ -380,7 +380,7 @@ class Made(NamedTuple):
     statistics: dict[str, Any]
 
 
-class Whole(NamedTuple):
+class WholePicture(NamedTuple):
     """The whole picture so far, (rows, cols, channels), its temperatures and its source map."""
 
     image: NDArray[Any]
@@ -442,7 +442,13 @@ class Filling:
         return whole.image, OutputWithSource(whole.source, whole.temperature, [], statistics)
 
     def _show(
-        self, callback: Callback, whole: Whole, at: Any, sample: WindowSample, part: tuple[int, int], now: Progress
+        self,
+        callback: Callback,
+        whole: WholePicture,
+        at: Any,
+        sample: WindowSample,
+        part: tuple[int, int],
+        now: Progress,
     ) -> Any:
         """Call back with the whole picture, with the current hole in it, and the share of all windows."""
         pasted = partial(paste, at=at, hole=self.hole[at], level=now.level)
@@ -457,7 +463,7 @@ class Filling:
             )
         )
 
-    def _blend(self, whole: Whole) -> None:
+    def _blend(self, whole: WholePicture) -> None:
         """Blend the picture into the rims of filled holes; sources and values without a mean change half-way."""
         rim = self.hole & (self.share < 1)
         if not rim.any():
@@ -474,11 +480,11 @@ class Filling:
             return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
         return windows(self.hole, int(neighbourhood_offsets(self.options.neighbourhood).max()), self.options.levels)
 
-    def begin(self) -> Whole:
+    def begin(self) -> WholePicture:
         """Return the picture before any hole is filled."""
         shape = self.hole.shape
         several = self.sample is not None and len(self.sample.pixels) > 1
-        whole = Whole(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
+        whole = WholePicture(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
         if self.sample is None:
             whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
         return whole

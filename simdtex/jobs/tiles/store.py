@@ -182,7 +182,7 @@ class Files(zarr.storage.LocalStore):
             await self.set(key, value)
 
 
-class Checked:
+class CheckedArray:
     """An array of a store, which raises Damaged with the name of a chunk, or of the array, that cannot be read."""
 
     def __init__(self, array: Any, name: str) -> None:
@@ -205,7 +205,7 @@ class Checked:
 class Sources:
     """The source map of a state, (rows, cols, 2 or 3); slicing it reads a part."""
 
-    def __init__(self, array: Checked, sample: Sample) -> None:
+    def __init__(self, array: CheckedArray, sample: Sample) -> None:
         self._array, self._sample = array, sample
         self.shape = (*array.shape, 2 + (len(sample.boxes) > 1))
 
@@ -218,7 +218,7 @@ class Store:
 
     def __init__(self, where: str) -> None:
         self.where = where
-        self._arrays: dict[str, Checked] = {}
+        self._arrays: dict[str, CheckedArray] = {}
         self._files = Files(where)
         try:
             self.root: Any = zarr.open_group(self._files, mode="r+")
@@ -497,21 +497,21 @@ class Store:
         shutil.rmtree(self._file(name), ignore_errors=True)
         self._arrays = {path: one for path, one in self._arrays.items() if not path.startswith(f"work/{name}")}
 
-    def _at(self, name: str) -> Checked:
+    def _at(self, name: str) -> CheckedArray:
         """Return an array, opened once."""
         if name not in self._arrays:
             if len(self._arrays) >= 64:  # of turns that are complete
                 self._arrays.clear()
             try:
                 with zarr.config.set({"array.write_empty_chunks": True}):  # a missing chunk is damage
-                    self._arrays[name] = Checked(self.root[name], name)
+                    self._arrays[name] = CheckedArray(self.root[name], name)
             except Exception:  # of JSON, of its members, of the files
                 raise Damaged(f"{name}/zarr.json") from None
         return self._arrays[name]
 
     def _sites(
         self, name: str, level: LevelLayout, dtype: Any, before: tuple[int, ...] = (), after: tuple[int, ...] = ()
-    ) -> Checked:
+    ) -> CheckedArray:
         """Return an array with rows and columns of sites, and further axes ``before`` and ``after`` these."""
         shape, chunks = ((*before, *sides, *after) for sides in ((level.rows, level.cols), (level.chunk, level.chunk)))
         axes = (*("channel",) * len(before), "y", "x", *("channel",) * len(after))
@@ -519,7 +519,7 @@ class Store:
 
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: Any, axes: Any = None
-    ) -> Checked:
+    ) -> CheckedArray:
         """Return an array; unless this process has it open, make it or rewrite its description."""
         if name in self._arrays:
             return self._arrays[name]
