@@ -18,7 +18,7 @@ from simdtex import TileStore
 from simdtex.figures import sheet
 from simdtex.io import image
 from simdtex.jobs.synthesis import report as synthesis
-from simdtex.jobs.tiles.store import Checked, Sources
+from simdtex.jobs.tiles.store import CheckedArray, Sources
 from simdtex.model.source_map import load_source_map
 
 zarr = pytest.importorskip("zarr")
@@ -71,7 +71,7 @@ def small_sheets(monkeypatch):
     read = []
     for module, name, value in ((sheet, "MOST_SIDE", 20), (sheet, "PART", 16), (synthesis, "CORNER", 12)):
         monkeypatch.setattr(module, name, value)
-    for kind in (Checked, Sources):
+    for kind in (CheckedArray, Sources):
         get = kind.__getitem__
 
         def recorded(self, where, get=get):
