@@ -103,7 +103,7 @@ INLINED void consider(const float distance, const int p, const float factor, con
     if (!(cost - MOST(g) <= *best))
         return;
     if (NOVEL)
-        cost += g.novelty * repeated(p, next, same, g.neighbours);
+        cost += PRODUCT(g.novelty, repeated(p, next, same, g.neighbours));
     if (g.spread > 0.0f)
         cost = fma(g.spread, noise_of(g, turn, place, p, levels + at[p], noise), cost);
     keep_better(cost, p, best, best_at);
