@@ -16,6 +16,12 @@ CONVERT(float, uint)
 CONVERT(ulong, uint)
 CONVERT(uint, ulong)
 float INLINE fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
+// Of vectors, which stand only where V > 1: declared, never called.
+#define DECLARED(T, I)                                                                                                 \
+    T __attribute__((overloadable)) fma(T a, T b, T c);                                                                \
+    T __attribute__((overloadable)) select(T a, T b, I c);
+DECLARED(float8, int8)
+DECLARED(float16, int16)
 float INLINE fmin(float a, float b) { return __builtin_fminf(a, b); }
 float INLINE fmax(float a, float b) { return __builtin_fmaxf(a, b); }
 float INLINE fabs(float x) { return __builtin_fabsf(x); }

@@ -77,7 +77,7 @@ class Build(NamedTuple):
         """Return the assembly, or LLVM's code, for a target, with another constant V."""
         defines = [f"-D{one}" for one in self.defines.replace(" V=1", f" V={vector}").split()]
         if vector > 1:  # a CPU, on which a work-item relaxes a site by itself
-            defines = [one for one in defines if not one.startswith("-DITEMS")]
+            defines = [re.sub("(-DITEMS)=.*", r"\1=1", one) for one in defines]
         words = [CLANG, *TARGETS[target], *defines, *LANGUAGE]
         source = kernel_source(f"{self.file}.cl")
         return subprocess.run(words, input=source, capture_output=True, text=True, check=True).stdout

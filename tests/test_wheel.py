@@ -93,7 +93,7 @@ def test_the_source_distribution_has_tests_and_documentation(sdist):
         names = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {
         *("pyproject.toml", "README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "Makefile", "CONTRIBUTING.md"),
-        *("simdtex/py.typed", "kernels/mrf/relax.cl", "tests/test_wheel.py", "docs/index.rst", "docs/contributing.rst"),
+        *("simdtex/py.typed", "kernels/mrf/relax.h", "tests/test_wheel.py", "docs/index.rst", "docs/contributing.rst"),
     }
     assert wanted <= names
     assert not [name for name in names if "__pycache__" in name or name.startswith((".venv", "docs/_build", "dist"))]

@@ -11,16 +11,6 @@
 // Only the first may be less than that of all candidates; none is below 0.
 #include "mrf/square.h"
 
-#ifndef WAVES
-#define WAVES 0
-#endif
-#ifndef SCATTERED
-#define SCATTERED 0
-#endif
-#ifndef KINDS
-#define KINDS 0
-#endif
-
 // at      (listed,)        place of each candidate in `levels`
 // levels  (C, plane)       grey levels of the sample, columns apart by the level's step side by side
 // penalty (listed,)        of each candidate
@@ -28,7 +18,7 @@
 // kinds_of (KINDS, listed) row of `kind_cost` that each candidate's kinds have
 // kind_cost (.., area)     what a candidate of a kind costs at each site, 0 or more
 // phases  (WAVES, area)    of each site
-// begin   (area + 1,)      where the data of the site at each pixel index begin
+// begin_  (area + 1,)      where the data of the site at each pixel index begin
 // reach_  (n,)             pixel offset of each datum in the sample
 // told    (n, SCATTERED)   its grey levels
 // pixels_ (C, plane_)      the sample
@@ -40,24 +30,26 @@
         __global const int *restrict reach_, __global const ushort *restrict told, const float hard_,                  \
         __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
         __global const ushort *restrict kinds_of, __global const float *restrict kind_cost
-#define EVALUATED(p, factor, site) WITH_COSTS(DISTANCE(p), p, factor, site)
-#define DISTANCE(p) distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, UNBOUNDED)
-#define DISTANCE_BELOW(p, factor, most, best)                                                                          \
-    distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, factor, most, best)
-#define WITH_COSTS(distance, p, factor, site)                                                                          \
-    (PRODUCT(distance, factor) + penalty[p] + PHASE(p, site) + MISFIT(p, site) + OF_KIND(p, site))
-#define PHASE(p, site) apart_in_phase(waves + (p), listed, phases + (site), area_, phase_weight, tolerance)
-#if KINDS
-#define OF_KIND(p, site) of_kind(kinds_of + (p), listed, kind_cost + (site), area_)
-#else
-#define OF_KIND(p, site) 0.0f
-#endif
-#if SCATTERED
-#define MISFIT(p, site)                                                                                                \
-    misfit(begin_[site], begin_[(site) + 1], reach_, told, hard_, pixels_ + at_[p], plane_)
-#else
-#define MISFIT(p, site) 0.0f
-#endif
+#define COSTED                                                                                                         \
+    at, levels, penalty, waves, listed, phases, area_, phase_weight, tolerance, begin_, reach_, told, hard_, pixels_,  \
+        plane_, at_, kinds_of, kind_cost
+
+// The first parameters of kernels that evaluate candidates.
+//
+// sites    (S,)         number of each site; sites first .. S - 1 of the list are relaxed
+// values (C, area), source (area,), temperature (area,)   the field
+// offsets  (N, AXES)    of the neighbours, canonical order
+// reach    (N,)         pixel offset of each in the sample
+// index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
+// positions (count,)    pixel index of each candidate
+// disc     (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
+// looks    (N, 2)       lane of each neighbour in the square and its offset in `levels`, close ones far apart
+#define FIELD                                                                                                          \
+    __global const int *restrict sites, const int first, const int S, __global const ushort *values,                   \
+        __global const int *source, __global const ushort *temperature, const Level g,                                 \
+        __global const int *restrict offsets, __global const int *restrict reach, __global const int *restrict index_of, \
+        __global const int *restrict positions, __global const float *restrict disc,                                   \
+        __global const int2 *restrict looks, COSTS
 
 static inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
                                    const float weight, const float tolerance)
@@ -89,4 +81,17 @@ static inline float misfit(const int begin, const int end, __global const int *r
             d = fma(e, e, d);
         }
     return d;
+}
+
+// All costs of candidate p at a distance, but novelty.
+INLINED float with_costs(const float distance, const int p, const float factor, const int site, COSTS)
+{
+    float cost = PRODUCT(distance, factor) + penalty[p];
+    if (WAVES)
+        cost += apart_in_phase(waves + p, listed, phases + site, area_, phase_weight, tolerance);
+    if (SCATTERED)
+        cost += misfit(begin_[site], begin_[site + 1], reach_, told, hard_, pixels_ + at_[p], plane_);
+    if (KINDS)
+        cost += of_kind(kinds_of + p, listed, kind_cost + site, area_);
+    return cost;
 }

@@ -3,7 +3,7 @@
 //
 //   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,
 //
-// and its mode (ICM of a density). A draw needs no table: relax.cl.
+// and its mode (ICM of a density). A draw needs no table: relax.h.
 //
 // Weights are integers, zero below 2^-40 of the largest: common/parzen.h. No distance is kept: each is evaluated again,
 // for the least, for the sums of weights and for the source.
@@ -12,9 +12,6 @@
 #include "common/parzen.h"
 #include "mrf/propose.h"
 
-#ifndef N
-#define N 64 // most neighbours
-#endif
 #ifndef CHANNELS
 #define CHANNELS MADE // of what candidates count for
 #endif
@@ -29,23 +26,14 @@ static inline ulong weight_at(ulong w, __global const float *y, const int plane,
     return w;
 }
 
-// The arguments of both kernels, as in relax.cl, and
+// After FIELD the arguments of both kernels are
 //
 // own  (CHANNELS, plane)  what a candidate counts for, at its place in `levels`: its grey levels
 // greys                   number of grey levels
-#define FIELD                                                                                                          \
-    __global const int *restrict sites, const int first, const int S, __global const ushort *values,                   \
-        __global const int *source, __global const ushort *temperature, const Level g,                                 \
-        __global const int *restrict offsets, __global const int *restrict reach,                                     \
-        __global const int *restrict index_of, __global const int *restrict positions,                                 \
-        __global const float *restrict disc, __global const int2 *restrict looks, COSTS,                               \
-        __global const float *restrict own, const int greys
-#define GATHERED                                                                                                       \
-    const int s = first + (int)get_global_id(0);                                                                       \
-    if (s >= S)                                                                                                        \
-        return;                                                                                                        \
-    const int site = sites[s], i = site / g.lattice.cols, j = site % g.lattice.cols;                                   \
-    AROUND(g, site, i, j)
+#define COUNTED __global const float *restrict own, const int greys
+#define EVALUATED(p, factor)                                                                                           \
+    with_costs(distance_in_lanes(levels + at[p], u, xu, g.plane, g.row_stride, g.layer_stride, UNBOUNDED), p, factor,  \
+               site, COSTED)
 
 // The density over grey levels and its mode, of several levels the lowest. From the pixel of the nearest candidate on,
 // each channel in turn, and once more, takes the mode given the others; the source gives most.
@@ -54,10 +42,17 @@ static inline ulong weight_at(ulong w, __global const float *y, const int plane,
 // mass    (S, greys)      scratch: sum of the weights per grey level
 // table   (S, greys)      out: f(x) of the last channel, up to a factor: devices may round a division as they like
 // choice  (S,), mode (CHANNELS, S)   out: pixel index in the sample, and grey levels
-__kernel void lcpdf_density(FIELD, __global const float *restrict window, __global ulong *restrict mass,
+__kernel void lcpdf_density(FIELD, COUNTED, __global const float *restrict window, __global ulong *restrict mass,
                             __global float *restrict table, __global int *restrict choice, __global ushort *restrict mode)
 {
-    GATHERED;
+    const int s = first + (int)get_global_id(0);
+    if (s >= S)
+        return;
+    const int site = sites[s], i = site / g.lattice.cols, j = site % g.lattice.cols;
+    int row[ROWS], col[SIDE], warmth[2];
+    ALIGNED float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16];
+    square_around(g.lattice, i, j, row, col);
+    gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu, warmth);
     __global ulong *m = mass + (size_t)s * greys;
     __global float *f = table + (size_t)s * greys;
 
@@ -65,23 +60,23 @@ __kernel void lcpdf_density(FIELD, __global const float *restrict window, __glob
     int next[N], coherent = 0, nearest = 0;
     ulong seen = 0;
     for (int k = 0; k < g.neighbours && g.discount < 1.0f; ++k) {
-        const int r = NEIGHBOUR(g.lattice, k);
+        const int r = neighbour_in_square(g.lattice, site, i, j, row, col, offsets + AXES * k);
         const int p = r < 0 || temperature[r] >= UNTOUCHED ? -1 : continuing(index_of, source[r], reach[k], g.pixels);
         coherent = proposed(p, next, coherent, &seen);
     }
     float smallest = INFINITY;
     for (int p = 0; p < g.candidates; ++p) {
-        const float d = EVALUATED(p, 1.0f, site);
+        const float d = EVALUATED(p, 1.0f);
         nearest = d < smallest ? p : nearest;
         smallest = fmin(d, smallest);
     }
     for (int n = 0; n < coherent; ++n) {
-        const float d = EVALUATED(next[n], g.discount, site);
+        const float d = EVALUATED(next[n], g.discount);
         nearest = d < smallest || (d == smallest && next[n] < nearest) ? next[n] : nearest;
         smallest = fmin(d, smallest);
     }
 #define WEIGHT(p, factor, but)                                                                                         \
-    weight_at(weight(EVALUATED(p, factor, site), smallest, g.scale), own + at[p], g.plane, x, but, window, g.radius)
+    weight_at(weight(EVALUATED(p, factor), smallest, g.scale), own + at[p], g.plane, x, but, window, g.radius)
 #define OWN_LEVEL(p, c) (int)own[(c) * g.plane + at[p]]
 
     int x[C];
@@ -124,13 +119,20 @@ __kernel void lcpdf_density(FIELD, __global const float *restrict window, __glob
 // match is a cost of 0, so a neighbour at temperature 1 matches anything.
 //
 // counts   (S, greys)   out: F(x, neighbours)
-__kernel void lcpdf_histogram(FIELD, __global uint *restrict counts)
+__kernel void lcpdf_histogram(FIELD, COUNTED, __global uint *restrict counts)
 {
-    GATHERED;
+    const int s = first + (int)get_global_id(0);
+    if (s >= S)
+        return;
+    const int site = sites[s], i = site / g.lattice.cols, j = site % g.lattice.cols;
+    int row[ROWS], col[SIDE], warmth[2];
+    ALIGNED float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16];
+    square_around(g.lattice, i, j, row, col);
+    gather(g, site, i, j, row, col, values, source, temperature, offsets, disc, u, xu, warmth);
     __global uint *F = counts + (size_t)s * greys;
     for (int x = 0; x < greys; ++x)
         F[x] = 0;
     for (int p = 0; p < g.candidates; ++p)
-        if (EVALUATED(p, 1.0f, site) == 0.0f)
+        if (EVALUATED(p, 1.0f) == 0.0f)
             ++F[(int)own[at[p]]];
 }

@@ -30,14 +30,14 @@ def test_every_function_of_a_kernel_is_named_and_every_name_is_one():
 ALWAYS = {"start", "active_survey"}
 GROUPS = {"active_count", "active_keep", "coloring_sites", "coloring_count", "coloring_list"}
 RUNS = {
-    "default": ({}, GROUPS | {"use", "relax"}),
-    "exact": ({"search": "exact", "balance": 0}, GROUPS | {"relax"}),
-    "synchronous": ({"schedule": "synchronous"}, GROUPS | {"use", "relax", "commit"}),
+    "default": ({}, GROUPS | {"use", "relax_coherent", "relax_exact"}),
+    "exact": ({"search": "exact", "balance": 0}, GROUPS | {"relax_exact"}),
+    "synchronous": ({"schedule": "synchronous"}, GROUPS | {"use", "relax_coherent", "relax_exact", "commit"}),
     "mode": (
         {"search": "exact", "pixel": "density", "balance": 0},
-        GROUPS | {"relax", "lcpdf_density", "temperature", "commit"},
+        GROUPS | {"relax_exact", "lcpdf_density", "temperature", "commit"},
     ),
-    "luby": ({"schedule": "luby"}, {"use", "relax", "luby_priority", "luby_round"}),
+    "luby": ({"schedule": "luby"}, {"use", "relax_coherent", "relax_exact", "luby_priority", "luby_round"}),
 }
 
 

@@ -20,7 +20,7 @@ from simdtex.model.guide import UNKNOWN
 from simdtex.model.sample import Candidates
 
 AGAIN = 4
-"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/mrf/relax.cl."""
+"""Ratio of the penalty for repeating a neighbour's source to that for continuing it, as in kernels/mrf/relax.h."""
 
 
 class Phased(NamedTuple):
@@ -114,9 +114,11 @@ class Costs(NamedTuple):
     @property
     def defines(self) -> dict[str, int]:
         """-D constants of kernels: kernels/mrf/costs.h."""
-        waves = {"WAVES": len(self.phased.candidates)} if self.phased else {}
-        kinds = {"KINDS": len(self.kinds.candidates)} if self.kinds else {}
-        return waves | kinds | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})
+        return {
+            "WAVES": len(self.phased.candidates) if self.phased else 0,
+            "SCATTERED": self.scattered.values.shape[1] if self.scattered else 0,
+            "KINDS": len(self.kinds.candidates) if self.kinds else 0,
+        }
 
     def arguments(self, machine: Launcher, candidates: Candidates) -> tuple[Any, ...]:
         """Return the arguments ``COSTS`` of kernels after ``at`` and ``levels``."""

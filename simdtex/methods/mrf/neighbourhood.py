@@ -44,8 +44,7 @@ class Confidences(NamedTuple):
     @property
     def defines(self) -> dict[str, int]:
         """-D constants of kernels."""
-        counts = {"G": self.guides, "KNOWN": self.known, "OWN": int(self.own)}
-        return {name: count for name, count in counts.items() if count}
+        return {"G": self.guides, "KNOWN": self.known, "OWN": int(self.own)}
 
 
 USUAL = Confidences()

@@ -4,7 +4,7 @@
 A `Relaxation` defines how a site relaxes: its neighbourhood, the proposed candidates (`AllCandidates` or
 `CandidateList`), their costs (`simdtex.methods.mrf.costs`), the choice among them, and its cooling. `relax` works in
 place, step after step; `relax_out_of_place` does not change the field. A device executes one kernel,
-``kernels/mrf/relax.cl``, or for the mode of a density ``kernels/mrf/lcpdf.cl``.
+of ``kernels/mrf/relax_coherent.cl`` or ``relax_exact.cl``, or for the mode of a density of ``lcpdf.cl``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ EXHAUSTIVE = 64
 """The most candidates of a level that a coherent search evaluates exhaustively."""
 
 SUGGESTING = 12
-"""Number of nearest neighbours that each suggest a candidate in a coherent search, as in kernels/mrf/relax.cl."""
+"""Number of nearest neighbours that each suggest a candidate in a coherent search: kernels/mrf/relax_coherent.cl."""
 
 ALIKE = 64
 """The most candidates that count as alike in known variables, unless they are equal in these."""
@@ -289,9 +289,8 @@ class Relaxation(NamedTuple):
         }
         most = -(-self.offsets.shape[0] // 64) * 64  # so that few programs suffice
         defines = {"C": len(field.values), "V": machine.vector, "RADIUS": square.disc.shape[0] // 2, "N": most}
+        defines |= {"ORDER": square.order * self.grid.layered, "TILES": int(bool(self.grid.tile)), "ITEMS": 1, "HOT": 0}
         defines |= confidences.defines | costs.defines | self.grid.defines
-        defines |= {"ORDER": square.order} if self.grid.layered else {}
-        defines |= {"TILES": 1} if self.grid.tile else {}
         return defines, [
             *(sites, 0, sites.size, *field, constants(self.grid, **level), self.offsets),
             *(candidates.reach, candidates.index_of, candidates.positions, square.disc, square.looks),
@@ -321,9 +320,9 @@ def relax_out_of_place(
     made = len(field.values) - relaxation.confidences.guides
     relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     cooled = machine.empty((sites.size,), np.uint16)
-    defines, arguments = _kernel(machine, sites, sites.size, field, evaluations, relaxation, turn)
+    kernel, defines, arguments = _kernel(machine, sites, sites.size, field, evaluations, relaxation, turn)
     arguments += [relaxed.values, relaxed.choice, cooled]
-    machine.launch("relax", (sites.size,), *arguments, defines=defines | {"APART": 1})
+    machine.launch(kernel, (sites.size,), *arguments, defines=defines | {"APART": 1})
     return relaxed, cooled
 
 
@@ -345,8 +344,8 @@ def relax(
     """
     if machine is not None and not relaxation.choice.mode:
         count = int((steps[:, 1] - steps[:, 0]).sum())
-        defines, arguments = _kernel(machine, sites, count, field, evaluations, relaxation, turn)
-        machine.launch_groups("relax", steps, *arguments, *field, defines=defines)
+        kernel, defines, arguments = _kernel(machine, sites, count, field, evaluations, relaxation, turn)
+        machine.launch_groups(kernel, steps, *arguments, *field, defines=defines)
         return field
     for begin, end in steps.tolist():
         most = max(1, PAIRS // relaxation.proposal.slots) if machine is None else max(1, end - begin)
@@ -365,32 +364,31 @@ def relax(
 
 def _kernel(
     machine: Launcher, sites: Array, count: int, field: Field, evaluations: Array, relaxation: Relaxation, turn: int
-) -> tuple[dict[str, int], list[Any]]:
-    """Return the -D constants of the kernel that relaxes ``count`` of some sites, and its arguments but the results."""
+) -> tuple[str, dict[str, int], list[Any]]:
+    """Return the kernel that relaxes ``count`` of some sites, its -D constants, and its arguments but the results."""
     defines, arguments = relaxation.arguments(machine, sites, field)
-    proposal, work = relaxation.proposal, evaluations
+    proposal, noise = relaxation.proposal, machine.constant(relaxation.choice.window.noise)
+    defines |= {"APART": 0, "NOVEL": int(relaxation.costs.novelty > 0)}
     if isinstance(proposal, AllCandidates):
-        defines |= {"EXACT": 1, "STEP": machine.step}
+        kernel, defines["STEP"] = "relax_exact", machine.step
         terms = (relaxation.offsets.shape[0] + bool(relaxation.confidences.guides)) * len(field.values)
-        work, phases = machine.fma_counters(sites.size, 2 * count * proposal.slots * terms), []
+        arguments += [noise, np.uint32(turn), machine.fma_counters(sites.size, 2 * count * proposal.slots * terms)]
     else:
+        kernel, nothing = "relax_coherent", machine.constant(np.zeros(1, np.int32))
         defines["SLOTS"] = -(-most_listed(proposal.neighbours, proposal.chance) // 64) * 64
-        phases = list(proposal.phases or ())
-        defines |= {"PHASES": 1} if phases else {}
-        defines |= {"NOVEL": 1} if relaxation.costs.novelty else {}
-        defines |= {"HOT": proposal.square.hot} if proposal.square.hot and machine.vector > 1 else {}
+        defines |= {"PHASES": int(proposal.phases is not None), "HOT": proposal.square.hot * (machine.vector > 1)}
+        arguments += [noise, np.uint32(turn), evaluations, *(proposal.phases or (nothing,) * 3)]
     if machine.items > 1 and _shared(defines, machine.items) <= machine.local_memory:
         defines["ITEMS"] = machine.items
-    arguments += [machine.constant(relaxation.choice.window.noise), np.uint32(turn), work]
-    return defines, arguments + phases
+    return kernel, defines, arguments
 
 
 def _shared(defines: dict[str, int], items: int) -> int:
-    """Return the most bytes of local memory that a group of work-items takes in kernels/mrf/relax.cl."""
-    channels, most, side = int(defines["C"]), int(defines["N"]), 2 * int(defines["RADIUS"]) + 1
-    each = channels + (channels if "OWN" in defines else 1)  # confidences and values
+    """Return the most bytes of local memory that a group of work-items takes in kernels/mrf/relax_*.cl."""
+    channels, most, side = defines["C"], defines["N"], 2 * defines["RADIUS"] + 1
+    each = channels + (channels if defines["OWN"] else 1)  # confidences and values
     rows, columns = side ** (2 if defines.get("AXES") == 3 else 1), -(-side // LANES) * LANES
-    lists = 2 * int(defines.get("SLOTS", 0)) + 2 * most * ("NOVEL" in defines)
-    if "EXACT" in defines:
-        lists = (most + 8) * (5 + each) + max(most + 1, items * int(defines["STEP"]))
+    lists = 2 * defines.get("SLOTS", 0) + 2 * most * defines["NOVEL"]
+    if "STEP" in defines:
+        lists = (most + 8) * (5 + each) + max(most + 1, items * defines["STEP"])
     return 4 * (rows * columns * each + 2 * items + lists)
