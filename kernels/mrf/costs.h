@@ -23,13 +23,15 @@
 // told    (n, SCATTERED)   its grey levels
 // pixels_ (C, plane_)      the sample
 // at_     (listed,)        pixel index of each candidate
-#define COSTS                                                                                                          \
-    __global const int *restrict at, __global const float *restrict levels, __global const float *restrict penalty,    \
-        __global const float *restrict waves, const int listed, __global const ushort *restrict phases,                \
-        const int area_, const float phase_weight, const float tolerance, __global const int *restrict begin_,         \
-        __global const int *restrict reach_, __global const ushort *restrict told, const float hard_,                  \
-        __global const float *restrict pixels_, const int plane_, __global const int *restrict at_,                    \
-        __global const ushort *restrict kinds_of, __global const float *restrict kind_cost
+//
+// `r` is restrict in a kernel. In a function it is empty, since Oclgrind fails on what clang makes of it there.
+#define COSTS_OF(r)                                                                                                    \
+    __global const int *r at, __global const float *r levels, __global const float *r penalty,                         \
+        __global const float *r waves, const int listed, __global const ushort *r phases, const int area_,             \
+        const float phase_weight, const float tolerance, __global const int *r begin_, __global const int *r reach_,   \
+        __global const ushort *r told, const float hard_, __global const float *r pixels_, const int plane_,           \
+        __global const int *r at_, __global const ushort *r kinds_of, __global const float *r kind_cost
+#define COSTS COSTS_OF()
 #define COSTED                                                                                                         \
     at, levels, penalty, waves, listed, phases, area_, phase_weight, tolerance, begin_, reach_, told, hard_, pixels_,  \
         plane_, at_, kinds_of, kind_cost
@@ -49,7 +51,7 @@
         __global const int *source, __global const ushort *temperature, const Level g,                                 \
         __global const int *restrict offsets, __global const int *restrict reach, __global const int *restrict index_of, \
         __global const int *restrict positions, __global const float *restrict disc,                                   \
-        __global const int2 *restrict looks, COSTS
+        __global const int2 *restrict looks, COSTS_OF(restrict)
 
 static inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
                                    const float weight, const float tolerance)

@@ -25,7 +25,7 @@
 #define WIDTH(g) (((g).cols + (g).runs * LANES - 1) / ((g).runs * LANES))
 
 // noise  cumulative kernel of equation (7) over grey levels: common/parzen.h
-#define DRAW const Level g, const int site, const ulong place, const uint turn, __global const uint *restrict noise
+#define DRAW const Level g, const int site, const ulong place, const uint turn, __global const uint *noise
 #define DRAWN g, site, place, turn, noise
 #define RESULTS __global ushort *new_values, __global int *new_source, __global ushort *new_temperature
 
