@@ -177,13 +177,6 @@ def test_documented_commands_parse_and_doctests_hold():
 
 
 @pytest.mark.slow
-def test_the_example_of_the_page_for_geoscientists_runs(any_device):
-    """The build of the documentation runs the others, which the gallery shows."""
-    made = runpy.run_path(str(ROOT / "examples" / "volume_of_a_reservoir.py"))
-    assert 0 < made["p10"] < made["p50"] < made["p90"]
-
-
-@pytest.mark.slow
 def test_what_a_script_needs_is_there(monkeypatch):
     """Its figures are made by hand, so that nothing else would tell."""
     others = (ROOT / "docs" / f"{name}.py" for name in ("blender_window", "pictures", "screenshots"))
@@ -215,13 +208,6 @@ def test_the_readme_is_short_and_what_it_names_exists():
     named = re.findall(r"\bmake (demo|test|docs|[a-z]+$)", README, re.MULTILINE)
     assert {"demo", "test", "docs"} <= set(named) <= set(targets)
     assert len(README.splitlines()) < 150
-
-
-def test_the_first_page_shows_every_command():
-    """But those that take minutes, need a run that was stopped, or never end."""
-    shown = "\n".join(commands(FIRST))
-    every = set(cli.main.commands) - {"bench", "demo", "live", "resume"}
-    assert [command for command in every if f"simdtex {command}" not in shown] == []
 
 
 def test_files_named_on_pages_exist():
@@ -261,19 +247,6 @@ def test_every_option_of_a_method_has_its_page_with_the_papers_value():
         rows = "\n".join(EXTENSION["paper_values"](method))
         for name, value in preset_values(module.Options, "paper").items():
             assert re.search(rf"^   \* - ``{name}``\n.*\n     - ``{re.escape(quoted(value))}``$", rows, re.MULTILINE)
-
-
-WISHES = (ROOT / "docs" / "wishes.rst").read_text(encoding="utf-8")
-ASKED = ("synth", "fill", "extend", "simulate")
-
-
-def test_every_option_answers_a_wish_and_no_wish_names_another():
-    params = [p for command in ASKED for p in cli.load(command).params if isinstance(p, click.Option)]
-    wished = set(re.findall(r"``(--[\w-]+)", WISHES))
-    assert {max(p.opts, key=len) for p in params} <= wished
-    assert wished <= {name for p in params for name in (*p.opts, *p.secondary_opts)}
-    lines = re.findall(r"^\* .*(?:\n  .*)*", WISHES.partition(".. _wishes-research:")[2], re.MULTILINE)
-    assert lines and all("``--" in line and ":doc:" in line for line in lines), "options for research lead to a page"
 
 
 def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():

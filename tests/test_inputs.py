@@ -38,11 +38,6 @@ def check(sample=GREY, **rest):
     return check_inputs(sample, SHAPE, **rest)
 
 
-def test_with_more_it_is_not_plain():
-    more = ({"mask": MASK}, {"known": SOME}, {"guide": (GREY, GREY[:6, :7])}, {"sample": [GREY, GREY]})
-    assert check().plain and not any(check(**one).plain for one in (*more, {"sample": at(FLOAT, (2, 3), np.nan)}))
-
-
 def test_channels_come_last():
     for axis in (0, 1, 2, -2):
         known = np.moveaxis(np.repeat(SOME[..., None], 3, -1), -1, axis)
@@ -57,13 +52,6 @@ def test_a_list_of_samples_is_told_from_a_sample_written_as_lists():
     for sample in (GREY, np.stack([GREY, GREY]), GREY.tolist(), list(GREY), [], None, [GREY, GREY.tolist()]):
         assert not is_several(sample, None)
     assert not is_several(list(np.moveaxis(COLOUR, -1, 0)), 0)
-
-
-def test_nested_lists_are_one_sample():
-    (one,) = check_samples(GREY.tolist(), None).pixels
-    assert one.shape == (9, 10, 1) and np.array_equal(one[..., 0], GREY)
-    (one,) = check_samples(list(np.moveaxis(COLOUR, -1, 0)), 0).pixels
-    assert np.array_equal(one, COLOUR)
 
 
 def test_samples_of_several_sizes():
@@ -115,21 +103,6 @@ def test_a_table_of_known_values_or_its_path(tmp_path):
     wells = HardData(np.array([[2.0, 1.0]]), np.array([[1.0, np.nan, 3.0]]), ("a", "b", "c"))
     both = check(COLOUR, channel_axis=-1, known=wells)
     assert both.given.known[1, 2].tolist() == [True, False, True] and both.given.known.sum() == 2
-
-
-def test_numbers_of_64_bits_are_kept_exactly():
-    sample = np.arange(90, dtype=np.int64).reshape(9, 10) + 2**60
-    known = np.ma.masked_all(SHAPE, np.int64)
-    known[1, 2] = 2**60 + 3
-    assert check(sample, known=known).given.values[1, 2, 0] == 2**60 + 3
-
-
-def test_some_variables_of_a_site_may_be_known():
-    known = np.full((*SHAPE, 3), np.nan)
-    known[2, 3, 1] = 8
-    found = check(COLOUR, channel_axis=-1, known=known).given
-    assert found.known.sum() == 1 and found.known[2, 3].tolist() == [False, True, False]
-    assert found.partly
 
 
 def test_a_source_map_is_of_whole_numbers():

@@ -41,9 +41,6 @@ or more, an exponential and four float32 roundings."""
 UNIT32 = 2.0**-24
 """Relative error of one float32 rounding: n products and sums in a row are off by about n of these at most."""
 
-PYRTOOLS = 1e-4
-"""Of a steerable pyramid's subband against that of pyrtools, relative to its largest value. Its taps and
-sums are float64; ours are float32, and rounded to integers at every level, of pictures of +-2**20: 1e-5 seen."""
 
 RECONSTRUCTION = {1: 0.0035, 2: 0.015, 4: 0.012, 6: 0.032}
 """What a steerable pyramid loses of white noise on an even torus, rms relative to its standard deviation, by number of
