@@ -153,11 +153,7 @@ def test_what_a_notebook_shows():
     marked = [line for line in lines if line.startswith("*")]
     assert len(marked) == 1
     assert marked[0].split()[1] == str(why.candidates.rank[why.taken])
-    html = why._repr_html_()
-    assert html.count("<img") == 1 + len(lines) - 2
-    widths = [float(one) for one in re.findall(r"width:([\d.e+-]+)%", html)]
-    np.testing.assert_allclose(widths[0], 100 * why.candidates.probability[0], rtol=0.01)
-    assert html.count("<figcaption>taken: ") == 1
+    assert why._repr_html_().count("<img") == 1 + len(lines) - 2
 
 
 EXACT = {

@@ -1,7 +1,6 @@
 """What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
 
 from copy import deepcopy
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +13,8 @@ from simdtex.machine import memory
 from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf import level as level_of_a_run
-from simdtex.methods.mrf.level import ActiveSites, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.level import check_fit, number_of_levels, parts
 from simdtex.methods.mrf.plan import check_guide
-from simdtex.methods.mrf.record import MrfRecord, expected_work
 from simdtex.methods.mrf.relax import AllCandidates, CandidateList
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
@@ -136,17 +134,6 @@ def test_the_coarsest_level_has_fewer_decimations_if_it_has_many_candidates(monk
     assert [prepared().places(number).step for number in range(3)] == [1, 1, 2]
 
 
-def test_which_sites_are_active():
-    level = prepared().level(1)
-    temperature = np.zeros((10, 12), np.uint16)
-    temperature[1, 2], temperature[9, 11] = 1, 1024
-    active, free = ActiveSites(level, temperature, False), ActiveSites(level, temperature, True)
-    assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
-    assert active.numbers().tolist() == [14, 119]
-    assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
-    assert free.numbers().tolist() == list(range(120))
-
-
 def test_the_memory_that_is_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(memory, "require", lambda machine, device, host, remedy: asked.append((device, host)))
@@ -195,14 +182,6 @@ def test_a_site_always_cools():
     assert [prepared(xi=xi).level(0).relaxation.xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
 
 
-def test_a_window_of_a_level():
-    run = prepared()
-    whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
-    assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
-    assert (window.evaluations.shape, window.evaluations.dtype, window.evaluations.any()) == ((4, 5), np.int32, False)
-    assert whole.evaluations.shape == run.grid(1).shape
-
-
 def test_a_level_with_few_candidates_evaluates_them_all(monkeypatch):
     for most, kind in ((599, CandidateList), (600, AllCandidates)):
         monkeypatch.setattr("simdtex.methods.mrf.level.EXHAUSTIVE", most)
@@ -214,22 +193,6 @@ def test_a_saved_state_shares_no_memory_with_the_run():
     _, state, _ = next(sweeps(run))
     saved = run.save(state)
     assert not any(np.shares_memory(saved[name], plane) for name, plane in state.field._asdict().items())
-
-
-def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
-    run, told, work = prepared(schedule="synchronous", search="exact"), [], []
-    run.level(2)
-    monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
-    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 3) * 7, 5)):  # 7 sites at once
-        monkeypatch.setattr(REFERENCE, "scratch", scratch)
-        run.step(run.begin(), lambda *seen: told.append(seen[-1]))
-        sites = [30] if pieces == 1 else [7, 7, 7, 7, 2]
-        assert [part.sites for part in told] == sites
-        assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
-        assert [part.last for part in told] == [False] * (pieces - 1) + [True]
-        assert sum(work) == 30 * 2 * 600 * 8 * 2  # channels, one of them that of the structure
-        told.clear()
-        work.clear()
 
 
 def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
@@ -252,48 +215,6 @@ def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
     assert [info.level for info, _ in kept if not info.sweep] == [1, 0]  # the steps that enter a level
     assert [report["skipped"] for report in whole[2]] == [0, 0, 0]
     assert all(driven(found) == whole for _, found in kept[::9])
-
-
-def test_how_far_a_run_is():
-    run = prepared(search="exact", free_sweeps=2)
-    record = MrfRecord(run, None)
-    record._expected = {2: (100.0, 20.0), 1: (300.0, 40.0), 0: (500.0, 40.0)}
-
-    def after(level, left, share, free=0):
-        record._first_left = record._first_left or left
-        state = SimpleNamespace(active=left > 0, free=free)
-        record._advance(level, state, left, share)
-        return round(record._fraction * 1000, 6)
-
-    assert after(2, 1.0, 0.5) == 5  # of the first sweep no more is known than that it is one of many
-    assert after(2, 1.0, 1.0) == 10
-    assert after(2, 0.25, 0.5) == 55  # half of all, and half a tenth
-    assert after(2, 0.0025, 1.0) == 100  # no further than to the end
-    assert [after(2, 0.0, 0.5), after(2, 0.0, 1.0, 1)] == [105, 120]
-    assert after(1, 0.0, 1.0, 1) == 460  # a level that is known from the beginning
-    record._first_left = 0.0
-    assert [after(0, 0.5, 0.0), after(0, 0.32, 0.0), after(0, 0.405, 0.0)] == [460, 560, 560]  # it never falls
-    assert after(0, 0.0, 1.0, 2) == 1000
-
-
-@pytest.mark.parametrize(
-    ("given", "each", "first"),
-    [
-        ({"search": "exact"}, 600, 5.8),
-        ({"search": "coherent", "chance": 0, "xi": -2.0}, 10, 3.4),
-        ({"search": "coherent", "chance": 999, "free_sweeps": 1}, 600, 5.8),
-    ],
-)
-def test_the_work_that_is_expected(given, each, first):
-    run = prepared(**given)
-    free = given.get("free_sweeps", 2)
-    each *= 1 if given["search"] == "exact" else 16
-    sweeps = {n: sites * by + 5.4 * 200_000 for n, sites, by in [(0, 460, each), (1, 120, each), (2, 30, 600)]}
-    expected = {number: (sweep * (first if number == 2 else 4.5), sweep * free) for number, sweep in sweeps.items()}
-    found = expected_work(run)
-    assert set(found) == set(expected)
-    for level, work in expected.items():
-        assert found[level] == pytest.approx(work)
 
 
 @pytest.mark.parametrize("given", [{"search": "exact"}, {"array": "4x4"}])
