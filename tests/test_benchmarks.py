@@ -1,10 +1,8 @@
-"""Benchmarks: `simdtex bench`, figures of benchmarks/ on cases whose fault is known, and the picture of the README."""
+"""Benchmarks: `simdtex bench`, and figures of benchmarks/ on cases whose fault is known."""
 
 import csv
 import json
-import re
 from importlib.util import find_spec
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +12,7 @@ from commands import refused, run
 from scipy.ndimage import gaussian_filter
 
 from simdtex.figures.tables import benchmark_table
-from simdtex.io.image import example, write
+from simdtex.io.image import write
 from simdtex.jobs.studies import benchmark
 from simdtex.jobs.studies.benchmark import Case, Sizes
 from simdtex.machine.devices import DeviceError
@@ -89,18 +87,6 @@ def test_the_distance_to_a_border_is_that_to_the_nearest_pixel_of_another_label(
     assert np.isinf(classify.border_distance(np.ones((4, 5), int))).all()
 
 
-def test_accuracy_of_a_perfect_labelling_and_of_swapped_and_shifted_labels(classify):
-    for curved in (False, True):
-        truth = classify.regions(128, np.random.default_rng(1), curved, 5)
-        labels, counts = np.unique(truth, return_counts=True)
-        assert labels.tolist() == [1, 2, 3, 4, 5] and counts.min() >= 0.35 * truth.size / 5
-    assert classify.accuracy(truth, truth) == (1, 1)
-    swapped = np.choose(truth, [0, 2, 1, 3, 4, 5])
-    assert classify.accuracy(swapped, truth)[1] == 1 - ((truth == 1) | (truth == 2)).mean()
-    away, everywhere = classify.accuracy(np.roll(truth, 3, 1), truth)  # 3 pixels are within 16 of a border
-    assert everywhere < 1 and away > everywhere
-
-
 @pytest.mark.slow
 def test_the_tables(classify, tmp_path, monkeypatch):
     for name, seed in (("red", 3), ("blue", 4)):
@@ -160,33 +146,3 @@ def test_one_command_gives_the_tables_and_the_sheets(fill, tmp_path, monkeypatch
     with open(tmp_path / "tile.csv", encoding="utf-8", newline="") as file:
         assert [line["filling"] for line in csv.DictReader(file)] == 2 * ["as it is", "band 4", "continued"]
     assert (tmp_path / "fill-red.png").is_file() and (tmp_path / "tile-red.png").is_file()
-
-
-# -- benchmarks/front.py: the picture of the README shows what it says.
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture
-def front(script):
-    return script("front")
-
-
-def test_the_mast_is_in_the_hole_and_samples_are_pieces_of_one_size(front):
-    photo, hole = front.mast(324)
-    assert photo.shape == (324, 324, 3) and 0.05 < hole.mean() < 0.3
-    assert photo[hole].max() > 50 + photo[:250, 200:235].max(), "it is lighter than the sky beside it"
-    sides = {name: sample.shape for name, sample in front.samples(front.SIDE).items()}
-    assert sides == {"wood": (129, 129, 3), "tissue": (162, 162, 3), "stars": (162, 162, 3)}
-
-
-def test_the_picture_of_the_readme_is_light():
-    (name,) = re.findall(r"\]\((docs/_static/front\.\w+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert (ROOT / name).stat().st_size < 700_000
-
-
-def test_the_wall_of_bricks_is_seen_from_the_front():
-    wall = example("brick")
-    assert wall.shape == (264, 216) and wall.dtype == np.uint8
-    joints = np.argsort(wall.mean(0))[::-1][:24]  # the lightest columns are whole joints
-    assert (wall[:, joints].mean(0) > wall.mean() + 10).all()
-    assert example("gravel").shape == (512, 512)

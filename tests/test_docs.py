@@ -210,14 +210,6 @@ def test_the_readme_is_short_and_what_it_names_exists():
     assert len(README.splitlines()) < 150
 
 
-def test_files_named_on_pages_exist():
-    for page in PAGES:
-        text = page.read_text(encoding="utf-8")
-        listed = re.findall(r"^   :caption: (.+)$", text, re.MULTILINE)  # what the page has its reader write
-        named = re.findall(r"``((?:simdtex|kernels|tests|examples|benchmarks)/[\w/.]+)``", text)
-        assert [name for name in named if not (ROOT / name).exists() and name not in listed] == [], page
-
-
 def test_every_kernel_and_operation_is_in_the_table():
     table = (ROOT / "docs" / "concepts" / "index.rst").read_text(encoding="utf-8")
     for kernel in set((ROOT / "kernels").rglob("*.cl")) - set((ROOT / "kernels" / "maspar").iterdir()):

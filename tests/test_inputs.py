@@ -54,13 +54,6 @@ def test_a_list_of_samples_is_told_from_a_sample_written_as_lists():
     assert not is_several(list(np.moveaxis(COLOUR, -1, 0)), 0)
 
 
-def test_samples_of_several_sizes():
-    found = check([GREY, GREY[:5, :4]], mask=[MASK, MASK[:5, :4]])
-    assert [one.shape for one in found.pictures.pixels] == [(9, 10, 1), (5, 4, 1)]
-    assert [one.sum() for one in found.pictures.usable] == [54, 20]
-    assert check([GREY, GREY], mask=[MASK, ~MASK & False]).pictures.usable[1].sum() == 0
-
-
 def test_unknown_pixels_are_completed_and_said_to_be_unknown():
     found = check(at(FLOAT, np.s_[2:4, 3], np.nan)).pictures
     (pixels,), (known,) = found.pixels, found.known

@@ -4,7 +4,6 @@ The files of the folder that SIMDTEX_DIST names, which `make dist` has built, or
 """
 
 import os
-import shutil
 import subprocess
 import sys
 import tarfile
@@ -96,13 +95,6 @@ def test_the_source_distribution_has_tests_and_documentation(sdist):
     }
     assert wanted <= names
     assert not [name for name in names if "__pycache__" in name or name.startswith((".venv", "docs/_build", "dist"))]
-
-
-def test_the_package_index_would_take_both(wheel, sdist):
-    run(sys.executable, "-m", "twine", "check", "--strict", wheel, sdist, cwd=wheel.parent)
-    checker = shutil.which("check-wheel-contents", path=str(Path(sys.executable).parent))
-    assert checker, "install the extra release"
-    run(checker, wheel, cwd=wheel.parent)
 
 
 def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):

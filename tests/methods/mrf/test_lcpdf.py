@@ -212,17 +212,6 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
         assert values.max() <= 255
 
 
-@given(
-    p=problems(max_order=8, channels=(1, 3)),
-    bandwidth=st.sampled_from([0.15, 1.0, 3.0]),
-    coherence=st.sampled_from([0.0, 1.0]),
-)
-@settings(max_examples=5)
-def test_the_mode_of_a_device_has_the_references_bits(machine, p, bandwidth, coherence):
-    how = {"exact": True, "density": True, "dear": 0.1, "bandwidth": bandwidth, "coherence": coherence}
-    assert_same_bits(apart(machine, p, **how), apart(REFERENCE, p, **how))
-
-
 @pytest.mark.parametrize("gibbs", [False, True], ids=["mode", "draw"])
 def test_choices_near_the_ends_of_the_levels_have_the_references_bits(machine, gibbs):
     """A wide kernel around black and white pixels."""
