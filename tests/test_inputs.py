@@ -120,10 +120,6 @@ def test_forms_of_guides():
     assert one.dtype == output.dtype == np.uint8
     (one,), output = check(guide=(GREY.tolist(), SOME)).guide
     assert np.isnan(output).any()
-    many, output = check([GREY, GREY[:5]], guide=([GREY, GREY[:5]], GREY[:6, :7])).guide
-    assert [each.shape for each in many] == [(9, 10, 1), (5, 10, 1)]
-    (one,), output = check([GREY], guide=([GREY], GREY[:6, :7])).guide
-    assert one.shape == (9, 10, 1)
     (one,), output = check(GREY, guide=(COLOUR, COLOUR[:6, :7])).guide  # not of the sample's channels
     assert one.shape[-1] == 3
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from cases import REFERENCE, texture
+from cases import REFERENCE, slow_but, texture
 from runs import RUNS, SEED
 from skimage import data
 
@@ -89,7 +89,7 @@ def consistent(why, coherence=0.5):
         np.testing.assert_allclose(why.density.sum(1), 1)
 
 
-@pytest.mark.parametrize("name", ["more-gibbs", "labels"])
+@pytest.mark.parametrize("name", slow_but(["labels"], ["more-gibbs", "labels"]))
 def test_a_device_is_explained_alike(machine, name):
     first, second = (replayed(name, device)[0].explain((2, 2)) for device in (REFERENCE, machine))
     assert first.table() == second.table()

@@ -139,6 +139,7 @@ def of_channels(p, n, **options):
     return simdtex.simulate(CHANNELS, n, categorical=True, rng=1, **given, **options).values.mean(0)
 
 
+@pytest.mark.slow
 def test_shares_are_those_asked():
     assert abs(of_channels(np.full((64, 64), 0.8), 4).mean() - 0.8) < 0.03
     found = of_channels(None, 2, proportions=(0.9, 0.1), shape=(64, 64))

@@ -205,7 +205,7 @@ SKIPPING = [
 """Problems with runs of candidates, short runs, decimated or masked samples; and forms of a launch."""
 
 
-@pytest.mark.parametrize(("how", "options"), SKIPPING, ids=str)
+@pytest.mark.parametrize(("how", "options"), slow_but((SKIPPING[0], SKIPPING[4]), SKIPPING), ids=str)
 def test_the_exact_search_skips_nothing_that_the_reference_takes(cl_device, how, options):
     p = problem(2, shape=(12, 13), count=24, **{"phases": 1} | how)
     for gibbs in (False, True):
