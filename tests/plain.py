@@ -32,18 +32,6 @@ def neighbours(i, j, order, rows, cols, torus):
     return found
 
 
-def clashes(colors, order, torus):
-    """Pairs of equal colour that equation (14) forbids."""
-    rows, cols = colors.shape
-    return [
-        ((i, j), r)
-        for i in range(rows)
-        for j in range(cols)
-        for r in neighbours(i, j, order, rows, cols, torus)
-        if r is not None and colors[i, j] == colors[r]
-    ]
-
-
 def whole_positions(shape, order, spacing=1, step=1):
     """Sample positions whose whole neighbourhood, spread by the spacing, lies in the sample, row by row."""
     return [

@@ -225,11 +225,8 @@ RUNS = {
     "defaults": textures(samples=((9, 10),), shape=(2, 3)),
     "overview": textures({"order": 2, "overview": 20}, samples=((20, 19),), shape=(9, 10)),
     "levels-by-output": textures(BARE | {"order": 2}, samples=((32, 33),), shape=(10, 8)),
-    "overview-whole": textures({"order": 1, "edges": "whole", "phases": 64}, samples=((20, 19),), shape=(9, 8)),
     "paper": textures({"preset": "paper", "order": 2}, shape=(6, 7)),
     "exact": textures(EXACT),
-    "exact-order-8": textures(EXACT | {"order": 8, "xi": -4.0}, samples=((14, 12),)),
-    "exact-three-levels": textures(EXACT | {"levels": 3, "phases": 2}, samples=((13, 14),), shape=(11, 10)),
     "exact-colour": textures(EXACT | OPEN, channels=3),
     "exact-16-bit": textures(EXACT | {"order": 5, "coherence": 0.5}, dtype=np.uint16, shape=(6, 7)),
     "exact-of-many": textures(MORE_EXACT | {"levels": 1, "xi": -4.0}, samples=((36, 35),), shape=(3, 4)),
@@ -242,15 +239,11 @@ RUNS = {
         MORE | OPEN | {"pixel": "density", "order": 1, "xi": -9.0, "free_sweeps": 1}, channels=2, shape=(4, 5)
     ),
     "few": textures(FEW),
-    "few-colour": textures(FEW | OPEN | {"order": 5}, channels=3, samples=((10, 11),), shape=(8, 7)),
-    "few-order-18": textures(FEW | {"order": 18, "xi": -16.0}, shape=(6, 7)),
     "few-16-bit": textures(FEW | {"order": 8, "xi": -4.0, "coherence": 1.5, "chance": 1}, dtype=np.uint16),
     "few-chance": textures(FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
-    "few-levels": textures(FEW | {"levels": 3, "edges": "reflect"}, samples=((13, 14),), shape=(11, 10)),
     "few-coarse-chance": textures(
         FEW | {"order": 1, "levels": 4, "phases": 64, "coarse_chance": 7}, samples=((12, 13),), shape=(9, 10)
     ),
-    "few-gibbs": textures(FEW | {"relaxation": "gibbs", "bandwidth": 0.5}, dtype=np.uint16),
     "few-density": textures(FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}, channels=2, shape=(7, 8)),
     "bool-larger": textures({"order": 1, "levels": 2}, samples=((9, 8),), shape=(17, 14), dtype=np.bool_),
     "few-whole": textures(
@@ -269,9 +262,6 @@ RUNS = {
     "array": textures(FEW | {"array": "4x4", "schedule": "luby"}),
     # penalties, structure, finish, a lattice
     "balance": textures(FEW | {"balance": 0.1, "order": 1}, samples=((12, 13),), shape=(11, 10), tiles=6),
-    "balance-order-9": textures(
-        FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}, samples=((13, 14),), shape=(6, 7)
-    ),
     "structure-colour": textures(FEW | OPEN | {"structure": 0.7}, channels=3, shape=(8, 7)),
     "structure-beyond": textures(FEW | {"structure": 50.0}, **F4),
     "novelty-exact": textures(EXACT | OPEN | {"novelty": 0.05, "levels": 1}, channels=3, shape=(5, 6)),
@@ -279,7 +269,6 @@ RUNS = {
     "finish-16-bit": textures(FEW | {"finish": 2.2}, channels=2, dtype=np.uint16, shape=(8, 7)),
     "lattice-exact": textures(EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}, shape=(9, 10)),
     "more": textures(MORE, samples=((14, 13),), shape=(9, 10)),
-    "more-levels": textures(MORE | {"levels": 3}, samples=((24, 25),), shape=(12, 11)),
     "more-whole": textures(MORE | {"edges": "whole", "phases": 64, "balance": 2.0}, samples=((16, 15),)),
     "reduced": textures(MORE | {"levels": 3, "reduction": 2}, samples=((24, 25),), shape=(13, 11), tiles=6),
     "reduced-lattice": textures(
@@ -313,7 +302,6 @@ RUNS = {
     "grey-guide": textures(MORE_FEW | GIBBS | {"guide_weight": 2.5}, labels=0, silent=0.4, dtype=np.uint16),
     "several": textures(MORE_EXACT | {"shares": (3.0, 1.0), "balance": 2.0, "xi": -4.0}, **TWO, tiles=5),
     "several-gaps": textures(MORE_FEW | OPEN | {"lattice": "4,0,1,5"}, gaps=0.1, known=0.1, **F4, **TWO),
-    "three-colour": textures(MORE_FEW | OPEN | GIBBS, samples=((9, 8), (7, 9), (8, 8)), channels=2),
     "masked": textures(MORE_FEW | {"xi": -4.0}, masked=0.4, tiles=5),
     "gaps": textures(MORE_EXACT | {"edges": "reflect"}, gaps=0.1, dtype=np.float64),
     "categories": textures(
@@ -365,7 +353,6 @@ RUNS = {
     ),
     "volume": volume((6, 12, 13), order=3, levels=2),
     "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
-    "volume-exact": volume((3, 5, 6), search="exact", relaxation="gibbs", edges="whole", order=1),
     "volume-grey": volume(
         (4, 8, 9), training=lambda: facies(kinds=200) * np.uint16(257), categorical=False, order=3, phases=64
     ),
@@ -401,7 +388,6 @@ RUNS = {
     "multires-mended": multires((17, 20), (21, 23), channels=3, alpha=0.4),
     "multires-keep-cut": multires((17, 20), (21, 23), channels=3, edges="keep", seams="cut"),
     "multires-larger": multires((7, 6), (33, 29), dtype=np.bool_, alpha=1.5),
-    "multires-smaller": multires((23, 26), (5, 4), orientations=0),
     "multires-row": multires((1, 17), (3, 40), alpha=1, boundary="open"),
     "multires-all": multires((8, 9), (10, 13), dtype=np.float32, alpha=np.inf),
     "pyramid": pyramid((34, 36), (32, 40), iterations=5),

@@ -1,10 +1,8 @@
-"""Benchmarks: `simdtex bench`, figures of benchmarks/ on cases whose fault is known, and the picture of the README."""
+"""Benchmarks: `simdtex bench`, and figures of benchmarks/ on cases whose fault is known."""
 
 import csv
 import json
-import re
 from importlib.util import find_spec
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,11 +11,10 @@ from cases import texture
 from commands import refused, run
 from scipy.ndimage import gaussian_filter
 
-import simdtex
 from simdtex.figures.tables import benchmark_table
-from simdtex.io.image import example, write
+from simdtex.io.image import write
 from simdtex.jobs.studies import benchmark
-from simdtex.jobs.studies.benchmark import FULL, QUICK, Case, Sizes
+from simdtex.jobs.studies.benchmark import Case, Sizes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.reference import Reference
 
@@ -25,16 +22,6 @@ from simdtex.machine.reference import Reference
 
 MRF = Case("mrf", 16, 16, 2, "exact")
 TINY = Sizes((Case("multires", 16, 16), Case("pyramid", 16, 16), Case("solid", 16, 8)), (MRF,), 0.0)
-
-
-def test_cases_have_names_that_tell_them():
-    for sizes in (QUICK, FULL):
-        names = [case.name for case in (*sizes.devices, *sizes.reference)]
-        assert len(set(names)) == len(names)
-        methods = {case.method for case in sizes.reference}
-        assert methods == {case.method for case in sizes.devices} == {"mrf", "multires", "pyramid", "solid"}
-    assert Case("solid", 64, 32).name == "solid, 64 -> 32^3"
-    assert Case("mrf", 64, 32, 8, "exact").name == "mrf exact, order 8, 64 -> 32"
 
 
 def test_the_fastest_run_counts(monkeypatch):
@@ -100,44 +87,6 @@ def test_the_distance_to_a_border_is_that_to_the_nearest_pixel_of_another_label(
     assert np.isinf(classify.border_distance(np.ones((4, 5), int))).all()
 
 
-def test_accuracy_of_a_perfect_labelling_and_of_swapped_and_shifted_labels(classify):
-    for curved in (False, True):
-        truth = classify.regions(128, np.random.default_rng(1), curved, 5)
-        labels, counts = np.unique(truth, return_counts=True)
-        assert labels.tolist() == [1, 2, 3, 4, 5] and counts.min() >= 0.35 * truth.size / 5
-    assert classify.accuracy(truth, truth) == (1, 1)
-    swapped = np.choose(truth, [0, 2, 1, 3, 4, 5])
-    assert classify.accuracy(swapped, truth)[1] == 1 - ((truth == 1) | (truth == 2)).mean()
-    away, everywhere = classify.accuracy(np.roll(truth, 3, 1), truth)  # 3 pixels are within 16 of a border
-    assert everywhere < 1 and away > everywhere
-
-
-def test_equalised_textures_have_the_flat_histogram_of_their_training_part(classify):
-    rng = np.random.default_rng(1)
-    ramp = classify.Texture(*(np.stack([rng.integers(low, 90, (32, 32))] * 3, -1).astype(np.uint8) for low in (40, 20)))
-    training, test = (classify.grey(one) for one in classify.equalised(ramp))
-    assert abs(np.sort(training.ravel()) - np.linspace(0, 255, 1024)).max() < 12
-    before = [classify.grey(one) for one in ramp]
-    assert all((test[before[1] == v] == training[before[0] == v][0]).all() for v in range(40, 90))
-    assert (test[before[1] < 40] == 0).all()
-
-
-def test_a_mosaic_shows_the_test_part_of_its_label(classify):
-    known = {str(n): classify.parted(np.full((64, 64), n, np.uint8)) for n in range(7)}
-    for mosaic in classify.drawn(known, 1, 5, 96):
-        names = np.array([int(name) for name in mosaic.textures])
-        assert len(set(names)) == 5
-        assert (classify.grey(mosaic.picture) == names[mosaic.truth - 1]).all()
-
-
-def test_the_field_removes_a_spot(classify):
-    evidence = np.zeros((2, 30, 40), np.float32)
-    evidence[0] = 1
-    evidence[:, 14:17, 20:23] = [[[0]], [[1]]]
-    assert (classify.field(Reference(), evidence, 4, 7) == 1).all()
-    assert (classify.field(Reference(), evidence, 4, 0) == 2).sum() == 9
-
-
 @pytest.mark.slow
 def test_the_tables(classify, tmp_path, monkeypatch):
     for name, seed in (("red", 3), ("blue", 4)):
@@ -197,55 +146,3 @@ def test_one_command_gives_the_tables_and_the_sheets(fill, tmp_path, monkeypatch
     with open(tmp_path / "tile.csv", encoding="utf-8", newline="") as file:
         assert [line["filling"] for line in csv.DictReader(file)] == 2 * ["as it is", "band 4", "continued"]
     assert (tmp_path / "fill-red.png").is_file() and (tmp_path / "tile-red.png").is_file()
-
-
-def test_a_wrapping_picture_has_no_seam(fill, band=4):
-    row, col = np.indices((48, 40))
-    picture = (127 + 60 * np.sin(2 * np.pi * row / 48) + 50 * np.cos(2 * np.pi * col / 40)).astype(np.uint8)
-    assert fill.frame(picture.shape, band).sum() == picture.size - (48 - 2 * band) * (40 - 2 * band)
-    assert fill.seamless(picture, band)["tiles"] < 1.7
-    assert fill.twice(picture).shape == (96, 80)
-    assert fill.seamless(np.maximum(picture, (row == 0) * np.uint8(255)), band)["tiles"] > 5
-
-
-# -- benchmarks/front.py: the picture of the README shows what it says.
-ROOT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture
-def front(script):
-    return script("front")
-
-
-def test_the_mast_is_in_the_hole_and_samples_are_pieces_of_one_size(front):
-    photo, hole = front.mast(324)
-    assert photo.shape == (324, 324, 3) and 0.05 < hole.mean() < 0.3
-    assert photo[hole].max() > 50 + photo[:250, 200:235].max(), "it is lighter than the sky beside it"
-    sides = {name: sample.shape for name, sample in front.samples(front.SIDE).items()}
-    assert sides == {"wood": (129, 129, 3), "tissue": (162, 162, 3), "stars": (162, 162, 3)}
-
-
-@pytest.mark.slow
-def test_the_picture_has_samples_results_and_the_hole(front, any_device):
-    side = 100
-    sheet = np.array(front.front(simdtex.open_machine(str(any_device.index)), side))
-    line, wide = front.TEXT + 8, 2 * side + front.GAP
-    assert np.array_equal(sheet[line : line + side, wide : wide + side], front.samples(side)["tissue"])
-    below = line + side + front.GAP + 2 * side + front.GAP + line
-    given, filled = (sheet[below : below + 2 * side, left : left + 2 * side] for left in (0, wide))
-    photo, hole = front.mast(2 * side)
-    assert np.array_equal(given, photo) and np.array_equal(filled[~hole], photo[~hole])
-    assert (filled[hole] != photo[hole]).any(-1).mean() > 0.8
-
-
-def test_the_picture_of_the_readme_is_light():
-    (name,) = re.findall(r"\]\((docs/_static/front\.\w+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert (ROOT / name).stat().st_size < 700_000
-
-
-def test_the_wall_of_bricks_is_seen_from_the_front():
-    wall = example("brick")
-    assert wall.shape == (264, 216) and wall.dtype == np.uint8
-    joints = np.argsort(wall.mean(0))[::-1][:24]  # the lightest columns are whole joints
-    assert (wall[:, joints].mean(0) > wall.mean() + 10).all()
-    assert example("gravel").shape == (512, 512)

@@ -16,10 +16,8 @@ from runs import hole
 
 import simdtex
 from simdtex import checkpoint as checkpoints
-from simdtex import schedules
-from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
+from simdtex.checkpoint import Checkpoint, like, pack, read, unpack
 from simdtex.io.files import exclusive, write_checked
-from simdtex.methods.mrf import Options
 
 GREY = texture((14, 15))
 SMALL = {"order": 1, "levels": 1}
@@ -302,20 +300,11 @@ def test_a_tree_comes_back_as_it_was():
             pack({"x": [thing]})
 
 
-def test_identities_tell_inputs_apart():
-    assert identity(1) == identity(1.0) == identity(np.float32(1))
-    assert identity(2**60) != identity(2**60 + 1)
-    assert identity(np.arange(4)) != identity(np.arange(4).reshape(2, 2)) != identity(np.arange(4, dtype=float))
-    assert identity((1, None, "a", True)) == [1.0, None, "a", True]
-    assert identity(schedules.get("block:3x4")) == "Block block:3x4"
-    assert identity(Options(xi=-2))["xi"] == -2 and json.dumps(identity(Options()))
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
 def test_a_few_kills_change_nothing():
     environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
-    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "more", "soft", "tiles"]
+    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "more", "soft"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

@@ -4,15 +4,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from unittest.mock import MagicMock
 
 import pytest
 
-import fuzz.__main__ as driver
-from fuzz import KINDS, corpus, seeded, worker
+from fuzz import KINDS, seeded, worker
 from fuzz.lines import LINES, RUNS, Maker, Try
 from simdtex.commands import COMMANDS as KNOWN
-from simdtex.io import image
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuzzer runs on Linux")]
 
@@ -43,21 +40,6 @@ def test_a_seed_and_a_number_give_a_try():
     assert len({one.args[0] for one in tries if one.args}) > 4
 
 
-def test_valid_files_are_valid(tmp_path):
-    read = 0
-    for name, data in corpus.pictures().items():
-        path = tmp_path / name
-        path.write_bytes(data)
-        try:
-            image.read(path)
-            read += 1
-        except (ValueError, TypeError) as error:
-            assert name.partition(".")[0].partition("-")[0] in (
-                *("complex", "object", "empty", "inf", "pages", "animated", "bool", "huge", "tiny"),
-            ), error
-    assert read > 40
-
-
 def test_what_a_command_says_wrong():
     for code, said, faults in [
         (2, "simdtex: the sample is empty; give another\n", []),
@@ -70,14 +52,3 @@ def test_what_a_command_says_wrong():
         (1, "Traceback (most recent call last):\nKeyError: 1\n", ["traceback"]),
     ]:
         assert [what for what, _ in worker.said_wrong(Try([*RUNS["synth"], "-q"]), code, said)] == faults
-
-
-def test_a_fault_is_counted_and_told_once_with_its_command(monkeypatch, capsys):
-    pool = MagicMock()
-    found = pool.return_value.__enter__.return_value.map.return_value.result
-    found.return_value = iter([("plain", "exit code 1", [("traceback", "KeyError")])] * 3)
-    monkeypatch.setattr(driver, "ProcessPool", pool)
-    count, ends, faults = driver.run("lines", 1, 3, 7, 5, 1, "reference")
-    assert (count, ends["exit code 1"], faults["traceback", "KeyError"]) == (3, 3, 3)
-    said = capsys.readouterr().out
-    assert said.count("KeyError") == 1 and "python -m fuzz --kinds lines --seed 7 --first 5 --tries 1\n" in said

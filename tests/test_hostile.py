@@ -1,21 +1,15 @@
 """Files that name other files or themselves, callbacks that change inputs, signals at any moment."""
 
 import os
-import signal
 import struct
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from copy import deepcopy
 
 import h5py
 import numpy as np
-import PIL.Image
 import pytest
 import rasterio
 import rasterio.shutil
-from runs import RUNS, SEED, digest, outcome
+from runs import RUNS, digest, outcome
 
 from simdtex.io import grids, image, rasters, volume
 
@@ -140,31 +134,3 @@ def test_a_callback_that_overwrites_all_inputs_changes_nothing(name, monkeypatch
     made = digest(outcome(name, callback=callback)[0])
     monkeypatch.setitem(RUNS, name, run)
     assert called and made == digest(outcome(name)[0])
-
-
-@pytest.mark.slow
-def test_a_signal_at_any_moment_ends_with_one_sentence_and_no_output(tmp_path):
-    """At 200 moments of a command; before its first line and after its last one, the signal itself ends it."""
-    PIL.Image.fromarray(PRIVATE).save(tmp_path / "a.png")
-    words = [sys.executable, "-m", "simdtex", "synth", "a.png", "-o", "o.png", "--size", "32", "--seed", "1", "--quiet"]
-    how = {"cwd": tmp_path, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    began = time.perf_counter()
-    subprocess.run(words, check=True, **how)
-    lasts, rng, wrong = time.perf_counter() - began, np.random.default_rng(SEED), []
-    whole = (tmp_path / "o.png").read_bytes()
-    (tmp_path / "o.png").unlink()
-    for number in [signal.SIGINT, signal.SIGTERM] * 100:
-        process = subprocess.Popen(words, **how)
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(lasts * rng.random())
-        process.send_signal(number)
-        said = process.communicate(timeout=120)[1].replace("1 error generated.\n", "")  # of LLVM, which it stopped too
-        made = {one.name for one in tmp_path.iterdir()} - {"a.png"}
-        sentence = "written so far: o.png" if made else "nothing was written"
-        ended = process.returncode == 128 + number and said in (f"simdtex: stopped; {sentence}\n", "simdtex: stopped\n")
-        early = process.returncode in (-number, 1) and (not said or "KeyboardInterrupt" in said) and not made
-        written = made == {"o.png"} and (tmp_path / "o.png").read_bytes() == whole
-        if not (ended or early or (process.returncode in (0, -number) and not said and written)):
-            wrong.append((number, process.returncode, said, made))
-        (tmp_path / "o.png").unlink(missing_ok=True)
-    assert not wrong

@@ -38,11 +38,6 @@ def check(sample=GREY, **rest):
     return check_inputs(sample, SHAPE, **rest)
 
 
-def test_with_more_it_is_not_plain():
-    more = ({"mask": MASK}, {"known": SOME}, {"guide": (GREY, GREY[:6, :7])}, {"sample": [GREY, GREY]})
-    assert check().plain and not any(check(**one).plain for one in (*more, {"sample": at(FLOAT, (2, 3), np.nan)}))
-
-
 def test_channels_come_last():
     for axis in (0, 1, 2, -2):
         known = np.moveaxis(np.repeat(SOME[..., None], 3, -1), -1, axis)
@@ -57,20 +52,6 @@ def test_a_list_of_samples_is_told_from_a_sample_written_as_lists():
     for sample in (GREY, np.stack([GREY, GREY]), GREY.tolist(), list(GREY), [], None, [GREY, GREY.tolist()]):
         assert not is_several(sample, None)
     assert not is_several(list(np.moveaxis(COLOUR, -1, 0)), 0)
-
-
-def test_nested_lists_are_one_sample():
-    (one,) = check_samples(GREY.tolist(), None).pixels
-    assert one.shape == (9, 10, 1) and np.array_equal(one[..., 0], GREY)
-    (one,) = check_samples(list(np.moveaxis(COLOUR, -1, 0)), 0).pixels
-    assert np.array_equal(one, COLOUR)
-
-
-def test_samples_of_several_sizes():
-    found = check([GREY, GREY[:5, :4]], mask=[MASK, MASK[:5, :4]])
-    assert [one.shape for one in found.pictures.pixels] == [(9, 10, 1), (5, 4, 1)]
-    assert [one.sum() for one in found.pictures.usable] == [54, 20]
-    assert check([GREY, GREY], mask=[MASK, ~MASK & False]).pictures.usable[1].sum() == 0
 
 
 def test_unknown_pixels_are_completed_and_said_to_be_unknown():
@@ -117,21 +98,6 @@ def test_a_table_of_known_values_or_its_path(tmp_path):
     assert both.given.known[1, 2].tolist() == [True, False, True] and both.given.known.sum() == 2
 
 
-def test_numbers_of_64_bits_are_kept_exactly():
-    sample = np.arange(90, dtype=np.int64).reshape(9, 10) + 2**60
-    known = np.ma.masked_all(SHAPE, np.int64)
-    known[1, 2] = 2**60 + 3
-    assert check(sample, known=known).given.values[1, 2, 0] == 2**60 + 3
-
-
-def test_some_variables_of_a_site_may_be_known():
-    known = np.full((*SHAPE, 3), np.nan)
-    known[2, 3, 1] = 8
-    found = check(COLOUR, channel_axis=-1, known=known).given
-    assert found.known.sum() == 1 and found.known[2, 3].tolist() == [False, True, False]
-    assert found.partly
-
-
 def test_a_source_map_is_of_whole_numbers():
     for dtype in (np.int8, np.uint64):
         place = np.zeros((*SHAPE, 2), dtype)
@@ -154,10 +120,6 @@ def test_forms_of_guides():
     assert one.dtype == output.dtype == np.uint8
     (one,), output = check(guide=(GREY.tolist(), SOME)).guide
     assert np.isnan(output).any()
-    many, output = check([GREY, GREY[:5]], guide=([GREY, GREY[:5]], GREY[:6, :7])).guide
-    assert [each.shape for each in many] == [(9, 10, 1), (5, 10, 1)]
-    (one,), output = check([GREY], guide=([GREY], GREY[:6, :7])).guide
-    assert one.shape == (9, 10, 1)
     (one,), output = check(GREY, guide=(COLOUR, COLOUR[:6, :7])).guide  # not of the sample's channels
     assert one.shape[-1] == 3
 

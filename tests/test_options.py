@@ -18,7 +18,7 @@ from simdtex.methods import mrf
 from simdtex.methods.multires import options as multires
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid import solid
-from simdtex.options import GREATEST, MOST, UNSET, Number, Whole, real, resolve, table, whole, within_32_bits
+from simdtex.options import GREATEST, MOST, UNSET, Number, Whole, resolve, table, within_32_bits
 
 SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)
 STRANGE = [
@@ -26,11 +26,6 @@ STRANGE = [
     *(nan, inf, -inf, 1e308, -1e308, 1e-320, 5e-324, -3e6, np.float32(3e38), np.int64(2**62), 1j),
     *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", object(), np.zeros(0), np.zeros((2, 2))),
 ]
-VERBS = {
-    *("blend", "compare", "count", "cover", "evaluate", "exchange", "fade", "follow", "give"),
-    *("keep", "look", "lower", "match", "penalise", "prefer", "reflect", "relax", "scale"),
-    *("set", "split", "start", "sweep", "take", "treat", "use", "wrap"),
-}
 JOBS = {"synth", "fill", "extend", "simulate", "simulate 3-D", "schedules"}
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
 
@@ -69,13 +64,6 @@ def test_the_ends_of_every_range_work():
         assert made.shape == (5, 5), options
 
 
-@pytest.mark.slow
-def test_the_slowest_cooling_ends():
-    """In a thousand sweeps."""
-    made = simdtex.synthesize(SAMPLE, (5, 5), order=1, xi=-5e-324, device="reference", rng=1)
-    assert made.shape == (5, 5)
-
-
 RUNS = {
     "mrf": lambda picture: simdtex.synthesize(picture, (9, 9), order=2, rng=1, device="reference"),
     "mix": lambda picture: simdtex.mix([picture, picture[::-1]], (16, 16), rng=1, device="reference"),
@@ -89,13 +77,6 @@ def test_a_range_beyond_the_largest_double_does_not_overflow():
         assert_same_bits(run(picture * 2.0**1023), run(picture) * 2.0**1023)
     with pytest.raises(ValueError, match="values beyond 1e\\+100: give them in a larger unit"):
         compare(np.full((12, 12), 1.7e308), (9, 9), ["coloring"], device="reference")
-
-
-def test_numbers_of_any_length_are_said_in_one_line():
-    for check, value in ((whole, 10**5000), (real, 10**5000), (whole, "a\n" * 500), (real, ["\n"] * 500)):
-        with pytest.raises((TypeError, ValueError)) as said:
-            check("n", value, 0)
-        assert len(str(said.value)) < 200 and "\n" not in str(said.value)
 
 
 def test_so_many_values_cannot_be_counted():
@@ -142,7 +123,6 @@ def test_what_is_declared_is_complete_and_checked_and_its_docstring_says_it():
                 with pytest.raises((TypeError, ValueError), match=name):
                     options(**{name: value})
             assert option.help[0].isupper() and option.help[-1] != "." and ". " not in option.help, name
-            assert option.help.split()[0].lower() in VERBS, option.help
             assert option.group and set(option.jobs) <= JOBS
             assert (option.default is None) == bool(option.none), f"{name} says what None stands for"
             said = " ".join(told.partition(f"    {name} : ")[2].partition("\n    " + name)[0].split())

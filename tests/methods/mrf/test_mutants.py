@@ -1,22 +1,15 @@
 """What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
 
-from copy import deepcopy
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from cases import REFERENCE, laid_out, sweeps, texture
 
 import simdtex
-from simdtex.checkpoint import Checkpointing
-from simdtex.driver import drive
 from simdtex.machine import memory
-from simdtex.maspar import observers
 from simdtex.methods import mrf
 from simdtex.methods.mrf import level as level_of_a_run
-from simdtex.methods.mrf.level import ActiveSites, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.level import check_fit, number_of_levels, parts
 from simdtex.methods.mrf.plan import check_guide
-from simdtex.methods.mrf.record import MrfRecord, expected_work
 from simdtex.methods.mrf.relax import AllCandidates, CandidateList
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
@@ -86,14 +79,9 @@ def test_a_neighbourhood_that_does_not_fit():
         ((16, 16), (64, 64), {"order": 1}, 2),  # 8 x 8 candidates are 64
         ((8, 16), (64, 64), {"order": 1}, 2),  # 4 x 8 candidates are enough down to 8 pixels from site to site
         ((7, 17), (64, 64), {"order": 1}, 1),
-        ((8, 15), (64, 64), {"order": 1, "overview": 28}, 2),
         ((8, 15), (64, 64), {"order": 1, "overview": 29}, 1),
-        ((256, 257), (512, 512), {"order": 1, "overview": 256}, 5),
-        ((255, 257), (512, 512), {"order": 1, "overview": 256}, 4),
         ((64, 64), (5, 64), {"order": 1}, 2),
         ((64, 64), (4, 64), {"order": 1}, 1),
-        ((64, 64), (64, 9), {"order": 1}, 3),
-        ((64, 64), (64, 8), {"order": 1}, 2),
         ((64, 64), (64, 64), {"order": 1, "overview": 1}, 6),  # down to 2x2 sites
         ((16, 16), (8, 16), {"order": 1, "levels": 4}, 4),
         ((16, 16), (8, 16), {"order": 1, "levels": 5}, "give at most 4"),
@@ -134,17 +122,6 @@ def test_the_coarsest_level_has_fewer_decimations_if_it_has_many_candidates(monk
     assert [prepared().places(number).step for number in range(3)] == [1, 1, 1]
     monkeypatch.setattr(level_of_a_run, "ALL", 4 * (24 * 25 // 4**2))
     assert [prepared().places(number).step for number in range(3)] == [1, 1, 2]
-
-
-def test_which_sites_are_active():
-    level = prepared().level(1)
-    temperature = np.zeros((10, 12), np.uint16)
-    temperature[1, 2], temperature[9, 11] = 1, 1024
-    active, free = ActiveSites(level, temperature, False), ActiveSites(level, temperature, True)
-    assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
-    assert active.numbers().tolist() == [14, 119]
-    assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
-    assert free.numbers().tolist() == list(range(120))
 
 
 def test_the_memory_that_is_asked_for(monkeypatch):
@@ -195,14 +172,6 @@ def test_a_site_always_cools():
     assert [prepared(xi=xi).level(0).relaxation.xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
 
 
-def test_a_window_of_a_level():
-    run = prepared()
-    whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
-    assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
-    assert (window.evaluations.shape, window.evaluations.dtype, window.evaluations.any()) == ((4, 5), np.int32, False)
-    assert whole.evaluations.shape == run.grid(1).shape
-
-
 def test_a_level_with_few_candidates_evaluates_them_all(monkeypatch):
     for most, kind in ((599, CandidateList), (600, AllCandidates)):
         monkeypatch.setattr("simdtex.methods.mrf.level.EXHAUSTIVE", most)
@@ -216,84 +185,11 @@ def test_a_saved_state_shares_no_memory_with_the_run():
     assert not any(np.shares_memory(saved[name], plane) for name, plane in state.field._asdict().items())
 
 
-def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
-    run, told, work = prepared(schedule="synchronous", search="exact"), [], []
-    run.level(2)
-    monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
-    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 3) * 7, 5)):  # 7 sites at once
-        monkeypatch.setattr(REFERENCE, "scratch", scratch)
-        run.step(run.begin(), lambda *seen: told.append(seen[-1]))
-        sites = [30] if pieces == 1 else [7, 7, 7, 7, 2]
-        assert [part.sites for part in told] == sites
-        assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
-        assert [part.last for part in told] == [False] * (pieces - 1) + [True]
-        assert sum(work) == 30 * 2 * 600 * 8 * 2  # channels, one of them that of the structure
-        told.clear()
-        work.clear()
-
-
 def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
     pixels = texture((24, 25), 3, np.uint16)
     run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=64, levels=1), 5)
     neighbours = len(neighbourhood_offsets(64))
     assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
-
-
-def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
-    plan, kept = prepared(search="coherent", schedule="luby").plan, []
-
-    def driven(found, keep=lambda info, tree, now=False: None):
-        image, output = drive(plan, REFERENCE, 5, None, Checkpointing(found, keep), observers("8x8"))
-        levels = [report | {"seconds": None} for report in output.statistics["levels"]]
-        counts = output.statistics["accounting"] | {"launches": None}
-        return image.tolist(), [stage.level for stage in output.stages], levels, counts
-
-    whole = driven(None, lambda info, tree, now=False: kept.append((info, deepcopy(tree()))))
-    assert [info.level for info, _ in kept if not info.sweep] == [1, 0]  # the steps that enter a level
-    assert [report["skipped"] for report in whole[2]] == [0, 0, 0]
-    assert all(driven(found) == whole for _, found in kept[::9])
-
-
-def test_how_far_a_run_is():
-    run = prepared(search="exact", free_sweeps=2)
-    record = MrfRecord(run, None)
-    record._expected = {2: (100.0, 20.0), 1: (300.0, 40.0), 0: (500.0, 40.0)}
-
-    def after(level, left, share, free=0):
-        record._first_left = record._first_left or left
-        state = SimpleNamespace(active=left > 0, free=free)
-        record._advance(level, state, left, share)
-        return round(record._fraction * 1000, 6)
-
-    assert after(2, 1.0, 0.5) == 5  # of the first sweep no more is known than that it is one of many
-    assert after(2, 1.0, 1.0) == 10
-    assert after(2, 0.25, 0.5) == 55  # half of all, and half a tenth
-    assert after(2, 0.0025, 1.0) == 100  # no further than to the end
-    assert [after(2, 0.0, 0.5), after(2, 0.0, 1.0, 1)] == [105, 120]
-    assert after(1, 0.0, 1.0, 1) == 460  # a level that is known from the beginning
-    record._first_left = 0.0
-    assert [after(0, 0.5, 0.0), after(0, 0.32, 0.0), after(0, 0.405, 0.0)] == [460, 560, 560]  # it never falls
-    assert after(0, 0.0, 1.0, 2) == 1000
-
-
-@pytest.mark.parametrize(
-    ("given", "each", "first"),
-    [
-        ({"search": "exact"}, 600, 5.8),
-        ({"search": "coherent", "chance": 0, "xi": -2.0}, 10, 3.4),
-        ({"search": "coherent", "chance": 999, "free_sweeps": 1}, 600, 5.8),
-    ],
-)
-def test_the_work_that_is_expected(given, each, first):
-    run = prepared(**given)
-    free = given.get("free_sweeps", 2)
-    each *= 1 if given["search"] == "exact" else 16
-    sweeps = {n: sites * by + 5.4 * 200_000 for n, sites, by in [(0, 460, each), (1, 120, each), (2, 30, 600)]}
-    expected = {number: (sweep * (first if number == 2 else 4.5), sweep * free) for number, sweep in sweeps.items()}
-    found = expected_work(run)
-    assert set(found) == set(expected)
-    for level, work in expected.items():
-        assert found[level] == pytest.approx(work)
 
 
 @pytest.mark.parametrize("given", [{"search": "exact"}, {"array": "4x4"}])
