@@ -151,6 +151,17 @@ def quick(line):
     return words
 
 
+def check_outputs(words, folder):
+    """What the words say is written is there."""
+    if {"synth", "fill", "extend", "tile", "simulate", "solid", "mix"} & set(words):
+        outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
+        outputs += [word.partition("=")[2] for word in words if "=" in word]
+        made = "--dry-run" not in words
+        assert outputs and all((folder / name).exists() == made for name in outputs)
+    if "--stages" in words:
+        assert list((folder / "stages").glob("level0-sweep*.png"))
+
+
 def test_documented_commands_parse_and_doctests_hold():
     for page in PAGES:
         assert doctest.testfile(str(page), module_relative=False, encoding="utf-8").failed == 0, page
@@ -163,6 +174,13 @@ def test_documented_commands_parse_and_doctests_hold():
                 options = {name: value for name, value in given(params).items() if name in table(method.Options)}
             options |= {"preset": params["preset"]} if params.get("preset") else {}
             resolve(method.Options, command, options)
+
+
+@pytest.mark.slow
+def test_the_example_of_the_page_for_geoscientists_runs(any_device):
+    """The build of the documentation runs the others, which the gallery shows."""
+    made = runpy.run_path(str(ROOT / "examples" / "volume_of_a_reservoir.py"))
+    assert 0 < made["p10"] < made["p50"] < made["p90"]
 
 
 @pytest.mark.slow
@@ -186,12 +204,32 @@ def test_command_of_the_first_pages_runs(any_device, material, line, monkeypatch
     monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
     words = quick(line)
     assert cli.main(words[1:], standalone_mode=False) in (None, 0)
+    check_outputs(words, material)
     assert simdtex.__file__.startswith(str(ROOT))
 
 
-def test_what_the_readme_names_exists():
+def test_the_readme_is_short_and_what_it_names_exists():
     links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link and not link.startswith("#")]
     assert links and [link for link in links if not (ROOT / link.partition("#")[0]).exists()] == []
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    named = re.findall(r"\bmake (demo|test|docs|[a-z]+$)", README, re.MULTILINE)
+    assert {"demo", "test", "docs"} <= set(named) <= set(targets)
+    assert len(README.splitlines()) < 150
+
+
+def test_the_first_page_shows_every_command():
+    """But those that take minutes, need a run that was stopped, or never end."""
+    shown = "\n".join(commands(FIRST))
+    every = set(cli.main.commands) - {"bench", "demo", "live", "resume"}
+    assert [command for command in every if f"simdtex {command}" not in shown] == []
+
+
+def test_files_named_on_pages_exist():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        listed = re.findall(r"^   :caption: (.+)$", text, re.MULTILINE)  # what the page has its reader write
+        named = re.findall(r"``((?:simdtex|kernels|tests|examples|benchmarks)/[\w/.]+)``", text)
+        assert [name for name in named if not (ROOT / name).exists() and name not in listed] == [], page
 
 
 def test_every_kernel_and_operation_is_in_the_table():
@@ -212,6 +250,8 @@ def test_every_option_of_the_command_line_is_documented():
         assert shown == [flag for p in params for flag in (*p.opts, *p.secondary_opts)]
         unsaid = [line for line in written if len(line.split("[")[-1]) > 1 and "  [" in line]
         assert unsaid == [], "defaults are in words"
+    with pytest.raises(AssertionError, match="simdtex fill has no option --nothing"):
+        EXTENSION["command_options"]("fill", ["--nothing", "   More on it."])
 
 
 def test_every_option_of_a_method_has_its_page_with_the_papers_value():
@@ -221,6 +261,19 @@ def test_every_option_of_a_method_has_its_page_with_the_papers_value():
         rows = "\n".join(EXTENSION["paper_values"](method))
         for name, value in preset_values(module.Options, "paper").items():
             assert re.search(rf"^   \* - ``{name}``\n.*\n     - ``{re.escape(quoted(value))}``$", rows, re.MULTILINE)
+
+
+WISHES = (ROOT / "docs" / "wishes.rst").read_text(encoding="utf-8")
+ASKED = ("synth", "fill", "extend", "simulate")
+
+
+def test_every_option_answers_a_wish_and_no_wish_names_another():
+    params = [p for command in ASKED for p in cli.load(command).params if isinstance(p, click.Option)]
+    wished = set(re.findall(r"``(--[\w-]+)", WISHES))
+    assert {max(p.opts, key=len) for p in params} <= wished
+    assert wished <= {name for p in params for name in (*p.opts, *p.secondary_opts)}
+    lines = re.findall(r"^\* .*(?:\n  .*)*", WISHES.partition(".. _wishes-research:")[2], re.MULTILINE)
+    assert lines and all("``--" in line and ":doc:" in line for line in lines), "options for research lead to a page"
 
 
 def test_every_option_of_a_command_is_a_parameter_or_in_the_table_of_names():

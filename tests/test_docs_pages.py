@@ -88,6 +88,15 @@ sys.path.insert(0, str(ROOT / "docs"))
 import check  # noqa: E402
 
 
+def test_pictures_of_the_pages_are_small_and_have_a_command():
+    text = (ROOT / "docs" / "pictures.py").read_text(encoding="utf-8")
+    found = [*(ROOT / "docs" / "wishes").glob("*.png"), *(ROOT / "docs" / "readers").glob("*.png")]
+    assert found
+    for path in found:
+        assert path.stat().st_size < 300_000, path.name
+        assert f"def {path.stem}()" in text, path.name
+
+
 def test_built_pages_are_sound_in_a_browser():
     if check.missing() or not (BUILT / "index.html").is_file():
         pytest.skip(check.missing() or "the documentation is not built (make docs)")

@@ -45,6 +45,14 @@ def test_every_supported_python_is_tried():
     assert PROJECT["requires-python"] == f">={named[0]}"
 
 
+def test_an_issue_begins_with_the_version():
+    for name in ("bug", "wish"):
+        form = yaml.safe_load((ROOT / ".github" / "ISSUE_TEMPLATE" / f"{name}.yml").read_text(encoding="utf-8"))
+        version = next(field for field in form["body"] if field.get("id") == "version")
+        assert {"name", "description", "body"} <= set(form)
+        assert "`simdtex --version`" in version["attributes"]["label"] and version["validations"]["required"] is True
+
+
 def test_the_changelog_knows_the_version_and_a_release_takes_three_steps():
     page = (ROOT / "docs" / "releasing.rst").read_text(encoding="utf-8")
     assert re.findall(r"^(\d)\. ", page, re.MULTILINE) == ["1", "2", "3"]
@@ -103,3 +111,11 @@ def test_the_conda_recipe_is_that_of_the_project():
     assert dict([script.split(" = ")]) == PROJECT["scripts"]
     wanted = [" >=".join(line.split(">=")) for line in PROJECT["dependencies"]]
     assert sorted(recipe["requirements"]["run"][1:]) == sorted(wanted)
+
+
+@pytest.mark.slow
+def test_the_conda_recipe_renders():
+    rattler_build = pytest.importorskip("rattler_build")
+    recipe = rattler_build.Stage0Recipe.from_file(RECIPE)
+    (variant,) = recipe.render(rattler_build.VariantConfig())
+    assert (variant.recipe.package.name, variant.recipe.package.version) == (PROJECT["name"], PROJECT["version"])

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from importlib.util import find_spec
 
 import click
@@ -16,7 +17,7 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex import commands as cli
-from simdtex.cli.command import catch_signals
+from simdtex.cli.command import catch_signals, reporting
 from simdtex.io.image import write
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "rich"}
@@ -159,3 +160,17 @@ def test_ctrl_c_waits_where_an_exception_would_do_harm():
             for _ in range(600):  # until the signal comes again
                 time.sleep(0.1)
         assert over
+
+
+def test_what_ctrl_c_leaves_undone_is_not_warned_of():
+    @click.command()
+    @reporting()
+    def stopped():
+        raise KeyboardInterrupt
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert CliRunner().invoke(stopped).exit_code == 130
+        warnings.warn("coroutine 'AsyncGroup.create_array' was never awaited", RuntimeWarning, stacklevel=1)
+        with pytest.raises(RuntimeWarning):
+            warnings.warn("another", RuntimeWarning, stacklevel=1)

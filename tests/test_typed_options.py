@@ -5,14 +5,20 @@ import re
 import runpy
 import subprocess
 import sys
+from dataclasses import dataclass
 from inspect import Parameter, getsource, signature
 from pathlib import Path
 from textwrap import dedent
 
+import click
 import pytest
+from click.testing import CliRunner
 
 import simdtex
+from simdtex.cli.job import job
 from simdtex.commands import load
+from simdtex.methods.pyramid import options as pyramid
+from simdtex.options import Number, documented, option, resolve
 
 ROOT = Path(simdtex.__file__).parents[1]
 
@@ -73,6 +79,11 @@ def test_a_command_has_the_parameters_and_the_defaults_of_its_function():
     assert wrong == []
 
 
+def test_a_misspelt_parameter_is_answered():
+    with pytest.raises(TypeError, match=r"unknown option 'seamles' of the method 'mrf' \(did you mean 'seamless'\?\)"):
+        simdtex.extend([[1, 2], [3, 4]], right=1, seamles=True)
+
+
 def test_the_types_follow_from_functions_and_tables():
     written = (ROOT / "simdtex" / "__init__.pyi").read_text(encoding="utf-8")
     assert written == runpy.run_path(str(ROOT / "docs" / "stubs.py"))["stub"](), "run: python docs/stubs.py"
@@ -103,3 +114,44 @@ def test_type_checkers_find_wrong_uses(tmp_path):
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout
     wrong = [str(number) for number, line in enumerate(USES.splitlines(), 1) if "wrong" in line]
     assert re.findall(r"uses.py:(\d+): error", said) == wrong, said
+
+
+def test_an_option_that_is_declared_is_everywhere(monkeypatch):
+    """In Python with its default, check and preset, in the docstring, on the command line and on the live page."""
+    from simdtex.live import job as page
+
+    how = {"jobs": {"mix": 0.75}, "shown": ("mix",), "group": "Appearance", "slider": (0, 1, 0.1)}
+
+    @documented
+    @dataclass(frozen=True)
+    class Options(pyramid.Options):
+        """The options of the method ``pyramid``."""
+
+        glitter: float = option(0.5, Number(0), "Make it glitter", paper=0.25, **how)
+
+    Options.__module__ = "simdtex.methods.pyramid.options"
+    monkeypatch.setitem(page.TABLES, "pyramid", (Options, "mix"))
+    for options, glitter in (
+        ({}, 0.75),
+        ({"glitter": 1}, 1),
+        ({"preset": "paper"}, 0.25),
+        ({"preset": "paper", "glitter": 2}, 2),
+    ):
+        assert resolve(Options, "mix", options).glitter == glitter
+    assert resolve(Options, "synth", {}).glitter == 0.5
+    with pytest.raises(ValueError, match="glitter is -1; give a number of at least 0"):
+        resolve(Options, "synth", {"glitter": -1})
+    assert "glitter : float, 0 or more, default 0.5\n" in Options.__doc__ and "Make it glitter." in Options.__doc__
+    assert {"name": "glitter", "default": 0.75}.items() <= page.controls("pyramid")[-1].items()
+
+    made = []
+
+    @job(methods=[Options])
+    def mix(**options):
+        """Mix."""
+        made.append(options)
+
+    assert isinstance(mix, click.Command)
+    assert CliRunner().invoke(mix, ["--glitter", "0.3"]).exit_code == 0
+    assert made[0]["glitter"] == 0.3
+    assert "--glitter FLOAT" in CliRunner().invoke(mix, ["--help"]).output

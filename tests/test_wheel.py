@@ -3,7 +3,9 @@
 The files of the folder that SIMDTEX_DIST names, which `make dist` has built, or else files that are built here.
 """
 
+import email
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -95,6 +97,27 @@ def test_the_source_distribution_has_tests_and_documentation(sdist):
     }
     assert wanted <= names
     assert not [name for name in names if "__pycache__" in name or name.startswith((".venv", "docs/_build", "dist"))]
+
+
+def test_the_metadata_are_those_of_the_project(wheel):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        found = email.message_from_bytes(archive.read(name))
+    assert (found["Name"], found["Version"]) == ("simdtex", project["version"])
+    assert (found["License-Expression"], found["Requires-Python"]) == (project["license"], project["requires-python"])
+    assert found["Description-Content-Type"] == "text/markdown"
+    assert set(found.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+    needed = {line for line in found.get_all("Requires-Dist") if "extra ==" not in line}
+    assert needed == set(project["dependencies"])
+    assert len(found.get_all("Project-URL", [])) == len(project.get("urls", {}))
+
+
+def test_the_package_index_would_take_both(wheel, sdist):
+    run(sys.executable, "-m", "twine", "check", "--strict", wheel, sdist, cwd=wheel.parent)
+    checker = shutil.which("check-wheel-contents", path=str(Path(sys.executable).parent))
+    assert checker, "install the extra release"
+    run(checker, wheel, cwd=wheel.parent)
 
 
 def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):
