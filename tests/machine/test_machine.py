@@ -1,8 +1,6 @@
 """Machines: memory and its checks, caches, threads, forked processes, the pace of launches, and profiles."""
 
 import dataclasses
-import functools
-import importlib.util
 import os
 import shutil
 import signal
@@ -132,26 +130,6 @@ def test_a_limit_of_counting_says_what_is_counted():
     for method, shape, values in (("pyramid", (20000, 20000), 8), ("multires", (40000, 40000), 4)):
         with pytest.raises(ValueError, match=f"columns is beyond 2..31 values, {values} for each pixel; give"):
             simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
-
-
-@functools.cache
-def benchmark():
-    spec = importlib.util.spec_from_file_location("memory_benchmark", ROOT / "benchmarks" / "memory.py")
-    module = importlib.util.module_from_spec(spec)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / "benchmarks"))
-        spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("channels, dtype", [(1, "uint8"), (3, "float64")])
-@pytest.mark.parametrize("name", benchmark().CASES)
-def test_no_run_takes_more_than_was_asked_for(name, channels, dtype, any_device):
-    kind, options = benchmark().CASES[name]
-    small, side = (24, 80) if kind == "solid" else (128, 1024)
-    grown, asked, _ = benchmark().run(kind, small, side, channels, dtype, str(any_device.index), options)
-    assert 0.3 * (asked - memory.TEMPORARY) < grown <= asked, "and not far less, but for what is asked for at any size"
 
 
 # -- Progress, and the pace of launches.
