@@ -46,14 +46,6 @@ def test_everything_at_once(folder):
     assert {"level0-sweep01.png", "temperature-level0-sweep01.png"} <= set(names("st"))
 
 
-def test_the_same_seed_gives_the_same_file_of_twice_the_size_and_quiet_says_nothing(folder):
-    assert synth("-q").output == ""
-    first = Path("out.png").read_bytes()
-    assert pixels("out.png").shape == (48, 40)
-    synth("-q")
-    assert Path("out.png").read_bytes() == first
-
-
 BAD = {
     "size": ["--size", "large"],
     "smaller size": ["--size", "60000x60000"],

@@ -21,7 +21,6 @@ def run(*words):
 
 
 def help_of(name, width=100):
-    """Return the help with all options."""
     flag = "--help-all" if name in COMMANDS and load(name).usual else "--help"
     return CliRunner(env={"COLUMNS": str(width)}).invoke(main, [name, flag], prog_name="simdtex").output
 

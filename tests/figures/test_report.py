@@ -155,7 +155,6 @@ def test_heat_grows_in_lightness_and_source_colours_tell_positions_apart():
 
 
 def told(name, level, full, ended=True, **maps):
-    """What a run would tell its callback."""
     picture, stage = full[:: 2**level, :: 2**level], f"level{level}{name}" if ended else None
     return Progress(fraction=0.5, doing="", stage=stage, image=lambda: picture, maps=maps)
 

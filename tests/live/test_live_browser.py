@@ -54,8 +54,6 @@ def chromium(tmp_path_factory):
 
 
 class Page:
-    """A page of the browser."""
-
     def __init__(self, driver, address):
         self.driver, self.folder = driver, driver.folder
         driver.switch_to.new_window("tab")
@@ -72,7 +70,6 @@ class Page:
         return found
 
     def labelled(self, text):
-        """The control that a label of these words is for."""
         label = self.driver.find_element(By.XPATH, f"//label[normalize-space()='{text}']")
         return self.driver.find_element(By.ID, label.get_attribute("for"))
 
@@ -96,11 +93,9 @@ class Page:
         return len(self.all(".strip li:not(.current)"))
 
     def result(self, number, timeout=120):
-        """Wait until there are so many results."""
         until(lambda: self.results == number, timeout)
 
     def put(self, label, value):
-        """Set a control's value as a person does."""
         field = self.labelled(label)
         self.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", field, value)
 
@@ -118,7 +113,6 @@ class Page:
 
     @property
     def command(self):
-        """The words of the command line."""
         return shlex.split(self.one("[aria-label='Command line']").get_attribute("textContent"))
 
     def assert_command_repeats(self, folder):
@@ -162,7 +156,6 @@ class Page:
         return bool((windows == wanted).all((-3, -2, -1)).any())
 
     def faults(self):
-        """What axe-core finds, in words."""
         self.script(AXE.read_text(encoding="utf-8"))
         found = self.driver.execute_async_script("const done = arguments[0]; axe.run(document).then(done)")
         return [f"{one['id']}: {node['html'][:150]}" for one in found["violations"] for node in one["nodes"]]
@@ -196,7 +189,6 @@ def made(page, wall):
 
 @contextmanager
 def beside(page, address):
-    """Another page, in a tab of its own."""
     other = Page(page.driver, address)
     try:
         yield other

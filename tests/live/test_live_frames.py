@@ -21,7 +21,6 @@ def stroke(label, width, *points):
 
 
 def seen(layer, *view, **sides):
-    """The frame of a view, and its pixels, (rows, cols, 3)."""
     frame = render(layer, View(*view, **sides))
     return frame, np.frombuffer(frame.pixels, np.uint8).reshape(frame.height, frame.width, 4)[..., :3]
 

@@ -161,7 +161,6 @@ class NoDevices(SimpleNamespace):
 
 @pytest.fixture
 def platforms(monkeypatch):
-    """Set the platforms of the loader."""
     devices._enumerate.cache_clear()
     yield lambda *found: monkeypatch.setattr(devices, "platforms", lambda: list(found))
     devices._enumerate.cache_clear()
@@ -263,7 +262,6 @@ def test_an_icd_that_names_no_library(tmp_path):
 
 @pytest.fixture
 def intel(monkeypatch, tmp_path):
-    """Pretend that the runtime is installed in this environment."""
     library = tmp_path / "lib" / "libintelocl.so"
     library.parent.mkdir()
     library.touch()

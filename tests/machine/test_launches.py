@@ -13,7 +13,6 @@ PAGE = (ROOT / "docs" / "concepts" / "cost.rst").read_text(encoding="utf-8").par
 
 
 def named():
-    """The names in the first column of the section's tables that could be functions."""
     first = re.findall(r"^   \* - (.*(?:\n       .*)*)", PAGE, re.MULTILINE)
     return {name for cell in first for name in re.findall(r"``([a-z]+(?:_[a-z]+)*)``", cell)}
 

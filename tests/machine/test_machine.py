@@ -42,7 +42,6 @@ MEBIBYTE = 2**20
 
 @pytest.fixture
 def limits(monkeypatch, tmp_path):
-    """Set the free memory, the memory of this process and the texts of the limits of its control group, in files."""
     files = (tmp_path / "memory.max", tmp_path / "memory.limit_in_bytes")
     monkeypatch.setattr(memory, "LIMITS", files)
 
@@ -70,8 +69,6 @@ def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_gr
 
 
 class Gpu(Reference):
-    """A machine with its own memory."""
-
     kind = "gpu"
 
 
@@ -137,7 +134,6 @@ def test_a_limit_of_counting_says_what_is_counted():
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock that stands still until it is moved on."""
     now = [0.0]
     monkeypatch.setattr(simdtex.run.time, "perf_counter", lambda: now[0])
     return now
