@@ -37,7 +37,6 @@ def missing():
 
 
 def chromium():
-    """The path of Chromium, None where there is none."""
     found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
     return next(filter(None, found), None)
 
@@ -64,7 +63,6 @@ def browser(folder=None, *, width=1400, height=1000, dark=False):
 
 
 def shown(driver, *, width, height=1000, dark=False):
-    """Have pages be of a size, and light or dark."""
     size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -88,7 +86,6 @@ def live(*words, **environment):
 
 
 def drop(driver, *paths, place=".simdtex"):
-    """Drop files on the page."""
     files = [[Path(path).name, base64.b64encode(Path(path).read_bytes()).decode()] for path in paths]
     driver.execute_script(DROP, files, place)
 

@@ -12,7 +12,6 @@ from simdtex.machine import open_machine
 
 
 def texture(rows=40, cols=48, channels=3, dtype=np.uint8, seed=0):
-    """A small picture that has some order."""
     rng = np.random.default_rng(seed)
     i, j = np.indices((rows, cols))
     base = 100 + 60 * np.sin(i / 3) * np.cos(j / 4)
@@ -23,7 +22,6 @@ def texture(rows=40, cols=48, channels=3, dtype=np.uint8, seed=0):
 
 
 def striped(channels=3, dtype=np.uint8):
-    """Two textures side by side, of 40 columns each, and noise in 16 more."""
     found, top = texture(48, 96, channels, dtype), np.iinfo(dtype).max
     rng = np.random.default_rng(1)
     i, j = np.indices((48, 40))
@@ -35,7 +33,6 @@ def striped(channels=3, dtype=np.uint8):
 
 
 def png(pixels):
-    """The bytes of a PNG."""
     file = BytesIO()
     PIL.Image.fromarray(pixels).save(file, "PNG")
     return file.getvalue()
@@ -85,7 +82,6 @@ class Fake:
         return self.wait(*([kinds] if isinstance(kinds, str) else kinds), after=after, **(wanted or {}))
 
     def result(self, **settings):
-        """Have something made; what is told of it."""
         message, _ = self.ask(("result", "error"), **asked(**settings))
         assert message["kind"] == "result", message
         return message

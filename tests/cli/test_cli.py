@@ -46,22 +46,6 @@ def test_everything_at_once(folder):
     assert {"level0-sweep01.png", "temperature-level0-sweep01.png"} <= set(names("st"))
 
 
-def test_the_same_seed_gives_the_same_file_of_twice_the_size_and_quiet_says_nothing(folder):
-    assert synth("-q").output == ""
-    first = Path("out.png").read_bytes()
-    assert pixels("out.png").shape == (48, 40)
-    synth("-q")
-    assert Path("out.png").read_bytes() == first
-
-
-def test_an_array_makes_the_same_file_and_an_account(folder):
-    words = ["--size", "9x8", "--schedule", "luby"]
-    plain, made = synth(*words).output, Path("out.png").read_bytes()
-    result = synth(*words, "--array", "4x4:hierarchical")
-    assert all(word in result.output and word not in plain for word in ("4x4 PEs", "utilisation", "X-Net"))
-    assert Path("out.png").read_bytes() == made
-
-
 BAD = {
     "size": ["--size", "large"],
     "smaller size": ["--size", "60000x60000"],

@@ -35,14 +35,12 @@ RUNS = {
 
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
-    """States are written wherever they are at hand."""
     monkeypatch.setattr(checkpoints, "FIRST", 0.0)
     monkeypatch.setattr(checkpoints, "SHARE", 0)
 
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
-    """A folder with inputs, from which commands are given."""
     folder = tmp_path / "begun"
     folder.mkdir()
     image.write(folder / "sample.png", texture((14, 15)))

@@ -26,7 +26,6 @@ PICTURES = ("synth", "fill", "extend", "mix")
 
 
 def parameters(*roles):
-    """The options of every command that have one of these roles."""
     return [
         (name, option)
         for name, command in COMMANDS.items()
@@ -52,7 +51,6 @@ def test_every_path_has_a_role():
 
 
 def words(option, text):
-    """An option with a value."""
     return [text] if isinstance(option, click.Argument) else [option.opts[-1], text]
 
 
@@ -66,12 +64,10 @@ def reading(option, text):
 
 
 def writing(option, text):
-    """An option that writes a file; of a pair, on the right."""
     return words(option, f"map.png={text}" if isinstance(option.type, Pair) else text)
 
 
 def required(command, *but):
-    """What a command cannot do without."""
     given = []
     for option in command.params:
         if option.required and option not in but:

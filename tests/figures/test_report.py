@@ -9,8 +9,6 @@ import PIL.Image
 import pytest
 from cases import texture
 from click.testing import CliRunner
-from hypothesis import given
-from hypothesis import strategies as st
 from pages import assert_needs_nothing_else, embedded, read_page
 
 import simdtex
@@ -142,13 +140,6 @@ def test_a_contact_sheet_shows_every_picture_at_its_own_size(tmp_path):
         sheet.contact_sheet([])
 
 
-@given(st.integers(1, 60), st.integers(1, 60), st.integers(1, 20))
-def test_fitted_keeps_the_bound_and_the_flat(rows, cols, side):
-    reduced = sheet.fitted(np.full((rows, cols, 3), 77, np.uint8), side)
-    assert max(reduced.shape[:2]) <= side
-    assert (reduced == 77).all()
-
-
 def test_heat_grows_in_lightness_and_source_colours_tell_positions_apart():
     heat = temperature_colours(np.linspace(0, 1, 256)).astype(float)
     grey = heat @ [0.2126, 0.7152, 0.0722]
@@ -164,7 +155,6 @@ def test_heat_grows_in_lightness_and_source_colours_tell_positions_apart():
 
 
 def told(name, level, full, ended=True, **maps):
-    """What a run would tell its callback."""
     picture, stage = full[:: 2**level, :: 2**level], f"level{level}{name}" if ended else None
     return Progress(fraction=0.5, doing="", stage=stage, image=lambda: picture, maps=maps)
 

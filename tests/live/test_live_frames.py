@@ -1,7 +1,6 @@
 """Strokes become labels, views of layers become frames, and the controls of the live page are the declared options."""
 
 import json
-import tracemalloc
 from math import inf
 
 import click
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 
 from simdtex import commands as cli
 from simdtex.live import frames
-from simdtex.live.frames import Layer, View, parse_view, render
+from simdtex.live.frames import Layer, View, render
 from simdtex.live.job import LIGHT, TABLES, controls, paint
 from simdtex.options import table
 
@@ -22,7 +21,6 @@ def stroke(label, width, *points):
 
 
 def seen(layer, *view, **sides):
-    """The frame of a view, and its pixels, (rows, cols, 3)."""
     frame = render(layer, View(*view, **sides))
     return frame, np.frombuffer(frame.pixels, np.uint8).reshape(frame.height, frame.width, 4)[..., :3]
 
@@ -79,18 +77,6 @@ def test_a_coarse_level_stands_for_the_whole_and_parts_of_a_large_view_are_the_s
     whole, _ = seen(layer, width=14, height=14, step=3)
     monkeypatch.setattr(frames, "CHUNK", 3 * 3 * 14 * 2)
     assert seen(layer, width=14, height=14, step=3)[0] == whole
-
-
-@pytest.mark.slow
-def test_a_coarse_view_of_a_tiled_layer_takes_little_memory():
-    view = parse_view({"width": 4096, "height": 1024, "step": frames.MAX_STEP, "tiled": True, "left": -(2**14)})
-    layer = Layer((512, 2**14), np.zeros((512, 2**14, 3), np.uint8), np.asarray)
-    tracemalloc.start()
-    frame = render(layer, view)
-    most = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert (frame.width, frame.height) == (96, 2)
-    assert most < 50 * 2**20
 
 
 def test_controls_are_what_options_may_be_and_the_command_line_has_them():

@@ -47,7 +47,6 @@ SETTINGS += " --expose-app-in-browser --ip=127.0.0.1 --ServerApp.port_retries=0 
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory):
-    """The address of a notebook of three cells in JupyterLab."""
     folder = tmp_path_factory.mktemp("lab")
     cells = [nbformat.v4.new_code_cell(code) for code in (CODE, "1", "2")]
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
@@ -100,7 +99,6 @@ def cells(driver):
 
 
 def visible(driver, selector):
-    """The elements of the widget that can be seen."""
     code = "return [...document.querySelectorAll(arguments[0])].filter((each) => each.checkVisibility())"
     return driver.execute_script(code, f".simdtex {selector}")
 

@@ -85,14 +85,12 @@ class Client:
                 return message, buffers
 
     def ended(self):
-        """How the server closes the connection."""
         with pytest.raises(ConnectionClosed) as closed:
             self.wait("closed")
         return closed.value.rcvd
 
 
 def soon(found, timeout=60):
-    """Wait until something is so."""
     end = time.monotonic() + timeout
     while not found():
         assert time.monotonic() < end, "it is not so in time"

@@ -194,7 +194,6 @@ def test_16_bits_stay_and_a_download_has_the_colours_of_the_picture(page):
     [
         ({}, {"finish": 0.5}, 0),
         ({"lattice": "none"}, {"lattice": "none", "search": "exact", "finish": 0}, 2),
-        pytest.param({}, {"search": "exact", "finish": 0}, None, marks=pytest.mark.slow),  # the lattice needs a search
         pytest.param({}, {"edges": "whole"}, None, marks=pytest.mark.slow),
     ],
 )

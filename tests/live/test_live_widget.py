@@ -121,7 +121,6 @@ def test_a_result_shows_its_picture_and_its_arrangement():
 
 
 def executed(book):
-    """The data of the outputs of each cell."""
     NotebookClient(book, timeout=300, kernel_name="python3").execute()
     return [[one.get("data", {}) for one in cell.get("outputs", [])] for cell in book.cells]
 
