@@ -1,6 +1,8 @@
 """Machines: memory and its checks, caches, threads, forked processes, the pace of launches, and profiles."""
 
 import dataclasses
+import functools
+import importlib.util
 import os
 import shutil
 import signal
@@ -42,6 +44,7 @@ MEBIBYTE = 2**20
 
 @pytest.fixture
 def limits(monkeypatch, tmp_path):
+    """Set the free memory, the memory of this process and the texts of the limits of its control group, in files."""
     files = (tmp_path / "memory.max", tmp_path / "memory.limit_in_bytes")
     monkeypatch.setattr(memory, "LIMITS", files)
 
@@ -69,6 +72,8 @@ def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_gr
 
 
 class Gpu(Reference):
+    """A machine with its own memory."""
+
     kind = "gpu"
 
 
@@ -129,11 +134,32 @@ def test_a_limit_of_counting_says_what_is_counted():
             simdtex.synthesize(SAMPLE, shape, method=method, device="reference", rng=1)
 
 
+@functools.cache
+def benchmark():
+    spec = importlib.util.spec_from_file_location("memory_benchmark", ROOT / "benchmarks" / "memory.py")
+    module = importlib.util.module_from_spec(spec)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "benchmarks"))
+        spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channels, dtype", [(1, "uint8"), (3, "float64")])
+@pytest.mark.parametrize("name", benchmark().CASES)
+def test_no_run_takes_more_than_was_asked_for(name, channels, dtype, any_device):
+    kind, options = benchmark().CASES[name]
+    small, side = (24, 80) if kind == "solid" else (128, 1024)
+    grown, asked, _ = benchmark().run(kind, small, side, channels, dtype, str(any_device.index), options)
+    assert 0.3 * (asked - memory.TEMPORARY) < grown <= asked, "and not far less, but for what is asked for at any size"
+
+
 # -- Progress, and the pace of launches.
 
 
 @pytest.fixture
 def clock(monkeypatch):
+    """A clock that stands still until it is moved on."""
     now = [0.0]
     monkeypatch.setattr(simdtex.run.time, "perf_counter", lambda: now[0])
     return now
