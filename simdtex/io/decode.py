@@ -189,7 +189,8 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> _Stored:
         pixels = np.frombuffer(data, dtype, prod(shape), header.end())
     else:
         text = re.sub(rb"#[^\r\n]*", b"", data[header.end() :])
-        pixels = np.fromstring(text.decode("ascii"), np.int64, prod(shape), sep=" ")
+        values = np.fromstring(text.decode("ascii"), np.int64, sep=" ")  # with a count NumPy 2.4 makes up what lacks
+        pixels = values[: prod(shape)]
     if pixels.size < prod(shape):
         raise ValueError("it ends before its last pixel")
     if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
