@@ -333,7 +333,7 @@ def test_a_run_pauses_and_resumes_and_the_last_request_counts(opened):
     after = len(opened.got)
     begin_and_pause(opened, seed=1)
     opened.ask("ended", png(texture(seed=3)), kind="open", name="other.png")
-    assert opened.kinds(after)[-2:] == ["picture", "ended"]
+    assert [kind for kind in opened.kinds(after) if kind in ("picture", "ended")][-2:] == ["picture", "ended"]
 
 
 def test_maps_have_the_pictures_size_and_are_carried_along(opened, monkeypatch):
