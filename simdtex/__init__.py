@@ -44,19 +44,19 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib.metadata import version
 
-        found: object = version("simdtex")
+        value: object = version("simdtex")
     elif home:
         from importlib import import_module
 
-        found = import_module(f"{home}.{name}") if name in _MODULES else getattr(import_module(home), name)
+        value = import_module(f"{home}.{name}") if name in _MODULES else getattr(import_module(home), name)
     else:
         from difflib import get_close_matches
 
         near = [ours for ours, theirs in _WORDS.items() if name in theirs] or get_close_matches(name, __all__, 1)
         meant = f"; did you mean {near[0]!r}?" if near else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{meant}")
-    globals()[name] = found  # the next time it is found without this function
-    return found
+    globals()[name] = value  # the next time it is found without this function
+    return value
 
 
 def __dir__() -> list[str]:

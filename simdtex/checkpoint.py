@@ -123,12 +123,12 @@ class Checkpoint:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
         self._used = True
         with exclusive(self.path):
-            seed, found = self._open(job, rng, inputs(), device)
-            self.running, self.resumed = True, found is not None
+            seed, state = self._open(job, rng, inputs(), device)
+            self.running, self.resumed = True, state is not None
             try:
-                yield seed, Checkpointing(found, self.offer, lambda: self.stopping)
+                yield seed, Checkpointing(state, self.offer, lambda: self.stopping)
             except (ValueError, TypeError):  # the input, which a plan finds out; a checkpoint of it is of no use
-                if not self._saved and found is None:
+                if not self._saved and state is None:
                     self.remove()
                 raise
             finally:
@@ -136,7 +136,7 @@ class Checkpoint:
 
     def _open(self, job: str, rng: Any, inputs: dict[str, Any], device: str) -> tuple[int, Any]:
         """Return the seed and the state to continue from; write the file if it is new."""
-        about, found = read(self.path) if self.path.exists() else (None, None)
+        about, state = read(self.path) if self.path.exists() else (None, None)
         now = {"job": job, **{name: identity(value) for name, value in inputs.items()}}
         seed = None if rng is None else as_seed(rng)
         if about is not None:
@@ -153,7 +153,7 @@ class Checkpoint:
         self._about["device"] = device
         if about is None:
             self._write(None)
-        return seed, found
+        return seed, state
 
     def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
         """Raise if the file belongs to another run; the message gives the difference."""
@@ -214,11 +214,11 @@ def begin_run(
     if checkpoint is None or isinstance(checkpoint, Checkpointing):
         yield as_seed(rng), checkpoint or Checkpointing()
         return
-    own = not isinstance(checkpoint, Checkpoint)
+    made = not isinstance(checkpoint, Checkpoint)
     kept = checkpoint if isinstance(checkpoint, Checkpoint) else Checkpoint(checkpoint)
     with kept.begin(job, rng, inputs, device) as run:
         yield run
-    if own:
+    if made:
         kept.remove()
 
 
@@ -249,7 +249,7 @@ def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
     text, arrays = pack(tree)
 
     def write(file: BinaryIO) -> None:
-        named: dict[str, Any] = {str(number): array for number, array in enumerate(arrays)}
+        named: dict[str, Any] = {str(index): array for index, array in enumerate(arrays)}
         named["about"] = np.frombuffer(json.dumps(about | {"tree": text}).encode(), np.uint8)
         np.savez(file, **named)
 
@@ -262,7 +262,7 @@ def read_state(path: Path) -> tuple[dict[str, Any], Any]:
         with read_checked(path) as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
-        return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
+        return about, unpack(about.pop("tree"), [arrays[str(index)] for index in range(len(arrays))])
     except (ValueError, KeyError, BadZipFile):
         raise Damaged(f"{path} is damaged") from None
 
@@ -305,10 +305,10 @@ def unpack(text: str, arrays: Sequence[NDArray[Any]]) -> Any:
 
     def kept(node: dict[str, Any]) -> Any:
         match node:
-            case {"array": int(number)}:
-                return arrays[number]
-            case {"scalar": int(number)}:
-                return arrays[number][()]
+            case {"array": int(index)}:
+                return arrays[index]
+            case {"scalar": int(index)}:
+                return arrays[index][()]
         return node
 
     return json.loads(text, object_hook=kept)

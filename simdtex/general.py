@@ -53,13 +53,13 @@ def resume(path: Path, workers: int | str | None, device: str | None, quiet: boo
     if command is None:
         raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
     again = load(command["name"]) if command["name"] in COMMANDS else None
-    if again is None or all(one.name != "checkpoint" for one in again.params):
+    if again is None or all(param.name != "checkpoint" for param in again.params):
         raise ValueError(f"the checkpoint in {path} is of a command that cannot be resumed; run that again")
     if not os.path.isdir(command["folder"]):
         raise ValueError(f"{command['folder']}, the folder of the run in {path}, does not exist; restore it")
-    given = {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
+    values = {"checkpoint": path.resolve(), "device": device, "quiet": quiet}
     with chdir(command["folder"]), again.make_context(f"simdtex {again.name}", list(command["words"])) as context:
-        context.params |= {name: value for name, value in given.items() if value}
+        context.params |= {name: value for name, value in values.items() if value}
         again.invoke(context)
 
 

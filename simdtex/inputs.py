@@ -77,27 +77,27 @@ def check_inputs(
 ) -> Inputs:
     """Check the arrays of a job, as in `simdtex.synthesize`, and return them; ``sample`` may already be checked."""
     pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
-    given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
-    return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
+    data = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
+    return Inputs(pictures, data, None if guide is None else check_guide(guide, shape, pictures))
 
 
 def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
     """Check a sample, or a list or tuple of samples, with the mask or masks of usable pixels, and return them."""
     several = is_several(sample, channel_axis, axes)
-    arrays: list[Any] = [as_array("a sample", one) for one in sample] if several else [sample]
-    if several and len(kinds := {one.ndim for one in arrays}) > 1:
+    arrays: list[Any] = [as_array("a sample", picture) for picture in sample] if several else [sample]
+    if several and len(kinds := {array.ndim for array in arrays}) > 1:
         counts = f"{min(kinds)} and {max(kinds)}"
         raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
-    pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
-    for number, picture in enumerate(pixels[1:], 1):
-        check_alike(f"sample {number}", picture, "sample 0", pixels[0])
+    pixels, unknown = zip(*(check_picture(array, channel_axis, axes) for array in arrays), strict=True)
+    for index, picture in enumerate(pixels[1:], 1):
+        check_alike(f"sample {index}", picture, "sample 0", pixels[0])
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
     if len(masks) != len(pixels):
         raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
-    usable = tuple(check_mask(one, picture.shape[:-1]) for one, picture in zip(masks, pixels, strict=True))
-    if not any(one.any() for one in usable):
+    usable = tuple(check_mask(array, picture.shape[:-1]) for array, picture in zip(masks, pixels, strict=True))
+    if not any(array.any() for array in usable):
         raise ValueError("the mask leaves nothing of the sample to be used; set it True where pixels may be taken from")
     return Pictures(pixels, unknown, usable)
 
@@ -114,7 +114,7 @@ def is_several(sample: Any, channel_axis: int | None, axes: int = 2) -> bool:
     """Return whether a sample is a list or tuple of samples, and not one array written as a list."""
     if not isinstance(sample, (list, tuple)):
         return False
-    each = [0 if isinstance(one, (list, tuple)) else np.ndim(one) for one in sample]
+    each = [0 if isinstance(item, (list, tuple)) else np.ndim(item) for item in sample]
     return axes + (channel_axis is not None) in each and min(each) >= 2
 
 
@@ -129,7 +129,7 @@ def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = 
 
 def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) -> HardData | NDArray[Any]:
     """Return known values as an array or as a table; codes of unknown ones within ``pictures`` are values."""
-    if isinstance(known, (str, os.PathLike)) or all(isinstance(one, str) for one in getattr(known, "columns", [0])):
+    if isinstance(known, (str, os.PathLike)) or all(isinstance(text, str) for text in getattr(known, "columns", [0])):
         if pictures is None:
             return read_hard_data(known)
         low, high = _ranges(pictures)
@@ -140,7 +140,7 @@ def as_known(known: Any, name: str = "known", pictures: Pictures | None = None) 
 def _ranges(pictures: Pictures) -> tuple[Any, Any]:
     """Return the smallest and the largest known value of each variable of the samples."""
     ends = np.fmin, np.fmax
-    low, high = (end.reduce([end.reduce(one, tuple(range(one.ndim - 1))) for one in pictures.pixels]) for end in ends)
+    low, high = (f.reduce([f.reduce(array, tuple(range(array.ndim - 1))) for array in pictures.pixels]) for f in ends)
     return low, high
 
 
@@ -181,11 +181,11 @@ def check_known(
     if there.all():
         raise ValueError("known leaves nothing to do; give NaN or a masked array where the output is to be made")
     kept = np.where(there, values, np.zeros((), values.dtype))
-    found, wrong = cast(kept, dtype)
+    converted, wrong = cast(kept, dtype)
     if wrong.any():
         raise ValueError(f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give such values")
-    _warn_beyond(found, there, pictures)
-    return Given(found, there, None if source is None else _check_source(source, there, pictures))
+    _warn_beyond(converted, there, pictures)
+    return Given(converted, there, None if source is None else _check_source(source, there, pictures))
 
 
 def _warn_beyond(values: NDArray[Any], there: NDArray[np.bool_], pictures: Pictures) -> None:
@@ -233,17 +233,17 @@ def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> Guide
         raise ValueError(f"there are {count} samples; give a list of a guide for each")
     listed = count > 1 or (isinstance(first, (list, tuple)) and len(first) == 1 and hasattr(first[0], "ndim"))
     axes = len(shape)
-    samples = tuple(_guide("the guide of the sample", one, axes) for one in (first if listed else [first]))
+    samples = tuple(_guide("the guide of the sample", array, axes) for array in (first if listed else [first]))
     output = _guide("the guide of the output", second, axes)
-    for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
-        which = f"sample {number}" if count > 1 else "the sample"
-        _check_size(f"the guide of {which}", one.shape[:-1], which, picture.shape[:-1])
-        if one.shape[-1] != output.shape[-1]:
+    for index, (array, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
+        which = f"sample {index}" if count > 1 else "the sample"
+        _check_size(f"the guide of {which}", array.shape[:-1], which, picture.shape[:-1])
+        if array.shape[-1] != output.shape[-1]:
             raise ValueError(
-                f"the guide of the sample has {one.shape[-1]} channels and that of the output {output.shape[-1]}; "
+                f"the guide of the sample has {array.shape[-1]} channels and that of the output {output.shape[-1]}; "
                 "give as many"
             )
-        if unknown_in(one).any():
+        if unknown_in(array).any():
             raise ValueError("the guide of the sample has NaN; give a number everywhere; NaN is for that of the output")
     _check_size("the guide of the output", output.shape[:-1], "the output", shape)
     return samples, output

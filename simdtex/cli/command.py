@@ -52,8 +52,8 @@ OPTION_WORDS = {
 class Command(click.Command):
     """Command with ``examples``, and the names of its ``usual`` options, which ``--help`` lists; others, --help-all."""
 
-    def __init__(self, *args: Any, examples: Examples = (), usual: str = "", **given: Any) -> None:
-        super().__init__(*args, **given)
+    def __init__(self, *args: Any, examples: Examples = (), usual: str = "", **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
         self.examples, self.usual = examples, usual.split()
         if usual:
             flags = {"is_flag": True, "is_eager": True, "expose_value": False}
@@ -68,10 +68,10 @@ class Command(click.Command):
             settle(error)
             raise
         except click.NoSuchOption as error:
-            own = {flag for param in self.params for flag in param.opts}
+            flags = {flag for param in self.params for flag in param.opts}
             ours = [ours for ours, theirs in OPTION_WORDS.items() if error.option_name in theirs]
-            if found := [one for one in ours if one in own or not one.startswith("-")]:
-                ctx.fail(f"No such option '{error.option_name}': use {' or '.join(found)}.")
+            if options := [option for option in ours if option in flags or not option.startswith("-")]:
+                ctx.fail(f"No such option '{error.option_name}': use {' or '.join(options)}.")
             raise
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -81,7 +81,7 @@ class Command(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the usual options, or all in groups if there are many."""
-        entries = {_name(one): entries_of(one, ctx) for one in self.get_params(ctx)}
+        entries = {_name(param): entries_of(param, ctx) for param in self.get_params(ctx)}
         if self.usual and not ctx.meta.get(ALL):
             records = [entries[name][0][1] for name in (*self.usual, "help")]
             with formatter.section("Usual options"):
@@ -91,7 +91,7 @@ class Command(click.Command):
             formatter.write_text(f"`{ctx.command_path} --help-all` lists the other {others} options too.")
             return
         groups: dict[str, list[tuple[str, str]]] = {title: [] for title in FIRST}
-        for title, record in (entry for one in entries.values() for entry in one):
+        for title, record in (entry for pairs in entries.values() for entry in pairs):
             groups.setdefault(title, []).append(record)
         groups = {title: groups[title] for title in sorted(groups, key=_rank)}
         if sum(map(len, groups.values())) <= FEW:
@@ -129,15 +129,15 @@ def entries_of(param: click.Parameter, ctx: click.Context) -> list[tuple[str, tu
         return []
     methods: dict[str, str] = getattr(param, "methods", {})
     group = getattr(param, "group", DEVICE_GROUP if _name(param).startswith("help") else JOB)
-    if methods and any(one.name == "method" for one in ctx.command.params):
+    if methods and any(param.name == "method" for param in ctx.command.params):
         return [(f"Method {method}: {group.lower()}", (record[0], text)) for method, text in methods.items()]
     return [(group, record)]
 
 
 def write_examples(examples: Examples, formatter: click.HelpFormatter) -> None:
     """Write examples, each with what it does above it."""
-    for number, (words, what) in enumerate(examples):
-        if not number:
+    for index, (words, what) in enumerate(examples):
+        if not index:
             formatter.write_paragraph()
         formatter.indent()
         formatter.write_text(f"# {what}")
@@ -196,15 +196,15 @@ def reporting() -> Iterator[None]:
     settle()
 
 
-def give_up(context: click.Context, number: int, before: dict[Path, Any]) -> NoReturn:
+def give_up(context: click.Context, signum: int, before: dict[Path, Any]) -> NoReturn:
     """Say that the command was stopped, and how to go on or what was written, and exit with the code of a signal."""
     path: Path | None = context.meta.get(RESUME)
-    written = ", ".join(str(one) for one, state in outputs(context).items() if before.get(one) != state)
+    written = ", ".join(str(path) for path, state in outputs(context).items() if before.get(path) != state)
     how = f"written so far: {written}" if written else "nothing was written"
     how = f"continue with: simdtex resume {path}" if path and path.exists() else how
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
     note(f"stopped; {how}")
-    sys.exit(128 + number)
+    sys.exit(128 + signum)
 
 
 @contextmanager
@@ -213,35 +213,35 @@ def catch_signals(context: click.Context) -> Iterator[None]:
     caught: list[int] = []
     raised = 0.0
 
-    def handle(number: int, frame: FrameType | None) -> None:
+    def handle(signum: int, frame: FrameType | None) -> None:
         nonlocal raised
         if context.obj and context.obj.running and not caught:
-            caught.append(number)
+            caught.append(signum)
             context.obj.stop()
             os.write(2, b"\nsimdtex: stopping after the current step; a second signal stops at once\n")
             return
-        if postponed(frame, number):
+        if postponed(frame, signum):
             return
         last, raised = raised, time.monotonic()
-        if number == signal.SIGINT or raised - last > 1:  # some programs send SIGTERM twice at once
-            raise Ended(number)
+        if signum == signal.SIGINT or raised - last > 1:  # some programs send SIGTERM twice at once
+            raise Ended(signum)
 
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            number: int | None = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
-                before[number] = signal.signal(number, handle)
+            signum: int | None = getattr(signal, name, None)
+            if signum is not None and signal.getsignal(signum) not in (signal.SIG_IGN, None):
+                before[signum] = signal.signal(signum, handle)
     try:
         yield
     except KeyboardInterrupt as signalled:
         raise (signalled if signalled.args or not caught else Ended(caught[0])) from None
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
 
 
-def postponed(frame: FrameType | None, number: int = signal.SIGINT) -> bool:
+def postponed(frame: FrameType | None, signum: int = signal.SIGINT) -> bool:
     """Return whether an exception would do harm in a frame, and if so have the signal come again a little later."""
     # An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
     # but printed; the search for runtimes would leave its temporary folder; and an HDF5 file that is half open prints a
@@ -249,7 +249,7 @@ def postponed(frame: FrameType | None, number: int = signal.SIGINT) -> bool:
     while frame:
         name, path = str(frame.f_globals.get("__name__")), frame.f_code.co_filename
         if name.startswith(UNINTERRUPTED) or path.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
-            again = threading.Timer(0.02, interrupt_main, (number,))
+            again = threading.Timer(0.02, interrupt_main, (signum,))
             again.daemon = True
             again.start()
             return True
@@ -342,11 +342,11 @@ class Pair(click.types.StringParamType):
         if not isinstance(value, str) or not isinstance(param, click.Option):
             return value
         cuts = [(value[:at], value[at + 1 :]) for at, letter in enumerate(value) if letter == "="] or [(value, "")]
-        found = [] if self.named else [cut for cut in cuts if all(map(os.path.exists, files(cut[0])))]
-        if len(found) > 1:
-            two = f"{found[0][0]} and {found[1][0]}"
+        fitting = [] if self.named else [cut for cut in cuts if all(map(os.path.exists, files(cut[0])))]
+        if len(fitting) > 1:
+            two = f"{fitting[0][0]} and {fitting[1][0]}"
             raise ValueError(f"{param.opts[-1]} {value} has two meanings, since {two} exist: rename one of them")
-        left, right = (found or cuts)[0]
+        left, right = (fitting or cuts)[0]
         if not (left and right):
             raise ValueError(f"{param.opts[-1]} {value!r} must be {param.metavar}")
         return (left, files(right)) if self.named else (files(left), Path(right))
@@ -372,12 +372,12 @@ class Named(NamedTuple):
 def check_places(context: click.Context) -> None:
     """Raise if a command would overwrite what it reads, or one of its outputs another."""
     named = list(_named(context))
-    reads = [one for one in named if one.role in READING]
-    writes = [one for one in named if one.role not in READING]
-    for number, out in enumerate(writes):
-        for one in reads:
-            check_input(out, one)
-        for other in writes[:number]:
+    reads = [place for place in named if place.role in READING]
+    writes = [place for place in named if place.role not in READING]
+    for index, out in enumerate(writes):
+        for read in reads:
+            check_input(out, read)
+        for other in writes[:index]:
             if _same(out.path, other.path):
                 raise ValueError(f"{out.path} would be written twice; give each output a file of its own")
             for inner, outer in ((out, other), (other, out)):
@@ -391,20 +391,20 @@ def check_places(context: click.Context) -> None:
 
 def outputs(context: click.Context) -> dict[Path, tuple[int, int]]:
     """Return the outputs of a command that exist, each with its inode and the time of its last change."""
-    there = [one.path for one in _named(context) if one.role not in READING and os.path.exists(one.path)]
+    there = [place.path for place in _named(context) if place.role not in READING and os.path.exists(place.path)]
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in there}
 
 
-def check_input(out: Named, one: Named) -> None:
+def check_input(out: Named, read: Named) -> None:
     """Raise if an output would overwrite or remove an input, or change a folder that is one."""
-    if _same(out.path, one.path):
+    if _same(out.path, read.path):
         raise ValueError(f"{out.path} is an input and would be overwritten; give the output another name")
     folder = out.role == "folder" or (out.role == "either" and out.path.is_dir())
-    link = _real(one.path.parent) / one.path.name  # a link in the folder would be removed
-    if folder and (_within(one.path, out.path) or link.is_relative_to(_real(out.path))):
-        raise ValueError(f"{one.path} is an input and is in {out.path}, which would be replaced; give another folder")
-    if one.role == "enter" and _within(out.path, one.path):
-        raise ValueError(f"{out.path} would be written into {one.path}, which is an input; give another folder")
+    link = _real(read.path.parent) / read.path.name  # a link in the folder would be removed
+    if folder and (_within(read.path, out.path) or link.is_relative_to(_real(out.path))):
+        raise ValueError(f"{read.path} is an input and is in {out.path}, which would be replaced; give another folder")
+    if read.role == "enter" and _within(out.path, read.path):
+        raise ValueError(f"{out.path} would be written into {read.path}, which is an input; give another folder")
 
 
 def _named(context: click.Context) -> Iterator[Named]:
@@ -414,13 +414,13 @@ def _named(context: click.Context) -> Iterator[Named]:
         if parameter.name == "preview" and value:
             yield Named(preview_of(context.params["output"]), "write")
         several = parameter.multiple or parameter.nargs < 0
-        for one in (value or ()) if several else [value]:
-            if one is None:
+        for item in (value or ()) if several else [value]:
+            if item is None:
                 continue
             if isinstance(kind, PathType):
-                yield Named(Path(one), kind.role)
+                yield Named(Path(item), kind.role)
             elif isinstance(kind, Pair):
-                left, right = one
+                left, right = item
                 yield from (Named(path, "read") for path in (right if kind.named else left))
                 if not kind.named:
                     yield Named(right, kind.role)

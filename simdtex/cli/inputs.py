@@ -121,41 +121,41 @@ def size_text(pixels: NDArray[Any]) -> str:
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def without_alpha(one: Read, count: int) -> np.ma.MaskedArray[Any, Any]:
+def without_alpha(read: Read, count: int) -> np.ma.MaskedArray[Any, Any]:
     """Return a picture without the alpha that pictures of so many channels lack, masked where it is transparent."""
     from simdtex.io.image import split_alpha
 
-    pixels, plain = one.pixels, one.grid is not None or bool(one.metadata and one.metadata.plain)
-    found: NDArray[Any] = np.ma.getdata(pixels)
+    pixels, plain = read.pixels, read.grid is not None or bool(read.metadata and read.metadata.plain)
+    picture: NDArray[Any] = np.ma.getdata(pixels)
     gone: NDArray[np.bool_] = np.asarray(planes(np.ma.getmaskarray(pixels)).any(-1))
-    if channels(found) == count + 1 and not plain:
-        found, clear = split_alpha(found)
+    if channels(picture) == count + 1 and not plain:
+        picture, clear = split_alpha(picture)
         gone = gone | clear
-    return np.ma.MaskedArray(found, np.broadcast_to(gone if found.ndim == 2 else gone[..., None], found.shape))
+    return np.ma.MaskedArray(picture, np.broadcast_to(gone if picture.ndim == 2 else gone[..., None], picture.shape))
 
 
 def read_picture(path: Path, how: Reading = PLAIN) -> Image:
     """Read a picture, and say so if its file has more than one."""
     from simdtex.io import image
 
-    found = image.read(path, palette=how.palette, ascending=how.ascending)
-    if found.metadata.more:
+    picture = image.read(path, palette=how.palette, ascending=how.ascending)
+    if picture.metadata.more:
         note(f"{path} has several frames or pages; only the first is read")
-    return found
+    return picture
 
 
-def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> None:
+def check_profiles(paths: Sequence[Path], about: Sequence[Metadata | None]) -> None:
     """Raise unless pictures that are used together have the same colour profile, sRGB by default, and palette."""
     from simdtex.io.decode import NOTHING
     from simdtex.io.image import profile_name
 
     # grids and arrays hold numbers alone, in whatever colours
-    told = [(path, one) for path, one in zip(paths, found, strict=True) if one and not one.ascending and one != NOTHING]
+    told = [(path, tag) for path, tag in zip(paths, about, strict=True) if tag and not tag.ascending and tag != NOTHING]
     for path, other in told[1:]:
-        first, own = told[0]
-        if other.profile != own.profile and {*(names := [profile_name(a.profile) for a in (other, own)])} != {"sRGB"}:
+        first, tag = told[0]
+        if other.profile != tag.profile and {*(names := [profile_name(a.profile) for a in (other, tag)])} != {"sRGB"}:
             raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
-        if any(a != b for a, b in zip(other.palette or b"", own.palette or b"", strict=False)):
+        if any(a != b for a, b in zip(other.palette or b"", tag.palette or b"", strict=False)):
             raise ValueError(f"{path} and {first} have different palettes; save both with the same palette")
 
 
@@ -183,10 +183,10 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
         deep = volume.is_volume(path, how.channels or not how.deep)
         grid = volume.read(path, ascending=how.deep) if deep else None
     if grid is None:
-        found = read_picture(path, how)
-        if path.suffix.lower() == ".npy" and not how.channels and (count := channels(found.pixels)) > 4:
+        picture = read_picture(path, how)
+        if path.suffix.lower() == ".npy" and not how.channels and (count := channels(picture.pixels)) > 4:
             note(f"{path} is read as a picture of {count} channels; for a volume use simdtex simulate, with --known")
-        return Read(found.pixels, found.metadata)
+        return Read(picture.pixels, picture.metadata)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not how.deep:
         raise ValueError(f"{path} is a volume: use simdtex simulate, which fills it as --known")
@@ -197,15 +197,15 @@ def read_pixels(path: Path, how: Reading = PLAIN) -> Read:
 
 def read_material(paths: Sequence[Path], how: Reading = PLAIN) -> Material:
     """Read pictures or grids, or with ``how.deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, metadata, found = zip(*(read_pixels(path, how) for path in paths), strict=True)
+    pictures, metadata, grids = zip(*(read_pixels(path, how) for path in paths), strict=True)
     check_profiles(paths, metadata)
-    volumes = [one.ndim == 4 for one in pictures]
+    volumes = [picture.ndim == 4 for picture in pictures]
     if len({*volumes}) > 1:
         volume, other = paths[volumes.index(True)], paths[volumes.index(False)]
         raise ValueError(f"{volume} is a volume and {other} is none; give volumes, or pictures")
-    pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
+    pixels = [picture[..., 0] if picture.shape[-1] == 1 and picture.ndim > 2 else picture for picture in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    return Material(tuple(paths), pixels, None if plain else -1, found[0], volumes[0], metadata[0])
+    return Material(tuple(paths), pixels, None if plain else -1, grids[0], volumes[0], metadata[0])
 
 
 def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
@@ -235,7 +235,7 @@ def check_output(
 
 def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, files: bool = True) -> list[Also]:
     """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
-    found = []
+    carried = []
     for paths, out in pairs:
         check_each("--also", paths, samples)
         maps = read_material(paths, Reading(ascending=samples.ascending))
@@ -246,8 +246,8 @@ def read_also(pairs: Sequence[tuple[list[Path], Path]], samples: Material, *, fi
                 raise ValueError(f"{sizes}; give --also a map of the sample's size")
         if files:
             check_output(out, maps.pixels[0], maps.metadata)
-        found.append(Also(maps, out))
-    return found
+        carried.append(Also(maps, out))
+    return carried
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
@@ -314,13 +314,13 @@ def read_table(
     kind = grids.kind_of(path)
     if kind != "points" and (kind is not None or path.suffix.lower() not in SUFFIXES):
         return None
-    found = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
-    if found.from_top:
+    table = read_hard_data(path, columns=how.columns, categories=how.categories, missing=how.missing, valid=valid)
+    if table.from_top:
         note(f"{path}: rows count from the top of the output, from 0 on")
     elif samples.grid is None:
         bottom = f"as in {like}" if like else f"and y = {origin[1] if origin else 0:g} is the bottom row of the output"
         note(f"{path}: y points north, {bottom}")
-    return found
+    return table
 
 
 def read_known(
@@ -338,13 +338,13 @@ def read_known(
         return table, None
     how = how._replace(valid=samples.limits, variables=variables, channels=not samples.deep)
     how = how._replace(palette=how.palette and samples.channel_axis is None)
-    one = read_pixels(path, how)
-    check_profiles([samples.paths[0], path], [samples.metadata, one.metadata])
-    if one.grid is not None and how.deep:
-        return in_place(one.pixels, one.grid), None
-    found = without_alpha(one, channels(samples.pixels[0]))
-    place = one.metadata and one.metadata.geo and one.metadata.geo.place()
-    return found.reshape(found.shape[:2]) if channels(found) == 1 else found, place
+    read = read_pixels(path, how)
+    check_profiles([samples.paths[0], path], [samples.metadata, read.metadata])
+    if read.grid is not None and how.deep:
+        return in_place(read.pixels, read.grid), None
+    picture = without_alpha(read, channels(samples.pixels[0]))
+    place = read.metadata and read.metadata.geo and read.metadata.geo.place()
+    return picture.reshape(picture.shape[:2]) if channels(picture) == 1 else picture, place
 
 
 def take_reading(options: dict[str, Any], deep: bool = False) -> Reading:
@@ -389,20 +389,20 @@ def read_guides(
     paths, out = pair
     check_each("--guide", paths, samples)
     as_labels = Reading(how.deep, palette=True, channels=True, ascending=how.ascending)
-    found = [read_pixels(path, as_labels) for path in (*paths, out)]
-    pictures = tuple(one.pixels for one in found)
-    if volumes := [path for path, one in zip((*paths, out), pictures, strict=True) if one.ndim > 3]:
+    read = [read_pixels(path, as_labels) for path in (*paths, out)]
+    pictures = tuple(guide.pixels for guide in read)
+    if volumes := [path for path, guide in zip((*paths, out), pictures, strict=True) if guide.ndim > 3]:
         raise ValueError(f"{volumes[0]} is a volume; give a guide of one layer")
-    palettes = [one.metadata and one.metadata.palette for one in found]
+    palettes = [guide.metadata and guide.metadata.palette for guide in read]
     if all(palettes) or len({*palettes} - {None}) > 1 or max(map(channels, pictures)) > 2:
         pictures = tuple(map(coloured, pictures, palettes))  # the order of colours may differ
-    *own, wanted = pictures
-    shown = without_alpha(found[-1]._replace(pixels=wanted), channels(own[0]))
+    *guides, wanted = pictures
+    shown = without_alpha(read[-1]._replace(pixels=wanted), channels(guides[0]))
     wanted, free = shown.data, planes(np.ma.getmaskarray(shown)).any(-1) | unknown_in(planes(shown.data))
-    are_few = few([one.reshape(*one.shape[:2], -1) for one in own], LABELS if all(palettes) else CATEGORIES)
-    colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
+    are_few = few([guide.reshape(*guide.shape[:2], -1) for guide in guides], LABELS if all(palettes) else CATEGORIES)
+    colours = all(guide.dtype == np.uint8 and channels(guide) == channels(wanted) > 1 for guide in (*guides, wanted))
     if labels is not False and colours and (labels or are_few):
-        known = np.unique(np.concatenate([one.reshape(-1, channels(one)) for one in own]), axis=0)
+        known = np.unique(np.concatenate([guide.reshape(-1, channels(guide)) for guide in guides]), axis=0)
         strange = [colour for colour in np.unique(wanted[~free], axis=0) if not (known == colour).all(-1).any()]
         if strange:
             more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""
@@ -411,23 +411,23 @@ def read_guides(
                 f"{'does' if len(paths) == 1 else 'do'} not have; paint with the colours of the labels, without soft "
                 "edges, or give --no-labels"
             )
-        own, wanted, labels = [_numbers(one, known) for one in own], _numbers(wanted, known), True
+        guides, wanted, labels = [_numbers(guide, known) for guide in guides], _numbers(wanted, known), True
     elif labels is None and free.any():  # in floats, that they are whole numbers would no longer be seen
-        labels = all(one.dtype.kind in "iu" for one in (*own, wanted)) and are_few
+        labels = all(guide.dtype.kind in "iu" for guide in (*guides, wanted)) and are_few
     if free.any():
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
-    grid = found[-1].grid
+    grid = read[-1].grid
     output = in_place(planes(wanted), grid) if how.deep and grid else wanted
-    return (own if samples.several else own[0], output), labels
+    return (guides if samples.several else guides[0], output), labels
 
 
 def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:
     """Return the number of each pixel's colour, (rows, cols)."""
-    found = np.zeros(pixels.shape[:2], np.int64)
-    for number, colour in enumerate(known):
-        found[(pixels == colour).all(-1)] = number
-    return found
+    labels = np.zeros(pixels.shape[:2], np.int64)
+    for label, colour in enumerate(known):
+        labels[(pixels == colour).all(-1)] = label
+    return labels
 
 
 @dataclass
@@ -452,10 +452,10 @@ class Folder:
             if maps.sizes != lead.sizes:
                 sizes = f"{path} is {size_text(maps.pixels[0])} and {self.lead.name} {size_text(lead.pixels[0])}"
                 raise ValueError(f"{sizes}: scale it to that size, or move it out of the folder")
-            own, plain = maps.pixels[0], bool(maps.metadata and maps.metadata.plain)
-            suffix = suitable_suffix(own.dtype, channels(own), path.suffix, plain=plain)
+            pixels, plain = maps.pixels[0], bool(maps.metadata and maps.metadata.plain)
+            suffix = suitable_suffix(pixels.dtype, channels(pixels), path.suffix, plain=plain)
             self.maps.append(Also(maps, self.output / f"{path.stem}{suffix}"))
-        names = [one.out.name for one in self.maps]
+        names = [maps.out.name for maps in self.maps]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"{self.output / twice[0]} would be written twice: move one of the maps out of the folder")
         earlier_files(self.output, "the maps", names.__contains__)
@@ -471,8 +471,8 @@ class Folder:
             made = unit_normals(made, (made != lead.carried(run.source)).any(axis=2))
         with atomic_folder(self.output) as temporary:
             image.write(temporary / lead.out.name, made, metadata)
-            for one in others:
-                one._replace(out=temporary / one.out.name).write(metadata, made, run)
+            for maps in others:
+                maps._replace(out=temporary / maps.out.name).write(metadata, made, run)
 
     def __str__(self) -> str:
         return f"{self.output} ({len(self.maps)} maps arranged by {self.lead.name})"
@@ -506,7 +506,7 @@ def arranged(
     else:
         check_output(output, pixels, metadata, options.get("categorical"), kept)
         writers = [lambda made, run: image.write(output, made, metadata)]
-    writers += [partial(one.write, metadata) for one in others]
+    writers += [partial(maps.write, metadata) for maps in others]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     if options.pop("preview", False):
@@ -542,7 +542,7 @@ def read_lead(
     picture = pictures[0] if len(pictures) == 1 else Path("-")
     whole = picture.is_dir()
     folder = picture if whole else picture.parent
-    named, found = {}, None
+    named, maps = {}, None
     roles: Sequence[tuple[str, list[Path]]] = options.pop("roles")
     for role, (path, *_) in roles:
         if role not in ROLES:
@@ -550,27 +550,27 @@ def read_lead(
         named[path if path.parent.parts else folder / path] = role
     if whole or (picture.is_file() and (output.is_dir() or not output.suffix)):
         lead = next((path for path, role in named.items() if role == "albedo"), None) if whole else picture
-        found = find_maps(folder, lead)
-        found.files.update(named)
-    if found is None or not (whole or picture in found.files):
+        maps = find_maps(folder, lead)
+        maps.files.update(named)
+    if maps is None or not (whole or picture in maps.files):
         if roles:
             raise ValueError("--map requires a folder of maps: give a folder for the sample and for the output")
         return output, read_material(pictures, how)
-    albedos = [lead] if lead else [path for path, role in found.files.items() if role == "albedo"]
+    albedos = [lead] if lead else [path for path, role in maps.files.items() if role == "albedo"]
     if len(albedos) > 1:
         raise ValueError(f"{albedos[0]} and {albedos[1].name} are both albedo maps: give the path of one")
     if not albedos:
-        there = next(iter(found.files), picture / "brick_normal.png")
-        what = f" ({found.unknown[0]} is of unknown kind)" if found.unknown else ""
+        there = next(iter(maps.files), picture / "brick_normal.png")
+        what = f" ({maps.unknown[0]} is of unknown kind)" if maps.unknown else ""
         raise ValueError(
             f"{picture} has no albedo{what}: give --map albedo=FILE, or instead of the folder the map that decides the "
             f"arrangement, such as {there}"
         )
     if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
-    for path in found.files:
+    for path in maps.files:
         check_input(Named(output, "folder"), Named(path, "read"))
     material = read_material(albedos[:1], how)
-    if unknown := [name for name in found.unknown if folder / name not in found.files]:
+    if unknown := [name for name in maps.unknown if folder / name not in maps.files]:
         note(f"left out, because the name does not show the kind of map: {', '.join(unknown)}")
-    return Folder(found, albedos[0], output), material
+    return Folder(maps, albedos[0], output), material

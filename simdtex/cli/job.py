@@ -69,13 +69,13 @@ def job(
             stages: Path | None = None,
             report: Path | None = None,
             profile: bool = False,
-            **own: Any,
+            **values: Any,
         ) -> None:
             if report:
                 from simdtex.figures.page import check_folder
 
                 check_folder(report)
-            task = plan(**own)
+            task = plan(**values)
             if task is None:
                 return
             if dry_run:
@@ -86,8 +86,8 @@ def job(
             if seed is None and not (kept and kept.path.exists()):  # else the seed of the checkpoint
                 seed = short_seed()
             with watching(quiet, stages, task.limits, kept) as callback:
-                given = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
-                made, output = task.make(full_output=True, **given)
+                keywords = {"rng": seed, "device": _device(device, profile), "callback": callback, "checkpoint": kept}
+                made, output = task.make(full_output=True, **keywords)
             if report and task.report:
                 task.outputs.append(partial(task.report, report))
             for write in task.outputs:
@@ -101,7 +101,7 @@ def job(
                 seconds = f"in {time.perf_counter() - began:.1f} s on {statistics['device']}"
                 drawn = f", seed {statistics['seed']}" if "seed" in statistics else ""
                 click.echo(f"{task.names}: {task.summary} {seconds}{drawn}")
-                if order := chosen_order(own, statistics):
+                if order := chosen_order(values, statistics):
                     click.echo(f"The neighbourhood has order {order}, the largest that fits the sample.")
                 if task.more:
                     task.more(made, output)
@@ -110,19 +110,19 @@ def job(
 
                 print_profile(statistics)
 
-        own = planned.__dict__.pop("__click_params__", [])
+        params = planned.__dict__.pop("__click_params__", [])
         own_options = job_options(of or plan.__name__, *methods)
         drawn = (SEED, own_options, CHECKPOINT) if seeded else (own_options,)
         function: Any = together(*drawn, DEVICE, DRY_RUN, QUIET)(planned)
-        function.__click_params__ += own
+        function.__click_params__ += params
         return command(*examples, usual=usual)(function)
 
     return decorate
 
 
-def chosen_order(given: dict[str, Any], statistics: dict[str, Any]) -> int | None:
+def chosen_order(values: dict[str, Any], statistics: dict[str, Any]) -> int | None:
     """Return the order of a run of ``mrf`` if it is smaller than the default, since the sample is small."""
-    if given.get("order") or "lattice" not in statistics:
+    if values.get("order") or "lattice" not in statistics:
         return None
     from simdtex.methods.mrf.options import ORDERS
 
@@ -232,8 +232,8 @@ def notes(output: Any) -> None:
     """Print the sentences on the sample of a run, if there are any."""
     from simdtex.model.light import sample_sentences
 
-    if found := sample_sentences(output.statistics):
-        click.echo(found)
+    if sentences := sample_sentences(output.statistics):
+        click.echo(sentences)
 
 
 @contextmanager

@@ -41,16 +41,16 @@ class CommandOption(click.Option):
         words: Iterable[str] = (),
         method: str = "",
         methods: dict[str, str] | None = None,
-        **given: Any,
+        **keywords: Any,
     ) -> None:
-        super().__init__(*names, **given)
+        super().__init__(*names, **keywords)
         self.group, self.words = group, list(dict.fromkeys(words))
         self.methods = methods or ({method: str(self.help)} if method else {})
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
-        found = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
-        return found or super().shell_complete(ctx, incomplete)
+        items = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
+        return items or super().shell_complete(ctx, incomplete)
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -75,10 +75,10 @@ class Parsed(click.types.StringParamType):
 
 def pairs(text: str) -> list[tuple[str, str]]:
     """Return the pairs of ``A=B,C=D``."""
-    found = [(left.strip(), right.strip()) for left, right in (part.split("=") for part in text.split(",") if part)]
-    if not all(map(all, found)):
+    parts = [(left.strip(), right.strip()) for left, right in (part.split("=") for part in text.split(",") if part)]
+    if not all(map(all, parts)):
         raise ValueError(text)
-    return found
+    return parts
 
 
 NUMBERS = Parsed(lambda text: tuple(map(float, text.split(","))), "numbers separated by commas, such as 0.1,0.2")
@@ -94,8 +94,8 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
     """Return a decorator that adds options in this order."""
 
     def decorate(command: Command) -> Command:
-        for one in reversed(options):
-            command = one(command)
+        for option in reversed(options):
+            command = option(command)
         return command
 
     return decorate
@@ -104,12 +104,12 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
 def job_options(job: str, *methods: Any) -> Callable[[Command], Command]:
     """Return a decorator that adds to a command all options that it shows of its methods, classes of options."""
     tables = {method.__module__.split(".")[2]: table(method) for method in methods}
-    found: dict[str, dict[str, Option]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
+    named: dict[str, dict[str, Option]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
     for method, options in tables.items():
-        for name, one in options.items():
-            if job in one.shown:
-                found.setdefault(name, {})[method if len(tables) > 1 else ""] = one
-    return together(*(_option(job, name, methods) for name, methods in found.items()))
+        for name, option in options.items():
+            if job in option.shown:
+                named.setdefault(name, {})[method if len(tables) > 1 else ""] = option
+    return together(*(_option(job, name, methods) for name, methods in named.items()))
 
 
 def paper_options(method: Any, *names: str) -> Callable[[Command], Command]:
@@ -124,27 +124,27 @@ def _option(job: str, name: str, methods: Mapping[str, Option]) -> Callable[[Com
     first = next(iter(methods.values()))
     kind, flag = first.kind, f"--{name.replace('_', '-')}"
     kinds: dict[Any, Any] = {Whole: int, Number: float, Numbers: NUMBERS}
-    helps = {method: _help(job, one) for method, one in methods.items() if method}
+    helps = {method: _help(job, option) for method, option in methods.items() if method}
     how: dict[str, Any] = {"group": first.group or JOB, "help": _help(job, first), "methods": helps}
     how["metavar"] = "N,N,..." if isinstance(kind, Numbers) else None
     flags = [f"{flag}/--no-{flag[2:]}" if is_flag(kind) and first.default is None else flag]
     type_: Any = kinds.get(type(kind), str)
-    words = [word for one in methods.values() if isinstance(one.kind, (Choice, Other)) for word in one.kind.valid]
+    words = [word for entry in methods.values() if isinstance(entry.kind, (Choice, Other)) for word in entry.kind.valid]
     if is_flag(kind):
         return option(*flags, is_flag=True, **{**how, "default": None})
     return option(*flags, type=type_, words=words, **how)
 
 
-def _help(job: str, one: Option) -> str:
+def _help(job: str, option: Option) -> str:
     """Return the help of an option, with its default in the job."""
-    default = one.default_of(job)
+    default = option.default_of(job)
     if default is None:
-        shown = one.none.replace("`", "")
+        shown = option.none.replace("`", "")
     elif default is False:
         shown = ""
     else:
         shown = f"{default:g}" if isinstance(default, float) else str(default)
-    return f"{one.help}.  [{shown}]" if shown else f"{one.help}."
+    return f"{option.help}.  [{shown}]" if shown else f"{option.help}."
 
 
 def given(options: dict[str, Any], without: tuple[str, ...] = ()) -> dict[str, Any]:

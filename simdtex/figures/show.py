@@ -45,7 +45,7 @@ class Shown(Figure):
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
         """Return nothing, so that IPython draws the figure, after those that pyplot has to draw before it."""
-        figures = [plt.figure(number) for number in plt.get_fignums()] if "inline" in plt.get_backend() else []
+        figures = [plt.figure(num) for num in plt.get_fignums()] if "inline" in plt.get_backend() else []
         while self in figures:
             from IPython.display import display  # installed with this backend
 
@@ -150,7 +150,7 @@ def draw(made: Any, number: int = 8) -> Figure:
     raise ValueError("there are no realisations and no estimate to draw; use plot.imshow of xarray")
 
 
-def _realisations(made: Any, number: int) -> Figure:
+def _realisations(made: Any, count: int) -> Figure:
     kinds, note = json.loads(made.attrs.get("options", "{}")).get("categorical"), ""
     made = made if "realisation" in made.dims else made.expand_dims("realisation")
     if "variable" in made.dims:
@@ -170,8 +170,8 @@ def _realisations(made: Any, number: int) -> Figure:
     if "z" in made.dims:
         middle = made.sizes["z"] // 2
         values, note = values[:, middle], f"{note}, z = {made.z.values[middle]:g}"
-    titles = [f"realisation {k}{note}" for k in made.realisation.values[:number]]
-    figure, bar = _figure(made, titles, values[:number], how)
+    titles = [f"realisation {k}{note}" for k in made.realisation.values[:count]]
+    figure, bar = _figure(made, titles, values[:count], how)
     bar.set_label("" if categorical else _label(made))
     if categorical:
         shares = [f"{name}: {share:.0f} %" for name, share in zip(names, 100 * counts / counts.sum(), strict=True)]

@@ -100,8 +100,8 @@ class Metadata(NamedTuple):
     def at(self, other: Metadata | None = None) -> Metadata:
         """Return the metadata of a picture with such values at the place of another, or at none."""
         if other and other.geo:
-            own = self.geo or other.geo.place()
-            return self._replace(geo=other.geo._replace(nodata=own.nodata, about=own.about))
+            geo = self.geo or other.geo.place()
+            return self._replace(geo=other.geo._replace(nodata=geo.nodata, about=geo.about))
         return self._replace(geo=self.geo and self.geo.values())
 
 

@@ -361,8 +361,8 @@ def check_folder_writable(target: Path) -> None:
         raise ValueError(f"the folder {target.parent} is not writable: choose another folder")
 
 
-def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[Path]:
-    """Return the files of an earlier run in a folder of ``what``, all ``own``; raise unless it can be written."""
+def earlier_files(folder: Path, what: str, is_ours: Callable[[str], bool]) -> list[Path]:
+    """Return the files of an earlier run in a folder of ``what``, all ``is_ours``; raise unless it can be written."""
     try:
         if folder.is_dir():
             earlier = sorted(path for path in folder.iterdir() if not is_leftover(path))
@@ -376,7 +376,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
             earlier = []
     except OSError as error:
         raise ValueError(f"{folder} cannot be written ({error.strerror}): give another folder") from None
-    others = [path.name for path in earlier if not (own(path.name) and path.is_file())]
+    others = [path.name for path in earlier if not (is_ours(path.name) and path.is_file())]
     if others:
         raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
     if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
@@ -387,9 +387,9 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
 def _not_written(path: PathLike, error: OSError | NotWritten, temporary: Path | None = None) -> NotWritten:
     if isinstance(error, NotWritten):  # of a writer into the temporary path
         return NotWritten(str(error).replace(str(temporary), os.fspath(path)))
-    number = error.errno or errno.ENOSPC  # NumPy and others give no reason if only a part was written
-    remedy = "free some space" if number in (errno.ENOSPC, errno.EDQUOT) else "choose another path"
-    return NotWritten(f"{os.fspath(path)} could not be written ({os.strerror(number)}): {remedy}")
+    code = error.errno or errno.ENOSPC  # NumPy and others give no reason if only a part was written
+    remedy = "free some space" if code in (errno.ENOSPC, errno.EDQUOT) else "choose another path"
+    return NotWritten(f"{os.fspath(path)} could not be written ({os.strerror(code)}): {remedy}")
 
 
 @contextmanager

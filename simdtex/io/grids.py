@@ -125,7 +125,7 @@ def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
         numbers = tuple(float(value) for value in values)
     except (TypeError, ValueError):
         numbers = ()
-    if len(numbers) not in (2, 3) or not all(abs(number) < _FAR for number in numbers):
+    if len(numbers) not in (2, 3) or not all(abs(value) < _FAR for value in numbers):
         raise ValueError(f"{name} is {shown(values)}; give (x, y) or (x, y, z), numbers below {_FAR:g}")
     return numbers
 
@@ -304,10 +304,10 @@ def _gslib(file: BufferedReader, most: int) -> Read:
             )
         gslib = [] if count_of(second) else words[1:]
         numbers, line = gslib or _of_title(title), 3 + int(words[0])
-        for number in range(3, line):
+        for index in range(3, line):
             names.append(_text(file.readline(_LINE)).strip())
             if not names[-1]:
-                raise ValueError(f"line {number} has no name of a variable: it is cut short, or line 2 is wrong")
+                raise ValueError(f"line {index} has no name of a variable: it is cut short, or line 2 is wrong")
     if len(numbers) not in (3, 6, 9, 10) or not _all_numbers(numbers):
         raise ValueError("its first two lines do not say how many cells it has: begin with nx ny nz, as 250 250 1")
     if not all(map(_is_count, (*numbers[:3], *numbers[9:]))):
@@ -356,7 +356,7 @@ def number_of(word: Any) -> float | None:
 
 
 def _all_numbers(words: Iterable[Any]) -> bool:
-    return all((number := number_of(word)) is not None and isfinite(number) for word in words)
+    return all((value := number_of(word)) is not None and isfinite(value) for word in words)
 
 
 def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[np.float64]:
@@ -370,8 +370,8 @@ def _parsed(file: BufferedReader, count: int, what: str, line: int) -> NDArray[n
             numbers[at : at + len(words)] = list(map(float, words))
         except ValueError:
             every = ((n, word) for n, row in enumerate(lines, line) for word in row.split())
-            number, wrong = next(pair for pair in every if number_of(pair[1]) is None)
-            raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
+            where, wrong = next(pair for pair in every if number_of(pair[1]) is None)
+            raise ValueError(f"line {where} has {_text(wrong)[:40]!r}, not a number: correct it") from None
         at += len(words)
         line += len(lines)
     if at < count:
@@ -416,7 +416,7 @@ def _sgems(file: BufferedReader, most: int) -> Read:
     if version < 100:
         raise ValueError(f"it is of the version {version} of SGeMS's files: save it by a newer SGeMS")
     sides: tuple[int, ...] = take(">3I")
-    size, origin = (tuple(float(str(np.float32(number))) for number in take(">3f")) for _ in range(2))
+    size, origin = (tuple(float(str(np.float32(value))) for value in take(">3f")) for _ in range(2))
     (variables,) = take(">I")
     names = [word() for _ in range(variables)]
     if not prod(sides) * variables:

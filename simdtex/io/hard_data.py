@@ -210,26 +210,26 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
     width = count_of(lines[1]) if len(lines) > 1 and not (said or header) else None
     begin = 2 + width if width else bool(said)
     names = [re.split(r"\t|\s\s", line.strip())[0] for line in lines[2:begin]]  # units may follow
-    kept = {number: line.strip(" ") for number, line in enumerate(lines[begin:], begin + 1) if line.strip(' \t,;"')}
-    comments = {number: kept.pop(number).strip("# ") for number in [*kept] if kept[number].startswith("#")}
+    kept = {at: line.strip(" ") for at, line in enumerate(lines[begin:], begin + 1) if line.strip(' \t,;"')}
+    comments = {at: kept.pop(at).strip("# ") for at in [*kept] if kept[at].startswith("#")}
     if not kept:
         what = f"the point set has no line after the names of {width} columns" if width else "the table is empty"
         raise ValueError(f"{what}: give a line with x, y and a value for each datum")
     first, line = next(iter(kept.items()))
     delimiter = said[1] if said else next((sign for sign in ";\t," if sign in line.partition(" #")[0]), None)
     count = width or len(_cells(line, first, delimiter))
-    rows = {number: _cells(line, number, delimiter, count) for number, line in kept.items()}
+    rows = {at: _cells(line, at, delimiter, count) for at, line in kept.items()}
     if (cells := len(rows[first])) < 3:
         raise ValueError(
             f"line {first} has {cells} cell{'s' * (cells != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
         )
-    for number, line in comments.items():
-        if number > first and line.count(delimiter or "#") == count - 1:
-            warnings.warn(f"line {number} begins with #, and is left out as a comment", DataWarning, stacklevel=2)
-    for number, row in rows.items():
+    for at, line in comments.items():
+        if at > first and line.count(delimiter or "#") == count - 1:
+            warnings.warn(f"line {at} begins with #, and is left out as a comment", DataWarning, stacklevel=2)
+    for at, row in rows.items():
         if len(row) != count:
-            raise ValueError(f"line {number} has {len(row)} cells and those before it {count}: give as many in all")
+            raise ValueError(f"line {at} has {len(row)} cells and those before it {count}: give as many in all")
     if not width and (header or sum(cell[:1] in _DIGITS for cell in rows[first] if cell) < 2):
         names = rows.pop(first)
         units = next(iter(rows), 0)
@@ -237,13 +237,13 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
             del rows[units]
         if not rows:
             raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
-    elif not width and (above := [line for number, line in comments.items() if number < first]):  # numpy.savetxt
+    elif not width and (above := [line for at, line in comments.items() if at < first]):  # numpy.savetxt
         words = _cells(above[-1], first, delimiter), re.split(r"[\s,;]+", above[-1])
         names = next((some for some in words if len(some) == count and any(map(axis_of, some))), [])
     return _of_columns(list(zip(*rows.values(), strict=True)), names, tuple(rows), columns, categories)
 
 
-def _cells(line: str, number: int, delimiter: str | None, count: int = 0) -> list[str]:
+def _cells(line: str, at: int, delimiter: str | None, count: int = 0) -> list[str]:
     """Return the cells of a line, without a comment after ``#`` if they are then ``count``, or with 0 three or more."""
     before, *comment = re.split(r"\s#", line, maxsplit=1)
     if comment and (count or 3) <= len(before.split(delimiter)) <= (count or np.inf):
@@ -253,7 +253,7 @@ def _cells(line: str, number: int, delimiter: str | None, count: int = 0) -> lis
     try:
         cells = next(csv.reader([line], delimiter=delimiter, strict=True, skipinitialspace=True))
     except csv.Error as error:
-        raise ValueError(f"line {number} cannot be split into cells ({error}): check its quotation marks") from None
+        raise ValueError(f"line {at} cannot be split into cells ({error}): check its quotation marks") from None
     return [cell.strip() for cell in cells]
 
 
@@ -265,7 +265,7 @@ def _of_columns(
     if names and (not names[0] or names[0].startswith("Unnamed: 0")):  # the index of pandas
         del listed[0]
     points, values = _roles(listed, bool(names), columns or {})
-    codes = {str(text).strip().lower(): float(number) for text, number in (categories or {}).items()}
+    codes = {str(text).strip().lower(): float(code) for text, code in (categories or {}).items()}
     codes |= dict.fromkeys(_UNKNOWN, np.nan)
     used = [cell for k in (*points, *values) for cell in cells[k]]
     if commas := [cell for cell in used if "," in cell and _COMMA.fullmatch(cell)]:
@@ -275,7 +275,7 @@ def _of_columns(
     numbers = {k: [number_of(cell) for cell in cells[k]] for k in points}
     numbers |= {k: [codes.get(cell.lower(), number_of(cell)) for cell in cells[k]] for k in values}
     if not categories and not (columns and "value" in columns):  # without names of wells
-        left = [k for k in values if all(number is None or isnan(number) for number in numbers[k])]
+        left = [k for k in values if all(value is None or isnan(value) for value in numbers[k])]
         if 0 < len(left) < len(values):
             values = [k for k in values if k not in left]
             shown = ", ".join(listed[k] for k in left)

@@ -292,15 +292,15 @@ def parse_size(text: str) -> tuple[int, int]:
     return height, width
 
 
-def parse_sides(text: str, form: str, own: Sequence[int] = ()) -> tuple[int, ...]:
-    """Return the sides in a text in the order of ``form``, such as WIDTHxHEIGHT; ``2x`` and ``200%`` multiply `own`."""
+def parse_sides(text: str, form: str, sample: Sequence[int] = ()) -> tuple[int, ...]:
+    """Return the sides in a text in the order of ``form``, say WIDTHxHEIGHT; ``2x`` and ``200%`` multiply `sample`."""
     sides, words = form.split("x"), re.split(r"\s*[xX\u00d7]\s*", text.strip())
-    if own and (times := re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([xX\u00d7%])", text.strip())):
+    if sample and (times := re.fullmatch(r"([0-9]+\.?[0-9]*|\.[0-9]+)\s*([xX\u00d7%])", text.strip())):
         factor = float(times[1]) / (100 if times[2] == "%" else 1)
-        words = [str(round(factor * side)) for side in own]
+        words = [str(round(factor * side)) for side in sample]
     if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
         example = "x".join(("640", "480", "100")[: len(sides)])
-        more = ", or 2x or 200% of the sample" if own else ""
+        more = ", or 2x or 200% of the sample" if sample else ""
         raise ValueError(f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all{more}")
     return tuple(int(word) for word in (words * len(sides))[: len(sides)])
 
@@ -397,10 +397,10 @@ def check_holds(
     raise ValueError(f"{target}: {suffix or 'PNG slices'} cannot hold {what}: end its name in {other} instead")
 
 
-def suitable_suffix(dtype: DTypeLike | None, channels: int | None, own: str = ".png", *, plain: bool = False) -> str:
+def suitable_suffix(dtype: DTypeLike | None, channels: int | None, wanted: str = ".png", *, plain: bool = False) -> str:
     """Return the suffix of a lossless format for such pixels, ``plain`` without alpha: its own, .png, .tif or .npy."""
     lossless = {*_PLAIN} if plain and channels in _ALPHA else _FORMATS.keys() - LOSSY
-    suffixes = (suffix for suffix in (own, ".png", ".tif", ".npy") if suffix.lower() in lossless)
+    suffixes = (suffix for suffix in (wanted, ".png", ".tif", ".npy") if suffix.lower() in lossless)
     return next(suffix for suffix in suffixes if _FORMATS[suffix.lower()].holds(dtype, channels))
 
 

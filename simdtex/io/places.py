@@ -36,7 +36,7 @@ class Location(NamedTuple):
         return self.frame.told or bool(self.crs) or any(self.about.values())
 
     def __str__(self) -> str:
-        at, size = (", ".join(f"{number:.12g}" for number in numbers) for numbers in self.frame)
+        at, size = (", ".join(f"{value:.12g}" for value in numbers) for numbers in self.frame)
         return f"{self.name} lies at {at} with cells of {size}"
 
 

@@ -131,7 +131,7 @@ def axis_of(name: str) -> str | None:
     """Return the axis that the name of a column or of a dimension means, ``"x"``, ``"y"``, ``"z"``, or None."""
     word = re.sub(r"\(.*|\[.*|[^a-z]", "", name.lower())
     around = "(utm|point|coord|loc|pos)?", "(m|km|ft|utm|(coord|loc|pos)[a-z]*)?"
-    return next((axis for axis, own in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({own})m?", word)), None)
+    return next((axis for axis, form in _NAMED.items() if re.fullmatch(f"{axis.join(around)}|({form})m?", word)), None)
 
 
 @contextmanager
@@ -185,9 +185,9 @@ def read_raster(source: PathLike | bytes, most: int) -> tuple[Array, Georeferenc
         where = closing.enter_context(MemoryFile(source)).name if in_memory else os.fspath(source)
         raster = closing.enter_context(DatasetReader(where, driver=list(DRIVERS)))
         if not isinstance(source, bytes):
-            own = [Path(source).with_suffix(".mp#")] * (raster.driver == "ILWIS")
-            check_beside(source, [*raster.files, *own])
-            if own and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(source).read_bytes()):
+            beside = [Path(source).with_suffix(".mp#")] * (raster.driver == "ILWIS")
+            check_beside(source, [*raster.files, *beside])
+            if beside and re.search(rb"(?im)^\s*type\s*=\s*maplist", Path(source).read_bytes()):
                 raise Refused("is a list of maps of ILWIS: give one of its maps")
         itemsize = max(np.dtype(kind).itemsize for kind in raster.dtypes)
         check_array((raster.height, raster.width, raster.count), itemsize, most)
@@ -377,13 +377,13 @@ def _check_own(path: PathLike) -> None:
 
     with h5py.File(path) as file:
 
-        def found(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
+        def outside(name: str, link: Any) -> str | None:  # an error here would be lost in h5py
             target: Any = file[name] if isinstance(link, h5py.HardLink) else link
             parts = target.virtual_sources() if getattr(target, "is_virtual", False) else ()
             other = isinstance(target, h5py.ExternalLink) or any(part.file_name != "." for part in parts)
             return name if other or getattr(target, "external", None) else None
 
-        if (name := file.visititems_links(found)) is not None:
+        if (name := file.visititems_links(outside)) is not None:
             raise Refused(f"takes {name[:100]} from another file: save all values in one file")
 
 

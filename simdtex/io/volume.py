@@ -90,7 +90,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
     else:
         earlier_files(target, "the slices", lambda name: bool(_SLICE.fullmatch(name)))
         check_folder_writable(target)
-    other = next(one for one in (".nrrd", ".tif", ".npz") if _FORMATS[one].holds(dtype, channels))
+    other = next(suffix for suffix in (".nrrd", ".tif", ".npz") if _FORMATS[suffix].holds(dtype, channels))
     check_holds(target, _FORMATS, dtype, channels, other)
 
 
@@ -304,7 +304,7 @@ def _vtk(path: Path, most: int) -> _Read:
     import pyvista
     from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-    sums = [[int(number or 1) for number in match] for match in _COUNTS.findall(path.read_bytes())]
+    sums = [[int(count or 1) for count in match] for match in _COUNTS.findall(path.read_bytes())]
     check_size(sum(map(prod, sums)), 0, most)
     # its own log would be on standard error
     with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
@@ -395,8 +395,8 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         image.write_tiff(path, values)
     else:
         digits = max(3, len(str(len(values) - 1)))
-        for number, picture in enumerate(values):
-            image.encode(path / f"slice-{number:0{digits}}.png", ".png", picture)
+        for index, picture in enumerate(values):
+            image.encode(path / f"slice-{index:0{digits}}.png", ".png", picture)
 
 
 _NEEDED = {
@@ -494,6 +494,6 @@ def _variables(array: Any) -> Iterator[tuple[str, Any]]:
         if dim in dims:
             count = planes.shape[wanted.index(dim)]
             numbers = array.coords[dim].values.tolist() if dim in array.coords else range(count)
-            names = [f"{name}{joint}{number}" for number in numbers for name in names]
+            names = [f"{name}{joint}{value}" for value in numbers for name in names]
     sides = planes.shape[sum(dim not in "zyx" for dim in dims) :]
     yield from zip(names, planes.reshape(-1, *sides), strict=True)

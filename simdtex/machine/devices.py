@@ -121,10 +121,10 @@ def platforms() -> list[cl.Platform]:
     _prepare_caches()
     try:
         with _lock, _icd_folder():
-            found = pyopencl.get_platforms()
+            listed = pyopencl.get_platforms()
     except pyopencl.Error:  # raised if there is no platform
         return []
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(listed))
 
 
 def address_space() -> int:
@@ -149,8 +149,8 @@ def _prepare_caches() -> None:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         report = folder / "simdtex" / "crashes.txt"
         report.parent.mkdir(parents=True, exist_ok=True)
-        own = Path(os.environ.get("POCL_CACHE_DIR") or folder / "pocl" / "kcache")
-        inner = [own, folder / "pocl", *(folder / name for name in ("pyopencl", "pytools"))]
+        kernels = Path(os.environ.get("POCL_CACHE_DIR") or folder / "pocl" / "kcache")
+        inner = [kernels, folder / "pocl", *(folder / name for name in ("pyopencl", "pytools"))]
         for each in [folder, report.parent, *filter(Path.is_dir, inner)]:
             with tempfile.TemporaryFile(dir=each, buffering=0) as file:
                 if file.write(bytes(2**16)) < 2**16:
@@ -217,12 +217,12 @@ def _copy_icd_files(folder: Path) -> None:
         Path(sys.prefix, "etc", "OpenCL", "vendors"),  # conda
         Path(pyopencl.__file__).parent / ".libs",  # PoCL's wheel, whose library is beside its .icd file
     )
-    for number, source in enumerate(sources):
+    for index, source in enumerate(sources):
         for entry in sorted(source.glob("*.icd")):
             library = entry.read_text(errors="replace").strip()
             if Path(library).name != _INTEL:
                 beside = source / library
-                (folder / f"{number}-{entry.name}").write_text(f"{beside if beside.is_file() else library}\n")
+                (folder / f"{index}-{entry.name}").write_text(f"{beside if beside.is_file() else library}\n")
 
 
 @functools.cache
@@ -283,10 +283,10 @@ def failure(handle: cl.Device) -> str:
         shared = context(handle)
         kernels = build(shared, _SOURCE, [])
         queue = pyopencl.CommandQueue(shared)
-        given = np.full((64, 2), _NUMBERS, np.float32), np.full(64, _WHOLE, np.uint64)
+        arrays = np.full((64, 2), _NUMBERS, np.float32), np.full(64, _WHOLE, np.uint64)
         result = np.zeros((64, len(_BITS)), np.uint64)
         flags = pyopencl.mem_flags
-        sources = (pyopencl.Buffer(shared, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=one) for one in given)
+        sources = (pyopencl.Buffer(shared, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array) for array in arrays)
         target = pyopencl.Buffer(shared, flags.WRITE_ONLY, result.nbytes)
         kernels["probe"](queue, (64,), None, *sources, target)
         pyopencl.enqueue_copy(queue, result, target)
@@ -323,7 +323,7 @@ def _failure_apart(index: int) -> str:
     answers = [line for line in done.stdout.decode(errors="replace").splitlines() if line.startswith(_MARK)]
     if answers:
         return answers[-1].removeprefix(_MARK)
-    signals = {int(number): number.name for number in signal.Signals}
+    signals = {int(code): code.name for code in signal.Signals}
     how = signals.get(-done.returncode, f"exit code {done.returncode}")
     return f"the runtime crashed on a tiny program ({how})"
 
@@ -475,13 +475,13 @@ def choose(
     its platform. None takes the first usable one.
     """
     if text is None:
-        found = []
+        tried = []
         for info in listing:
             if info.kind != "reference":
-                found.append(check(info))
-                if found[-1].usable:
-                    return found[-1]
-        raise DeviceError(_nothing_usable(found))
+                tried.append(check(info))
+                if tried[-1].usable:
+                    return tried[-1]
+        raise DeviceError(_nothing_usable(tried))
     matches = [check(info) for info in _matching(text, listing)]
     usable = [info for info in matches if info.usable]
     if len(usable) > 1:  # PoCL's devices have the name of the processor, as "Intel"
@@ -511,8 +511,8 @@ def _indexed(listing: Sequence[DeviceInfo]) -> str:
     return ", ".join(f"{info.index} = {info}" for info in listing if info.name and info.reason in ("", _NOT_PROBED))
 
 
-def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
-    why = "; ".join(f"{info.name or info.platform}: {info.reason}" for info in found)
+def _nothing_usable(tried: Sequence[DeviceInfo]) -> str:
+    why = "; ".join(f"{info.name or info.platform}: {info.reason}" for info in tried)
     return (
         f"No usable OpenCL device was found{f' ({why})' if why else ''}: install a CPU runtime by "
         "`pip install simdtex[cpu]` (x86-64 Linux and Windows, no root needed) or `apt install pocl-opencl-icd` "
@@ -523,22 +523,22 @@ def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
 @functools.cache
 def _enumerate() -> tuple[DeviceInfo, ...]:
     """Return the devices of every platform, sorted by preference; platforms are queried once in a process."""
-    found: list[DeviceInfo] = []
-    for number, vendor in enumerate(platforms()):
-        title = f"platform {number}"
+    devices: list[DeviceInfo] = []
+    for n, vendor in enumerate(platforms()):
+        title = f"platform {n}"
         try:
             title = clean(vendor.name)
             handles = vendor.get_devices()
-            found += [_describe(title, handle) for handle in handles]
+            devices += [_describe(title, handle) for handle in handles]
             if not handles:
-                found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
+                devices.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
         except Exception as error:  # a broken platform must not stop the others
-            found.append(DeviceInfo(0, title, "", "other", reason=one_line(error)))
+            devices.append(DeviceInfo(0, title, "", "other", reason=one_line(error)))
     if _report and not faulthandler.is_enabled():  # a crash leaves a report; PoCL has set its own handlers by now
         faulthandler.enable(os.open(_report, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666))
-    found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
-    found.sort(key=_preference)
-    return tuple(replace(info, index=index) for index, info in enumerate(found))
+    devices.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
+    devices.sort(key=_preference)
+    return tuple(replace(info, index=index) for index, info in enumerate(devices))
 
 
 def _describe(title: str, handle: cl.Device) -> DeviceInfo:

@@ -57,8 +57,8 @@ def require_host(wanted: int, remedy: str = SMALLER, of: int = 0) -> None:
 def available() -> int:
     """Return the bytes that are available to this process, within its limit and that of its control group."""
     taken = psutil.Process().memory_info()
-    found: int = min(psutil.virtual_memory().available, devices.address_space() - taken.vms)
+    free: int = min(psutil.virtual_memory().available, devices.address_space() - taken.vms)
     for path in LIMITS:
         with suppress(OSError, ValueError):  # no such version; or "max", which is no limit
-            found = min(found, int(path.read_text()) - taken.rss)
-    return max(0, found)
+            free = min(free, int(path.read_text()) - taken.rss)
+    return max(0, free)

@@ -70,9 +70,9 @@ def kernel_source(*names: str) -> str:
             return ""
         read.add(name)
         lines = [f'#line 1 "{name}"', *(kernel_folder() / name).read_text(encoding="utf-8").splitlines()]
-        for number, line in enumerate(lines):
+        for index, line in enumerate(lines):
             if line.startswith("#include"):
-                lines[number] = f'{text(line.split(chr(34))[1])}\n#line {number + 1} "{name}"'
+                lines[index] = f'{text(line.split(chr(34))[1])}\n#line {index + 1} "{name}"'
         return "\n".join(lines) + "\n"
 
     return "".join(map(text, names))

@@ -50,14 +50,14 @@ def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ArraySize:
     """
     models = "|".join(name.removeprefix(PREFIX) for name in ARRAYS)
     form = rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|(?:{PREFIX})?({models}))(?::(.*))?"
-    found = re.fullmatch(form, text if isinstance(text, str) else "")
-    if not found:
+    match = re.fullmatch(form, text if isinstance(text, str) else "")
+    if not match:
         raise ValueError(
             f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
         )
-    rows, cols = ARRAYS[PREFIX + found[3]] if found[3] else (int(found[1]), int(found[2]))
+    rows, cols = ARRAYS[PREFIX + match[3]] if match[3] else (int(match[1]), int(match[2]))
     if rows * cols > LARGEST:
         raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
-    mapping = mapping if found[4] is None else found[4]
+    mapping = mapping if match[4] is None else match[4]
     one_of("mapping", mapping, MAPPINGS)
     return ArraySize(rows, cols, mapping)

@@ -67,9 +67,9 @@ def use_colours(counts: NDArray[np.intp]) -> Picture:
 
 def label_colours(count: int) -> Picture:
     """Return colours for labels 0 to count - 1, (count, 3) uint8: those of Okabe and Ito (2008), then distinct ones."""
-    number = np.arange(len(OKABE_ITO), max(count, len(OKABE_ITO)))
-    hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: consecutive labels have distinct hues
-    lightness = 0.62 + 0.16 * (number % 3 - 1)
+    label = np.arange(len(OKABE_ITO), max(count, len(OKABE_ITO)))
+    hue = label * np.pi * (3 - np.sqrt(5))  # the golden angle: consecutive labels have distinct hues
+    lightness = 0.62 + 0.16 * (label % 3 - 1)
     more = _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))
     return np.concatenate([np.array(OKABE_ITO, np.uint8), more])[:count]
 

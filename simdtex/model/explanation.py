@@ -154,31 +154,31 @@ class Explanation:
         """
         near = self.neighbours
         difference = near.values.astype(np.float64) - self.candidates.around
-        found: NDArray[np.float64] = (difference * near.confidence) ** 2
-        return found
+        terms: NDArray[np.float64] = (difference * near.confidence) ** 2
+        return terms
 
     @property
     def reason(self) -> str:
         """The choice, in a sentence."""
-        found, at = self.candidates, self.taken
+        listed, at = self.candidates, self.taken
         search = f"the {self.weighed} candidates of the level" if self.exact else f"{self.weighed} listed candidates"
         if self.drawn:
-            how = f"draws from the LCPDF of {search}; it has drawn one of probability {found.probability[at]:.4g}"
+            how = f"draws from the LCPDF of {search}; it has drawn one of probability {listed.probability[at]:.4g}"
         else:
             mode = "candidate of least total cost" if self.density is None else "grey level of greatest density"
             how = f"takes the mode, the {mode} of {search}"
-        return f"Site {self.site} of level {self.level}, sweep {self.sweep}, {how}: rank {found.rank[at]}."
+        return f"Site {self.site} of level {self.level}, sweep {self.sweep}, {how}: rank {listed.rank[at]}."
 
     def table(self) -> str:
         """Return the choice in a sentence, and the first candidates in lines of text; a star marks the taken one."""
-        found = self.candidates
-        names = ["", "rank", "place", "continues", "distance", *found.costs, "total", "probability"]
+        listed = self.candidates
+        names = ["", "rank", "place", "continues", "distance", *listed.costs, "total", "probability"]
         lines = [names]
         for n in self.shown():
-            costs = [found.distance[n], *(cost[n] for cost in found.costs.values()), found.total[n]]
-            place = ",".join(map(str, found.place[n].tolist()))
-            numbers = [str(found.rank[n]), place, str(found.continues[n]), *(f"{cost:.1f}" for cost in costs)]
-            lines.append(["*" if n == self.taken else "", *numbers, f"{found.probability[n]:.4g}"])
+            costs = [listed.distance[n], *(cost[n] for cost in listed.costs.values()), listed.total[n]]
+            place = ",".join(map(str, listed.place[n].tolist()))
+            numbers = [str(listed.rank[n]), place, str(listed.continues[n]), *(f"{cost:.1f}" for cost in costs)]
+            lines.append(["*" if n == self.taken else "", *numbers, f"{listed.probability[n]:.4g}"])
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         rows = ["  ".join(map(str.rjust, line, widths)).rstrip() for line in lines]
         return "\n".join([self.reason, *rows])
@@ -191,18 +191,18 @@ class Explanation:
         """Return HTML for a notebook: the neighbourhood and the first candidates as pictures, and the table."""
         from simdtex.model.display import choice_html
 
-        found, shown = self.candidates, self.shown()
+        listed, shown = self.candidates, self.shown()
         captions = [
-            f"{'taken: ' if n == self.taken else ''}rank {found.rank[n]}, at {tuple(found.place[n].tolist())}, "
-            f"total {found.total[n]:.1f}, probability {found.probability[n]:.4g}"
+            f"{'taken: ' if n == self.taken else ''}rank {listed.rank[n]}, at {tuple(listed.place[n].tolist())}, "
+            f"total {listed.total[n]:.1f}, probability {listed.probability[n]:.4g}"
             for n in shown
         ]
         return choice_html(
             self.neighbours.offsets,
             self.neighbours.pixels,
             self.neighbours.confidence.max(1),
-            found.pixels[shown],
-            found.probability[shown],
+            listed.pixels[shown],
+            listed.probability[shown],
             captions,
             self.table(),
         )

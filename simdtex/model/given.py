@@ -131,17 +131,17 @@ def nearest_data(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return the numbers of sites and of the `MOST_NEAR` data nearest to each, and their offsets in pixels."""
     step, reach, axes = grid.step, isqrt(order), place.shape[1]
-    found: list[list[NDArray[np.int64]]] = [[], [], []]
+    pieces: list[list[NDArray[np.int64]]] = [[], [], []]
     for by in product(range(-reach, reach + 2), repeat=axes):
         site = place.astype(np.int64) // step + by
         apart = place - site * step
         near = ((apart**2).sum(1) <= order * step**2) & (abs(apart).max(1) <= reach * step)
         site = (site - grid.first) % grid.whole.shape if grid.torus else np.subtract(site, grid.first)
         near &= ((site >= 0) & (site < grid.shape)).all(1)
-        found[0].append(np.ravel_multi_index(tuple(site[near].T), grid.shape))
-        found[1].append(np.flatnonzero(near))
-        found[2].append(apart[near])
-    site, datum, apart = (np.concatenate(parts) for parts in found)
+        pieces[0].append(np.ravel_multi_index(tuple(site[near].T), grid.shape))
+        pieces[1].append(np.flatnonzero(near))
+        pieces[2].append(apart[near])
+    site, datum, apart = (np.concatenate(parts) for parts in pieces)
     sorting = np.lexsort((datum, (apart**2).sum(1), site))
     site, datum, apart = site[sorting], datum[sorting], apart[sorting]
     rank = np.arange(site.size) - np.searchsorted(site, site)
@@ -161,17 +161,17 @@ class GivenPlanes(NamedTuple):
         return np.asarray(self.known & (self.values != UNKNOWN).any(0))
 
 
-def planes(given: Given, sample: Sample) -> GivenPlanes:
+def planes(data: Given, sample: Sample) -> GivenPlanes:
     """Return the given values in the channels of ``sample``; a site from the sample has all of them."""
-    shape = given.whole.shape
+    shape = data.whole.shape
     values = np.full((sample.channels, *shape), UNKNOWN, np.uint16)
-    source = np.full(shape, -1, np.int32) if given.place is None else sample.index(given.place)
-    source = np.where(given.data, source, np.int32(-1))
-    values[: sample.shown, given.data] = sample.scale.levels(given.values[given.data])
+    source = np.full(shape, -1, np.int32) if data.place is None else sample.index(data.place)
+    source = np.where(data.data, source, np.int32(-1))
+    values[: sample.shown, data.data] = sample.scale.levels(data.values[data.data])
     values[:, source >= 0] = sample.working[: sample.channels, source[source >= 0]]
-    if not given.suggests:
+    if not data.suggests:
         source[:] = -1
-    return GivenPlanes(values, source, given.whole)
+    return GivenPlanes(values, source, data.whole)
 
 
 EXCLUDED = np.float32(2.0**40)
@@ -220,15 +220,15 @@ class Soft:
 
     def kinds(self, sample: Sample, source: NDArray[np.integer]) -> NDArray[np.uint16]:
         """Return the kinds of pixels (n,) of the sample as indices of rows of `costs`, (kinds of a pixel, n)."""
-        found, before = [], 0
+        rows, before = [], 0
         for kind in self._all(sample, source):
-            found.append(kind.of + before)
+            rows.append(kind.of + before)
             before += len(kind.shares)
-        return np.stack(found).astype(np.uint16)
+        return np.stack(rows).astype(np.uint16)
 
     def costs(self, sample: Sample, grid: Grid, rate: float) -> NDArray[np.float32]:
         """Return the cost of each kind at the sites, (kinds, *grid.shape); ``rate`` is w N C sigma^2."""
-        found = []
+        costs = []
         for kind in self._all(sample, np.zeros(0, np.intp)):
             p = kind.probability
             p = np.broadcast_to(p, (len(p), *grid.shape)) if p[0].size == 1 else grid.cut(grid.decimated(p))
@@ -236,8 +236,8 @@ class Soft:
                 said = np.log(p) - np.log(kind.shares).reshape(-1, *[1] * len(grid.shape))
                 cost = rate * UNIT * np.rint((said.max(0) - said) * STEPS) / STEPS
             cost = np.where(p > 0, np.minimum(cost, EXCLUDED), EXCLUDED)
-            found.append(np.where(np.isnan(p), 0, cost).astype(np.float32))
-        return np.concatenate(found)
+            costs.append(np.where(np.isnan(p), 0, cost).astype(np.float32))
+        return np.concatenate(costs)
 
     def regions(self) -> NDArray[np.int32]:
         """Return the region of each cell, connected cells with like probabilities of categories; -1 without these."""

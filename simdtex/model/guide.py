@@ -56,7 +56,7 @@ class Guide:
         """Return the guide of pictures and an output of half the size: one of the pixels of each square of 2x2."""
         row, col = (np.minimum(np.arange(1, side + 1, 2), side - 1) for side in self.output.shape[:2])
         names = tuple(self._names(channel) for channel in range(self.output.shape[-1])) if self.labels else None
-        samples, output = tuple(one[1::2, 1::2] for one in self.samples), self.output[np.ix_(row, col)]
+        samples, output = tuple(guide[1::2, 1::2] for guide in self.samples), self.output[np.ix_(row, col)]
         return replace(self, samples=samples, output=output, names=names)
 
     def _names(self, channel: int) -> NDArray[Any]:
@@ -90,14 +90,14 @@ class Guide:
             wanted = stretch(output, top, ends)[0][None]
         n, variance = every.size, 0.0
         for k in range(len(wanted)):
-            total = sum(int(one[k].sum()) for one in unit)
-            squares = sum(int((one[k].astype(np.int64) ** 2).sum()) for one in unit)
+            total = sum(int(guide[k].sum()) for guide in unit)
+            squares = sum(int((guide[k].astype(np.int64) ** 2).sum()) for guide in unit)
             variance += (n * squares - total * total) / n**2
         most = 1 if self.labels else top
         height = float(top) if self.weight else 0.0
         if variance:
             height = min(sqrt(self.weight * spread / self.output.shape[-1] / variance) * most, top)
-        return GuidePlanes([_scaled(one, height, most) for one in unit], _scaled(wanted, height, most))
+        return GuidePlanes([_scaled(guide, height, most) for guide in unit], _scaled(wanted, height, most))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +145,9 @@ class Surroundings:
 
     def halved(self) -> Surroundings:
         """Return the guide of a picture and an output of half the size."""
-        values, given = (halved(one, all_of_it=True) for one in (self.values, self.given))
+        values, mask = (halved(array, all_of_it=True) for array in (self.values, self.given))
         corner = self.corner[0] / 2, self.corner[1] / 2
-        return Surroundings(halved(self.sample), halved(self.known), values, given, corner, self.colours)
+        return Surroundings(halved(self.sample), halved(self.known), values, mask, corner, self.colours)
 
     @property
     def channels(self) -> int:
@@ -184,10 +184,10 @@ def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_], reach: int) -> 
 def _places(shape: tuple[int, ...], corner: tuple[float, ...], step: float, top: int) -> NDArray[np.uint16]:
     """Return row and column of each pixel as levels (2, rows, cols), rounded; 0 if the corner is NaN."""
     places = np.indices(shape) + np.array(corner)[:, None, None]
-    found: NDArray[np.uint16] = np.rint(np.clip(np.nan_to_num(places) * step, 0, top)).astype(np.uint16)
-    return found
+    levels: NDArray[np.uint16] = np.rint(np.clip(np.nan_to_num(places) * step, 0, top)).astype(np.uint16)
+    return levels
 
 
 def _scaled(unit: NDArray[Any], height: float, most: int) -> NDArray[np.uint16]:
-    found: NDArray[np.uint16] = np.rint(unit * (height / most)).astype(np.uint16)
-    return found
+    levels: NDArray[np.uint16] = np.rint(unit * (height / most)).astype(np.uint16)
+    return levels

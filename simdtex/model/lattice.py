@@ -128,8 +128,8 @@ class Grid:
     def struct(self) -> np.void:
         """The grid as a kernel argument, of the type `LATTICE`."""
         numbers = np.zeros((), LATTICE)
-        one, none = (1,) * (3 - len(self.shape)), (0,) * (3 - len(self.shape))
-        axes = (*one, *self.shape), (*none, *self.around), (*none, *self.first), (*one, *self.whole.shape)
+        ones, none = (1,) * (3 - len(self.shape)), (0,) * (3 - len(self.shape))
+        axes = (*ones, *self.shape), (*none, *self.around), (*none, *self.first), (*ones, *self.whole.shape)
         (*_, rows, cols), (begin, across, size) = self.pixels, self.key
         others = (self.step * size, rows, across or cols, *(self.tile or (0, 0)), self.size, begin)
         numbers[()] = (*chain(*axes), *others)
@@ -169,11 +169,11 @@ class Grid:
 
     def near_edge(self, radius: int) -> NDArray[np.bool_]:
         """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""
-        found = np.zeros(self.shape, bool)
+        mask = np.zeros(self.shape, bool)
         if not self.torus:
             for near, n in zip(np.ix_(*self.lines()), self.whole.shape, strict=True):
-                found |= (near < radius) | (near >= n - radius)
-        return found
+                mask |= (near < radius) | (near >= n - radius)
+        return mask
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole output: the keys of random numbers."""
@@ -198,11 +198,11 @@ class Grid:
         sides = np.array(self.shape)[:, None, None]
         there = np.where(np.array(self.around)[:, None, None], there % sides, there)
         inside = ((there >= 0) & (there < sides)).all(0) & (there != itself).any(0)
-        number = np.ravel_multi_index(tuple(np.where(inside, there, 0)), self.shape)
+        index = np.ravel_multi_index(tuple(np.where(inside, there, 0)), self.shape)
         if self.tile:
             tile = np.array(self.tile)[:, None, None]
-            number = number + (there // tile != itself // tile).any(0) * self.size
-        return np.where(inside, number, -1).astype(np.int32)
+            index = index + (there // tile != itself // tile).any(0) * self.size
+        return np.where(inside, index, -1).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -274,27 +274,27 @@ def coloring_sublattice(
             if index % c or (cols is not None and cols % c):
                 continue
             for b in range(index // c):
-                found = Sublattice(index // c, b, c)
-                fitting = rows is None or cols is None or found.fits(rows, cols)
-                if fitting and found.shortest() > order:
-                    return found
+                lattice = Sublattice(index // c, b, c)
+                fitting = rows is None or cols is None or lattice.fits(rows, cols)
+                if fitting and lattice.shortest() > order:
+                    return lattice
     return None
 
 
 def gathered(array: NDArray[Any], index: NDArray[np.integer[Any]], none: float) -> NDArray[Any]:
     """Return ``array[..., index]``, and ``none`` where the index is negative: there is nothing to read."""
     there = index >= 0
-    found = np.full((*array.shape[:-1], *index.shape), none, array.dtype)
-    found[..., there] = array[..., index[there]]
-    return found
+    taken = np.full((*array.shape[:-1], *index.shape), none, array.dtype)
+    taken[..., there] = array[..., index[there]]
+    return taken
 
 
 def sums_around(values: NDArray[Any], reach: int) -> NDArray[np.int64]:
     """Return the sum of integers over 2 reach + 1 places along each axis around each place, clipped to the array."""
-    found: NDArray[np.int64] = values.astype(np.int64)
+    total: NDArray[np.int64] = values.astype(np.int64)
     for axis, n in enumerate(values.shape):
-        running = np.zeros((*found.shape[:axis], n + 1, *found.shape[axis + 1 :]), np.int64)
-        found.cumsum(axis, out=running[(slice(None),) * axis + (slice(1, None),)])
+        running = np.zeros((*total.shape[:axis], n + 1, *total.shape[axis + 1 :]), np.int64)
+        total.cumsum(axis, out=running[(slice(None),) * axis + (slice(1, None),)])
         at = np.arange(n)
-        found = running.take(np.minimum(at + reach + 1, n), axis) - running.take(np.maximum(at - reach, 0), axis)
-    return found
+        total = running.take(np.minimum(at + reach + 1, n), axis) - running.take(np.maximum(at - reach, 0), axis)
+    return total

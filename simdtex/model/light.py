@@ -74,8 +74,8 @@ class Trend(NamedTuple):
             return np.zeros((1, 1, self.terms.shape[1]))
         lines = [np.arange(side) if n in wraps else (rows, cols)[n] for n, side in enumerate(self.shape)]
         y, x = (_centred(np.clip(at, 0, side - 1), side) for at, side in zip(lines, self.shape, strict=True))
-        found = np.clip(_sheet(self.terms, y[:, None, None], x[:, None]), *self.limits)
-        return np.asarray(found.mean(wraps, keepdims=True)) if wraps else found
+        trend = np.clip(_sheet(self.terms, y[:, None, None], x[:, None]), *self.limits)
+        return np.asarray(trend.mean(wraps, keepdims=True)) if wraps else trend
 
     def removed(self, picture: NDArray[Any], along: Axes = (0, 1)) -> NDArray[Any]:
         """Return the picture (rows, cols, C) without the trend's changes along these axes."""
@@ -90,13 +90,13 @@ class Trend(NamedTuple):
         every = _thinned(use)
         lines: Any = (np.arange(side)[part] for side, part in zip(self.shape, every, strict=True))
         whole, there = picture[every], use[every]
-        before, after = (np.abs(one[there] - np.median(one[there], 0)) for one in (whole, whole - self.at(*lines)))
+        before, after = (np.abs(part[there] - np.median(part[there], 0)) for part in (whole, whole - self.at(*lines)))
         return bool(np.median(after, 0).sum() < LEFT * np.median(before, 0).sum())
 
     def cast(self, values: NDArray[np.float64]) -> NDArray[Any]:
         """Return values (..., C) within those of the picture, in its type."""
-        found = np.clip(values, *self.ends.astype(np.float64))
-        return (np.rint(found) if self.ends.dtype.kind in "iu" else found).astype(self.ends.dtype)
+        clipped = np.clip(values, *self.ends.astype(np.float64))
+        return (np.rint(clipped) if self.ends.dtype.kind in "iu" else clipped).astype(self.ends.dtype)
 
 
 def trend(picture: NDArray[Any], use: Mask | None = None) -> Trend:
@@ -161,11 +161,11 @@ def in_light(pictures: Pictures, light: str, categorical: Any = False) -> tuple[
     about = {"light": light, **unevenness(pictures.pixels[0])}
     if light == "keep":
         return pictures, Light(about)
-    use = [np.ones(one.shape[:2], bool) for one in pictures.pixels]
+    use = [np.ones(picture.shape[:2], bool) for picture in pictures.pixels]
     for masks in filter(None, (pictures.known, pictures.usable)):
-        use = [one & mask for one, mask in zip(use, masks, strict=True)]
-    found = trends(pictures.pixels, use, categorical)
-    pixels = tuple(one.removed(picture) for one, picture in zip(found, pictures.pixels, strict=True))
+        use = [used & mask for used, mask in zip(use, masks, strict=True)]
+    sheets = trends(pictures.pixels, use, categorical)
+    pixels = tuple(sheet.removed(picture) for sheet, picture in zip(sheets, pictures.pixels, strict=True))
     return replace(pictures, pixels=pixels), Light(about)
 
 
@@ -218,9 +218,9 @@ def _centred(at: NDArray[np.integer], side: int) -> NDArray[np.float64]:
 
 def _sheet(terms: NDArray[np.float64], y: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the quadratic of ``terms`` (6, ...) at ``y`` and ``x``, without matrices: the same bits everywhere."""
-    found: NDArray[np.float64] = terms[0] + y * (terms[2] + y * terms[5]) + x * (terms[1] + x * terms[3])
-    found += y * terms[4] * x
-    return found
+    sheet: NDArray[np.float64] = terms[0] + y * (terms[2] + y * terms[5]) + x * (terms[1] + x * terms[3])
+    sheet += y * terms[4] * x
+    return sheet
 
 
 def _fitted(

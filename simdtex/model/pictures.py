@@ -67,7 +67,7 @@ class Pictures:
         """Return the categories of a variable in ascending order; None if it is not categorical."""
         if not (self.categorical and self.categorical[variable]):
             return None
-        return np.unique(np.concatenate([self.values(variable, number) for number in range(len(self.pixels))]))
+        return np.unique(np.concatenate([self.values(variable, picture) for picture in range(len(self.pixels))]))
 
     def proportions(self) -> NDArray[np.number[Any]]:
         """Return the proportions of the categories of the first variable, by the shares of the pictures."""
@@ -77,10 +77,10 @@ class Pictures:
         each = counts / counts.sum(1, keepdims=True)
         return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
 
-    def values(self, variable: int, number: int) -> NDArray[Any]:
+    def values(self, variable: int, picture: int) -> NDArray[Any]:
         """Return the known values of a variable in one of the pictures, (n,)."""
-        plane = self.pixels[number][..., variable]
-        return plane[self.known[number]] if self.known else plane.ravel()
+        plane = self.pixels[picture][..., variable]
+        return plane[self.known[picture]] if self.known else plane.ravel()
 
     def halved(self) -> Pictures:
         """Return pictures of half the size: the means of squares of 2x2 pixels, known and usable if all four are."""
@@ -214,19 +214,19 @@ class Turned:
         """Return the copies of pictures as pictures."""
         copies, unknown, usable = self.copies, None, None
         if pictures.known:
-            unknown = tuple(one.of([~known for known in pictures.known]) for one in copies)
-        if pictures.usable or not all(one.inside.all() for one in copies):
-            everywhere = [np.ones(one.shape[:-1], bool) for one in pictures.pixels]
-            usable = tuple(one.inside & one.of(pictures.usable or everywhere) for one in copies)
-        return Pictures(tuple(one.of(pictures.pixels) for one in copies), unknown, usable)
+            unknown = tuple(copy.of([~known for known in pictures.known]) for copy in copies)
+        if pictures.usable or not all(copy.inside.all() for copy in copies):
+            everywhere = [np.ones(picture.shape[:-1], bool) for picture in pictures.pixels]
+            usable = tuple(copy.inside & copy.of(pictures.usable or everywhere) for copy in copies)
+        return Pictures(tuple(copy.of(pictures.pixels) for copy in copies), unknown, usable)
 
     def sources(self, place: NDArray[np.int32], several: bool) -> NDArray[np.int32]:
         """Return the source map in the pictures from one of the copies, with the picture's number if ``several``."""
         axes, none = len(self.copies[0].at), place[..., 0] < 0
-        number = place[..., axes] if place.shape[-1] > axes else np.where(none, np.int32(-1), np.int32(0))
+        index = place[..., axes] if place.shape[-1] > axes else np.where(none, np.int32(-1), np.int32(0))
         source = np.full((*place.shape[:-1], axes + several), -1, np.int32)
         for k, copy in enumerate(self.copies):
-            here = number == k
+            here = index == k
             at = tuple(place[here][:, :axes].T)
             lines = [line[at] for line in np.broadcast_arrays(*copy.at)]
             source[here] = np.stack([*lines, np.full(at[0].size, copy.image)][: axes + several], -1)

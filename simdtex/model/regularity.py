@@ -121,15 +121,15 @@ class Lattice(NamedTuple):
         """Return the lattice deformed so that a torus of ``shape`` pixels holds it; None beyond `MOST_STRAIN`."""
         size, basis = np.diag(shape).astype(np.float64), self.basis
         exact = size @ _inverse(basis)
-        found, least = None, MOST_STRAIN
+        closest, least = None, MOST_STRAIN
         for more in product((-1, 0, 1), repeat=4):
             count = np.rint(exact) + np.array(more, np.float64).reshape(2, 2)
             if not round(float(_determinant(count))):
                 continue
             deformed = _inverse(count) @ size
             if (strain := self.deformation(deformed)) < least:
-                found, least = deformed, strain
-        return None if found is None else _lattice(found)._replace(origin=self.origin)
+                closest, least = deformed, strain
+        return None if closest is None else _lattice(closest)._replace(origin=self.origin)
 
     def deformation(self, basis: NDArray[np.float64]) -> float:
         """Return the deformation to another basis (2, 2) of the same nodes: the norm of the strain of the plane."""
@@ -156,7 +156,7 @@ class Phases(NamedTuple):
 
     def halved(self) -> Phases:
         """Return the phases of pictures and an output of half the size."""
-        return Phases(tuple(one.halved() for one in self.pictures), self.output.halved(), self.weight)
+        return Phases(tuple(lattice.halved() for lattice in self.pictures), self.output.halved(), self.weight)
 
     def waves(self, spread: float, top: int) -> Waves:
         """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels, summed over channels."""
@@ -180,27 +180,27 @@ class Waves(NamedTuple):
     weight: float
     height: float
 
-    def sample(self, number: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
+    def sample(self, picture: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
         """Return the guide (4, ...) at pixels of one of the sample's pictures."""
-        return self._levels(self.pictures[number], row, col)
+        return self._levels(self.pictures[picture], row, col)
 
     def at(self, grid: Grid) -> NDArray[np.uint16]:
         """Return the guide (4, rows, cols) of the output at the sites of a lattice or a window of it."""
         row, col = (line * grid.step for line in grid.lines())
-        found = np.empty((WAVES, grid.rows, grid.cols), np.uint16)
+        levels = np.empty((WAVES, grid.rows, grid.cols), np.uint16)
         for first in range(0, grid.rows, CACHED_ROWS):
             some = slice(first, first + CACHED_ROWS)
-            found[:, some] = self._levels(self.output, row[some, None], col[None, :])
-        return found
+            levels[:, some] = self._levels(self.output, row[some, None], col[None, :])
+        return levels
 
     @property
     def divisions(self) -> tuple[int, int]:
         """The numbers of phases along the vectors of the lattice: each is a pixel wide, and all fit in 16 bits."""
         return tuple(min(255, max(1, round(sqrt(y * y + x * x)))) for y, x in self.output[:2])  # type: ignore[return-value]
 
-    def phase(self, number: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
+    def phase(self, picture: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.int32]:
         """Return the numbers of the phases of pixels of one of the sample's pictures."""
-        return self._phase(self.pictures[number], row, col)
+        return self._phase(self.pictures[picture], row, col)
 
     def phase_at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the numbers (rows, cols) of the phases of the sites of a lattice or a window of it."""
@@ -221,8 +221,8 @@ class Waves(NamedTuple):
     def _levels(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
         angles = 2 * np.pi * lattice.phases(row, col)
         waves = np.stack([wave(angle) for angle in angles for wave in (np.cos, np.sin)])
-        found: NDArray[np.uint16] = np.rint((1 + np.rint(waves * ROUND) / ROUND) * self.height).astype(np.uint16)
-        return found
+        levels: NDArray[np.uint16] = np.rint((1 + np.rint(waves * ROUND) / ROUND) * self.height).astype(np.uint16)
+        return levels
 
 
 def parse_lattice(value: Any) -> Lattice | str | None:
@@ -232,17 +232,17 @@ def parse_lattice(value: Any) -> Lattice | str | None:
     remedy = 'give "auto", "none", or two vectors in pixels: ((dy, dx), (dy, dx)), or the text "DY,DX,DY,DX"'
     parts: list[Any] = value.split(",") if isinstance(value, str) else []
     if isinstance(value, (tuple, list)):
-        parts = [number for part in value for number in (part if isinstance(part, (tuple, list)) else (part,))]
+        parts = [component for part in value for component in (part if isinstance(part, (tuple, list)) else (part,))]
     elif not isinstance(value, str):
         raise TypeError(f"lattice must be a text or two vectors, not {shown(value)}; {remedy}")
     try:
-        a, b, c, d = (float(number) for number in parts)
+        a, b, c, d = (float(part) for part in parts)
     except (TypeError, ValueError):
         raise ValueError(f"lattice is {shown(value)}; {remedy}") from None
-    found = Lattice((a, b), (c, d))
-    if not (np.isfinite([a, b, c, d]).all() and found.cell >= SMALLEST):
-        raise ValueError(f"the cell of the lattice {shown(value)} has {found.cell:g} pixels; give {SMALLEST} or more")
-    return found
+    lattice = Lattice((a, b), (c, d))
+    if not (np.isfinite([a, b, c, d]).all() and lattice.cell >= SMALLEST):
+        raise ValueError(f"the cell of the lattice {shown(value)} has {lattice.cell:g} pixels; give {SMALLEST} or more")
+    return lattice
 
 
 def phases(
@@ -258,18 +258,18 @@ def phases(
     (H, W), and their positions in the sample (H, W, 2 or 3), -1 or None from elsewhere, which fix the output's phases.
     """
     planes, masks = plain(pictures)
-    largest = max(range(len(planes)), key=lambda number: (planes[number].size, -number))
-    found = regular(planes[largest], masks[largest]) if isinstance(lattice, str) else lattice
-    if found is None:
+    largest = max(range(len(planes)), key=lambda picture: (planes[picture].size, -picture))
+    base = regular(planes[largest], masks[largest]) if isinstance(lattice, str) else lattice
+    if base is None:
         return None
-    reference = harmonics(planes[largest], masks[largest], found)
+    reference = harmonics(planes[largest], masks[largest], base)
     lattices = [
-        found if number == largest else aligned(found, reference, harmonics(plane, mask, found))
-        for number, (plane, mask) in enumerate(zip(planes, masks, strict=True))
+        base if picture == largest else aligned(base, reference, harmonics(plane, mask, base))
+        for picture, (plane, mask) in enumerate(zip(planes, masks, strict=True))
     ]
-    output = found.fitted(shape) if torus else found
+    output = base.fitted(shape) if torus else base
     if output is None and not isinstance(lattice, str):
-        rows, cols = found.fitting(shape)
+        rows, cols = base.fitting(shape)
         raise ValueError(
             f"the lattice fits a torus of {shape[0]}x{shape[1]} (rows x columns) only if deformed by more than "
             f'{MOST_STRAIN:.0%}; give the shape {rows}x{cols}, or boundary="open"'
@@ -320,7 +320,7 @@ def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | N
         return None
     correlation = autocorrelation(picture, known)
     lattices = followed(correlation, candidates(correlation))
-    lattices = [one for one in lattices if one.strength >= max(LEAST_STRENGTH, SIGNIFICANT * one.error * one.length)]
+    lattices = [fit for fit in lattices if fit.strength >= max(LEAST_STRENGTH, SIGNIFICANT * fit.error * fit.length)]
     least = max([CONTRAST, *(OF_GREATEST * each.contrast for each in lattices)])
     best = _best([each for each in lattices if each.contrast >= least])
     if best is None:
@@ -419,8 +419,8 @@ def candidates(correlation: Correlation, sides: int = 3) -> NDArray[np.int64]:
     use = ((y > 0) | ((y == 0) & (x > 0))) & (y * y + x * x >= APART**2)
     order = np.lexsort((x[use], y[use], -height[use]))[:MOST_PEAKS]
     vectors = np.stack([y[use], x[use]], 1)[order]
-    one, other = np.triu_indices(len(vectors), 1)
-    pairs = reduced(np.stack([vectors[one], vectors[other]], 1))
+    first, other = np.triu_indices(len(vectors), 1)
+    pairs = reduced(np.stack([vectors[first], vectors[other]], 1))
     if not len(pairs):
         return pairs
     reach = np.array([m, n])
@@ -431,8 +431,8 @@ def candidates(correlation: Correlation, sides: int = 3) -> NDArray[np.int64]:
 
     def at(plane: NDArray[np.float64], lags: NDArray[Any]) -> NDArray[np.float64]:
         lags = np.clip(np.rint(lags).astype(int), -reach, reach) + reach
-        found: NDArray[np.float64] = plane[lags[..., 0], lags[..., 1]]
-        return found
+        values: NDArray[np.float64] = plane[lags[..., 0], lags[..., 1]]
+        return values
 
     ends = at(correlation.around, vectors)
     near = ends[:, :2].mean(1)
@@ -461,11 +461,11 @@ def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         if not times.any():
             break
         second -= times[:, None] * first
-    found = np.stack([first, second], 1)
-    found = found[(found**2).sum(2).all(1)]
-    flip = (found[..., 0] < 0) | ((found[..., 0] == 0) & (found[..., 1] < 0))
-    found[flip] *= -1
-    unique: NDArray[np.int64] = np.unique(found.reshape(-1, 4), axis=0).reshape(-1, 2, 2)
+    bases = np.stack([first, second], 1)
+    bases = bases[(bases**2).sum(2).all(1)]
+    flip = (bases[..., 0] < 0) | ((bases[..., 0] == 0) & (bases[..., 1] < 0))
+    bases[flip] *= -1
+    unique: NDArray[np.int64] = np.unique(bases.reshape(-1, 4), axis=0).reshape(-1, 2, 2)
     return unique
 
 
@@ -496,19 +496,19 @@ def followed(correlation: Correlation, pairs: NDArray[np.int64]) -> list[Followe
     def mean(plane: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
         seen = (np.abs(lags) <= reach - 2).all(1)
         at = np.rint(lags[seen]).astype(int) + reach
-        found, count = (np.bincount(owner[seen], weights, len(bases)) for weights in (plane[at[:, 0], at[:, 1]], None))
-        return np.where(count, found / np.maximum(count, 1), -np.inf)
+        total, count = (np.bincount(owner[seen], weights, len(bases)) for weights in (plane[at[:, 0], at[:, 1]], None))
+        return np.where(count, total / np.maximum(count, 1), -np.inf)
 
     strength, vectors = mean(correlation.around, lags), shortest(bases)
     between = [mean(correlation.values, lags + vectors[owner, k] * part) for k in range(3) for part in INSIDE]
     contrast = strength - np.max(between, 0)
-    found = []
-    for number, basis in enumerate(bases):
+    lattices = []
+    for index, basis in enumerate(bases):
         core = correlation.values[correlation.length <= (basis**2).sum(1).min() / 4]
         error = sqrt(float((core**2).sum()) / correlation.pixels)
         lattice = _lattice(np.rint(basis * FINE) / FINE)
-        found.append(Followed(lattice, float(strength[number]), error, float(contrast[number])))
-    return found
+        lattices.append(Followed(lattice, float(strength[index]), error, float(contrast[index])))
+    return lattices
 
 
 def _nodes(
@@ -538,12 +538,12 @@ def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[n
         y, x = np.maximum(1, y + best // 3 - 1), np.maximum(1, x + best % 3 - 1)
         y, x = np.minimum(y, rows - 2), np.minimum(x, cols - 2)  # np.clip takes several times as long
     at = y * cols + x
-    middle, found = flat.take(at), np.stack([y, x], 1).astype(np.float64)
+    middle, summit = flat.take(at), np.stack([y, x], 1).astype(np.float64)
     for axis, step in enumerate((cols, 1)):
         low, high = flat.take(at - step), flat.take(at + step)
         bend = low - 2 * middle + high
-        found[:, axis] += np.where(bend < 0, np.clip((low - high) / np.where(bend < 0, 2 * bend, 1), -0.5, 0.5), 0)
-    shifted: NDArray[np.float64] = found - np.array([rows // 2, cols // 2])
+        summit[:, axis] += np.where(bend < 0, np.clip((low - high) / np.where(bend < 0, 2 * bend, 1), -0.5, 0.5), 0)
+    shifted: NDArray[np.float64] = summit - np.array([rows // 2, cols // 2])
     return shifted
 
 
@@ -552,15 +552,15 @@ def _least_squares(
 ) -> NDArray[np.float64]:
     """Return the bases (count, 2, 2) for which ``nodes @ basis`` is nearest to ``peaks``, 0 if not determined."""
 
-    def sums(one: NDArray[np.float64]) -> NDArray[np.float64]:
-        products: list[Any] = [np.bincount(owner, x * y, count) for x in nodes.T for y in one.T]
+    def sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        products: list[Any] = [np.bincount(owner, x * y, count) for x in nodes.T for y in values.T]
         return np.stack(products, 1).reshape(count, 2, 2)
 
     square, right = sums(nodes), sums(peaks)
     known = np.abs(_determinant(square)) >= 1e-9
-    found = np.zeros((count, 2, 2))
-    found[known] = _inverse(square[known]) @ right[known]
-    return found
+    solution = np.zeros((count, 2, 2))
+    solution[known] = _inverse(square[known]) @ right[known]
+    return solution
 
 
 def harmonics(picture: NDArray[np.int64], known: NDArray[np.bool_], lattice: Lattice) -> NDArray[np.complex128]:
@@ -571,12 +571,12 @@ def harmonics(picture: NDArray[np.int64], known: NDArray[np.bool_], lattice: Lat
     return np.array([(np.exp(-2j * np.pi * (k * y + m * x)) * (values - values.mean())).sum() for k, m in HARMONICS])
 
 
-def aligned(lattice: Lattice, wanted: NDArray[np.complex128], own: NDArray[np.complex128]) -> Lattice:
-    """Return the lattice moved so that a picture with harmonics ``own`` has the phases of one with ``wanted``."""
+def aligned(lattice: Lattice, wanted: NDArray[np.complex128], actual: NDArray[np.complex128]) -> Lattice:
+    """Return the lattice moved so that a picture with harmonics ``actual`` has the phases of one with ``wanted``."""
     y, x = np.mgrid[:STEPS, :STEPS] / STEPS
     likeness = sum(
-        (np.exp(2j * np.pi * (k * y + m * x)) * one * np.conj(other)).real
-        for (k, m), one, other in zip(HARMONICS, own, wanted, strict=True)
+        (np.exp(2j * np.pi * (k * y + m * x)) * value * np.conj(other)).real
+        for (k, m), value, other in zip(HARMONICS, actual, wanted, strict=True)
     )
     best = int(np.argmax(np.rint(likeness / (np.abs(likeness).max() or 1) * ROUND)))
     return lattice.moved(np.array(divmod(best, STEPS)) / STEPS)
@@ -588,10 +588,10 @@ def _continued(
     """Return the lattice of an output moved so that its known sites have the phases of their sources."""
     row, col = np.nonzero(known)
     source = place[known].astype(np.float64)
-    number = source[:, 2].astype(int) if source.shape[1] > 2 else np.zeros(len(source), int)
+    index = source[:, 2].astype(int) if source.shape[1] > 2 else np.zeros(len(source), int)
     apart = lattice.phases(row, col)
     for n, picture in enumerate(pictures):
-        apart[:, number == n] -= picture.phases(source[number == n, 0], source[number == n, 1])
+        apart[:, index == n] -= picture.phases(source[index == n, 0], source[index == n, 1])
     turn = np.exp(2j * np.pi * apart).sum(1)
     return lattice.moved(np.rint(np.angle(turn) / (2 * np.pi) * 2**16) / 2**16)
 
@@ -604,8 +604,8 @@ def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the inverses of matrices (..., 2, 2), by Cramer's rule."""
     (a, b), (c, d) = np.moveaxis(matrix, (-2, -1), (0, 1))
     turned = np.stack([d, -b, -c, a], -1).reshape(matrix.shape)
-    found: NDArray[np.float64] = turned / _determinant(matrix)[..., None, None]
-    return found
+    inverse: NDArray[np.float64] = turned / _determinant(matrix)[..., None, None]
+    return inverse
 
 
 def _lattice(basis: NDArray[np.float64]) -> Lattice:

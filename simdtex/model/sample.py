@@ -115,16 +115,16 @@ class Sample:
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
         self.shown, spread = len(levels[0]), variance(*levels)
-        guiding = [one.planes(self.scale, spread * self.shown, highest(values)) for one in guides]
+        guiding = [guide.planes(self.scale, spread * self.shown, highest(values)) for guide in guides]
         if weight:
             more = structure(levels, weight, spread, max(self.top, STEPS))
-            levels = [np.concatenate([here, one[None]]) for here, one in zip(levels, more, strict=True)]
+            levels = [np.concatenate([here, plane[None]]) for here, plane in zip(levels, more, strict=True)]
         channels = len(levels[0])
         self.guided = [np.concatenate(those) for those in zip(*(guide.samples for guide in guiding), strict=True)]
         for guide in guiding:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
-        known = (len(planes.output) for one, planes in zip(guides, guiding, strict=True) if isinstance(one, Colocated))
+        known = (len(part.output) for guide, part in zip(guides, guiding, strict=True) if isinstance(guide, Colocated))
         self.known_variables = sum(known)
         self.waves = phases and phases.waves(spread * self.shown, highest(values))
         self._lay(levels, margin, step, apart)
@@ -149,15 +149,15 @@ class Sample:
             self._lay_volumes(levels, margin, step)
             return
         top = 0
-        for one in levels:
-            self.boxes.append((top, *one.shape[1:]))
-            top += -(-(one.shape[1] + max(2 * margin, apart)) // step) * step
+        for picture in levels:
+            self.boxes.append((top, *picture.shape[1:]))
+            top += -(-(picture.shape[1] + max(2 * margin, apart)) // step) * step
         self.height, self.width = sum(self.boxes[-1][:2]), max(cols for *_, cols in self.boxes)
         self.rows, self.cols = self.height + 2 * margin, self.width + 2 * margin
         canvas = np.zeros((len(levels[0]), self.rows, self.cols), np.uint16)
-        for (first, rows, cols), one in zip(self.boxes, levels, strict=True):
+        for (first, rows, cols), picture in zip(self.boxes, levels, strict=True):
             around = ((0, 0), (margin, margin), (margin, margin))
-            padded = np.pad(one, around, mode="reflect" if min(rows, cols) > 1 else "edge")
+            padded = np.pad(picture, around, mode="reflect" if min(rows, cols) > 1 else "edge")
             canvas[:, first : first + rows + 2 * margin, : cols + 2 * margin] = padded
         self.levels = [
             canvas[:, margin + first : margin + first + rows, margin : margin + cols]
@@ -166,17 +166,17 @@ class Sample:
         self.working = canvas.reshape(len(canvas), -1)
 
     def _lay_volumes(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int) -> None:
-        self.height, self.width = (max(one.shape[axis] for one in levels) for axis in (2, 3))
+        self.height, self.width = (max(volume.shape[axis] for volume in levels) for axis in (2, 3))
         self.layer, self.cols, self.levels = self.height + 2 * margin, self.width + 2 * margin, [*levels]
         high, parts = 0, []
-        for one in levels:
-            self.boxes.append((high, *one.shape[2:]))
-            parts.append(np.pad(one, ((0, 0), *[(margin, margin)] * 3), mode="reflect"))
+        for volume in levels:
+            self.boxes.append((high, *volume.shape[2:]))
+            parts.append(np.pad(volume, ((0, 0), *[(margin, margin)] * 3), mode="reflect"))
             high += -(-parts[-1].shape[1] // step) * step
         self.depth = self.boxes[-1][0] + levels[-1].shape[1]
         canvas = np.zeros((len(levels[0]), self.depth + 2 * margin, self.layer, self.cols), np.uint16)
-        for (first, *_), one in zip(self.boxes, parts, strict=True):
-            canvas[:, first : first + one.shape[1], : one.shape[2], : one.shape[3]] = one
+        for (first, *_), volume in zip(self.boxes, parts, strict=True):
+            canvas[:, first : first + volume.shape[1], : volume.shape[2], : volume.shape[3]] = volume
         self.rows, self.working = canvas.shape[1] * self.layer, canvas.reshape(len(canvas), -1)
 
     def _stacked(self, pictures: Sequence[NDArray[Any]], between: Any) -> NDArray[Any]:
@@ -185,14 +185,14 @@ class Sample:
             return pictures[0]
         sides = (self.depth, self.height, self.width) if self.layer else (self.height, self.width)
         stacked = np.full((*sides, *pictures[0].shape[len(sides) :]), between, pictures[0].dtype)
-        for (first, *_), one in zip(self.boxes, pictures, strict=True):
-            stacked[(slice(first, first + len(one)), *map(slice, one.shape[1 : len(sides)]))] = one
+        for (first, *_), picture in zip(self.boxes, pictures, strict=True):
+            stacked[(slice(first, first + len(picture)), *map(slice, picture.shape[1 : len(sides)]))] = picture
         return stacked
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """Mask (rows, cols), margins included, of the sample's pixels that are known and may be taken."""
-        here = [np.ones(one.shape[1:], bool) for one in self.levels]
+        here = [np.ones(planes.shape[1:], bool) for planes in self.levels]
         for masks in (self.pictures.known, self.pictures.usable):
             here = [a & b for a, b in zip(here, masks, strict=True)] if masks else here
         return self._framed(here)
@@ -204,7 +204,7 @@ class Sample:
     @cached_property
     def variance(self) -> float:
         """sigma^2 of equation (8): the variance of the working levels, averaged over the matched channels."""
-        return variance(*(one[: self.channels] for one in self.levels))
+        return variance(*(planes[: self.channels] for planes in self.levels))
 
     def _in_pixels(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
         """Return offsets from sites of a level in rows and columns of the sample with its margin, (N, 2)."""
@@ -291,33 +291,33 @@ class Sample:
         picture = self.picture_of(places.everywhere)
         counts = np.bincount(picture[allowed], minlength=len(self.boxes))
         total, fair = sum(self.pictures.shares), np.zeros(allowed.size, np.int64)
-        for number, share in enumerate(self.pictures.shares):
-            each = round(2**16 * share / total * int(counts.sum()) / max(1, int(counts[number])))
-            fair[allowed & (picture == number)] = each
+        for index, share in enumerate(self.pictures.shares):
+            each = round(2**16 * share / total * int(counts.sum()) / max(1, int(counts[index])))
+            fair[allowed & (picture == index)] = each
         return fair
 
     def picture_of(self, source: NDArray[np.integer]) -> NDArray[np.intp]:
         """Return the number of the picture of each pixel index: the last one that begins at or above it."""
         tops = np.array([top for top, *_ in self.boxes]) * (self.layer or 1)
         row = np.asarray(source) // self.cols - self.margin * ((self.layer or 0) + 1)
-        found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
-        return found
+        picture: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
+        return picture
 
     def phases_at(self, source: NDArray[np.integer]) -> NDArray[np.uint16]:
         """Return the phases (waves, n) of pixels (n,) of a regular sample."""
         assert self.waves
-        found = np.empty((WAVES, source.size), np.uint16)
+        phases = np.empty((WAVES, source.size), np.uint16)
         for picture, there, row, col in self._in_pictures(source):
-            found[:, there] = self.waves.sample(picture, row, col)
-        return found
+            phases[:, there] = self.waves.sample(picture, row, col)
+        return phases
 
     def phase_numbers_at(self, source: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the numbers (n,) of the phases of pixels (n,) of a regular sample."""
         assert self.waves
-        found = np.empty(source.size, np.int32)
+        phases = np.empty(source.size, np.int32)
         for picture, there, row, col in self._in_pictures(source):
-            found[there] = self.waves.phase(picture, row, col)
-        return found
+            phases[there] = self.waves.phase(picture, row, col)
+        return phases
 
     def _in_pictures(self, source: NDArray[np.integer]) -> Iterator[tuple[int, NDArray[np.bool_], Any, Any]]:
         """Yield the number of each picture, which of the pixels (n,) are in it, and their rows and columns there."""
@@ -369,9 +369,9 @@ class Sample:
         """Return [layer,] row, column[, picture] in the user's sample of pixel indices; -1 without a source."""
         place = np.stack(self._coordinates(source), -1)
         if len(self.boxes) > 1:
-            number = self.picture_of(source).astype(np.int32)
-            place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[number]
-            place = np.concatenate([place * np.int32(self.reduction), number[..., None]], -1)
+            picture = self.picture_of(source).astype(np.int32)
+            place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[picture]
+            place = np.concatenate([place * np.int32(self.reduction), picture[..., None]], -1)
         else:
             place *= self.reduction
         return np.where((source < 0)[..., None], np.int32(-1), place)
@@ -384,8 +384,8 @@ class Sample:
         if self.reduction > 1:
             row, col = np.minimum(row // self.reduction, rows - 1), np.minimum(col // self.reduction, cols - 1)
         row = row + ((place[..., 0] + first + self.margin) * self.layer if self.layer else first)
-        found = (row + self.margin) * self.cols + col + self.margin
-        return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
+        index = (row + self.margin) * self.cols + col + self.margin
+        return np.where(place[..., 0] < 0, -1, index).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of working levels (C, rows, cols) and pixel indices (rows, cols).
@@ -393,11 +393,11 @@ class Sample:
         A pixel is its source pixel plus the difference of the working level from that of the source.
         """
         source = np.maximum(source, self.first)  # without a source: the difference from the first pixel
-        own, usual = self.own(source), self.working[: self.shown, source]
+        pixels, usual = self.own(source), self.working[: self.shown, source]
         if not self.direct or (values[: self.shown] == usual).all():
-            return np.ascontiguousarray(own)
+            return np.ascontiguousarray(pixels)
         step = np.moveaxis(values[: self.shown].astype(np.int64) - usual, 0, -1)
-        return moved(own, step, self.unit, self.pixels)
+        return moved(pixels, step, self.unit, self.pixels)
 
     def own(self, source: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (..., C) at pixel indices, in the sample's own type."""
@@ -413,25 +413,25 @@ class Sample:
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""
         lines = np.stack(self._coordinates(position[:, None] + reach))
-        number = self.picture_of(position)
-        sides = np.array([one.shape[1:] for one in self.levels])[number].T[..., None]
-        top = np.array([top for top, *_ in self.boxes])[number, None]
+        picture = self.picture_of(position)
+        sides = np.array([planes.shape[1:] for planes in self.levels])[picture].T[..., None]
+        top = np.array([top for top, *_ in self.boxes])[picture, None]
         lines[0] -= top
         period = np.maximum(2 * sides - 2, 1)
         lines = abs(lines) % period
         lines = np.minimum(lines, period - lines)
         lines[0] += top
-        found: NDArray[Any] = self.pixels[tuple(lines)]
-        return found
+        pixels: NDArray[Any] = self.pixels[tuple(lines)]
+        return pixels
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
         """Return the pixels (rows, cols, C) at indices, plus the differences ``by`` (C, rows, cols) of the finish."""
-        own, change = self.own(source), np.moveaxis(by, 0, -1)
+        pixels, change = self.own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8 and self.direct:
-            exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
+            exact: NDArray[Any] = np.clip(pixels.astype(np.int32) + change, 0, 255).astype(np.uint8)
             return exact
         units = self.scale.units if not self.direct else self.unit
-        return moved(own, change, units / self.fine, self.pixels)
+        return moved(pixels, change, units / self.fine, self.pixels)
 
     @property
     def fine(self) -> int:
@@ -449,10 +449,10 @@ def variance(*pictures: NDArray[np.integer]) -> float:
     return float(total / channels)
 
 
-def moved(own: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) -> NDArray[Any]:
+def moved(values: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) -> NDArray[Any]:
     """Return pixels plus a difference in units, as the closest of 0 to 255 for 8 bits, else of the sample's range."""
     with np.errstate(over="ignore"):  # half values beyond the largest double are clipped
-        half = own.astype(np.float64) / 2 + by * (unit / 2)
+        half = values.astype(np.float64) / 2 + by * (unit / 2)
     if pixels.dtype == np.bool_:
         legal: NDArray[Any] = half > 0.25
     elif pixels.dtype.kind == "f":
@@ -464,4 +464,4 @@ def moved(own: NDArray[Any], by: NDArray[Any], unit: Any, pixels: NDArray[Any]) 
         most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
         legal = np.clip(np.rint(2 * half), bounds.min, most).astype(pixels.dtype)
         legal = legal if pixels.dtype == np.uint8 else np.clip(legal, pixels.min(), pixels.max())
-    return np.where(by == 0, own, legal)
+    return np.where(by == 0, values, legal)

@@ -45,12 +45,12 @@ class Scale:
         if not self.direct:
             for variable in range(variables):
                 categories = pictures.categories(variable)
-                here = np.concatenate([pictures.values(variable, number) for number in range(len(pixels))])
+                here = np.concatenate([pictures.values(variable, picture) for picture in range(len(pixels))])
                 self._variables.append(_Stretched(here, self.top) if categories is None else _Categories(here))
             weights = pictures.weights or (1.0,) * variables
-            most = max(w * one.steepness for w, one in zip(weights, self._variables, strict=True))
-            for weight, one in zip(weights, self._variables, strict=True):
-                one.scale = weight / most * self.top if most else 0.0
+            most = max(w * kind.steepness for w, kind in zip(weights, self._variables, strict=True))
+            for weight, kind in zip(weights, self._variables, strict=True):
+                kind.scale = weight / most * self.top if most else 0.0
         elif not eight:
             self._common = _Stretched(_ends(pictures), self.top)
             self.unit = self._common.unit
@@ -60,21 +60,21 @@ class Scale:
         """One working level of each channel in the pixels' own unit, (channels,); 0 for a category."""
         if self.direct:
             return np.full(self._channels, self.unit)
-        return np.array([unit for one in self._variables for unit in (one.step,) * one.channels])
+        return np.array([unit for kind in self._variables for unit in (kind.step,) * kind.channels])
 
     @property
     def owners(self) -> list[int]:
         """The variable of each channel of working levels."""
         if self.direct:
             return list(range(self._channels))
-        return [variable for variable, one in enumerate(self._variables) for _ in range(one.channels)]
+        return [variable for variable, kind in enumerate(self._variables) for _ in range(kind.channels)]
 
     def levels(self, pixels: NDArray[Any]) -> NDArray[np.uint16]:
         """Return the working levels (channels, ...) of pixels (..., C) of the sample's type, clipped to its range."""
         planes = np.moveaxis(pixels, -1, 0)
         if not self.direct:
-            found = [one.levels(plane) for plane, one in zip(planes, self._variables, strict=True)]
-            return np.concatenate(found).astype(np.uint16)
+            levels = [kind.levels(plane) for plane, kind in zip(planes, self._variables, strict=True)]
+            return np.concatenate(levels).astype(np.uint16)
         if self._common is None:
             return planes.astype(np.uint16)
         return self._common.stretched(planes).astype(np.uint16)
@@ -114,8 +114,8 @@ class _Stretched:
         """Return the one channel of the variable."""
         if not self.spread:
             return np.zeros((1, *plane.shape), np.int64)
-        found: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
-        return found
+        levels: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
+        return levels
 
 
 class _Categories:
@@ -136,8 +136,8 @@ class _Categories:
         """Return a channel for each category."""
         height = round(self.scale * self.steepness)
         those = self.categories[1:] if len(self.categories) < 3 else self.categories
-        found = [(plane == category) * height for category in those] or [np.zeros(plane.shape, np.int64)]
-        return np.stack(found).astype(np.int64)
+        levels = [(plane == category) * height for category in those] or [np.zeros(plane.shape, np.int64)]
+        return np.stack(levels).astype(np.int64)
 
 
 def highest(values: int) -> int:
@@ -164,7 +164,7 @@ def _ends(pictures: Pictures) -> NDArray[Any]:
     known = pictures.pixels
     if pictures.known:
         known = tuple(picture[there] for picture, there in zip(known, pictures.known, strict=True))
-    values = np.concatenate([one.ravel() for one in known])
+    values = np.concatenate([picture.ravel() for picture in known])
     return np.array([values.min(), values.max()])
 
 
@@ -196,15 +196,15 @@ def structure(
         component = np.tensordot(by, levels, 1)
         around, total = surroundings(component)
         signed.append(_signed(component * total > around))
-    least = min(int(one.min()) for one in signed)
-    signed = [one - least for one in signed]
-    n, total = sum(one.size for one in signed), sum(int(one.sum()) for one in signed)
-    squares, most = sum(int((one * one).sum()) for one in signed), max(int(one.max()) for one in signed)
+    least = min(int(plane.min()) for plane in signed)
+    signed = [plane - least for plane in signed]
+    n, total = sum(plane.size for plane in signed), sum(int(plane.sum()) for plane in signed)
+    squares, most = sum(int((plane * plane).sum()) for plane in signed), max(int(plane.max()) for plane in signed)
     spread = sqrt((n * squares - total * total) / n**2)
     if not spread:
-        return [np.zeros(one.shape, np.uint16) for one in signed]
+        return [np.zeros(plane.shape, np.uint16) for plane in signed]
     scale = min(weight * sqrt(variance) / spread, top / most)
-    return [np.rint(one * scale).astype(np.uint16) for one in signed]
+    return [np.rint(plane * scale).astype(np.uint16) for plane in signed]
 
 
 def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
@@ -213,11 +213,11 @@ def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
     All arithmetic is on integers, since the last bits of a library's eigenvectors differ from machine to machine.
     """
     channels = len(pictures[0])
-    flat = [one.reshape(channels, -1).astype(np.int64) for one in pictures]
-    n = sum(one.shape[1] for one in flat)
-    sums = [sum(int(one[a].sum()) for one in flat) for a in range(channels)]
+    flat = [picture.reshape(channels, -1).astype(np.int64) for picture in pictures]
+    n = sum(levels.shape[1] for levels in flat)
+    sums = [sum(int(levels[a].sum()) for levels in flat) for a in range(channels)]
     power = [
-        [n * sum(int(one[a] @ one[b]) for one in flat) - sums[a] * sums[b] for b in range(channels)]
+        [n * sum(int(levels[a] @ levels[b]) for levels in flat) - sums[a] * sums[b] for b in range(channels)]
         for a in range(channels)
     ]
     for _ in range(SQUARINGS):
@@ -236,14 +236,14 @@ def principal(pictures: Sequence[NDArray[np.integer]]) -> NDArray[np.int64]:
 
 def smoothed(channel: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return 256 times a channel (rows, cols) smoothed by `BINOMIAL`; edge pixels continue beyond the border."""
-    found = channel.astype(np.int64)
+    total = channel.astype(np.int64)
     for axis in (0, 1):
-        around = np.pad(found, [(2, 2) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
-        n = found.shape[axis]
-        found = np.zeros_like(found)
+        around = np.pad(total, [(2, 2) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
+        n = total.shape[axis]
+        total = np.zeros_like(total)
         for k, weight in enumerate(BINOMIAL):
-            found += weight * np.take(around, np.arange(k, k + n), axis)
-    return found
+            total += weight * np.take(around, np.arange(k, k + n), axis)
+    return total
 
 
 def surroundings(component: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
@@ -263,8 +263,8 @@ def _signed(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the distance to the border between bright and dark, negative in the dark, in 1/256 of a pixel."""
     squared = np.where(bright, distance(~bright), distance(bright))
     apart = np.rint(np.sqrt(squared.astype(np.float64)) * 256).astype(np.int64) - 128
-    found: NDArray[np.int64] = np.where(bright, apart, -apart)
-    return found
+    signed: NDArray[np.int64] = np.where(bright, apart, -apart)
+    return signed
 
 
 def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:

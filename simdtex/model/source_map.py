@@ -232,7 +232,7 @@ def _maps(
     """Return the map of each sample and the sample's size, None if unknown."""
     shapes: list[tuple[int, ...] | None] = [sample_shape]
     several = positions.shape[2] == 3 and isinstance(other_map, (list, tuple))
-    maps = [plain_array("the other map", one) for one in (other_map if several else [other_map])]
+    maps = [plain_array("the other map", array) for array in (other_map if several else [other_map])]
     if several:
         shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
     wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)
