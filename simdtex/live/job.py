@@ -121,13 +121,13 @@ class PageJob:
         self._flags: list[str] = []
         whole_picture = self.kind in ("fill", "classify")
         part = _part(None if whole_picture else message.get("part"), picture.pixels.shape)
-        number = message.get("of") if self.kind == "fill" else None
-        if number is None:
+        key = message.get("of") if self.kind == "fill" else None
+        if key is None:
             name = file_stem(picture.name, "sample") + ("" if part == WHOLE else "-part")
             self._read(name, picture.pixels[part], {role: values[part] for role, values in maps.items()})
         else:
-            before = result(number)
-            self._read(f"result-{number}", before.image, before.maps)
+            before = result(key)
+            self._read(f"result-{key}", before.image, before.maps)
         self.shape: tuple[int, int] = self.sample.shape[:2]
         if self.kind == "synth":
             self._size(message)
@@ -211,16 +211,16 @@ class PageJob:
 
     def _guide(self, message: Message, shape: tuple[int, ...], part: Part) -> None:
         guide = _painted(message)
-        own = paint(guide.get("sample", []), shape)[part]
+        labels = paint(guide.get("sample", []), shape)[part]
         wanted = paint(guide.get("output", []), self.shape)
         if not wanted.any():
             return
-        if missing := sorted(set(np.unique(wanted)) - {0} - set(np.unique(own))):
+        if missing := sorted(set(np.unique(wanted)) - {0} - set(np.unique(labels))):
             raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
         transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
-        self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
+        self.files |= {"guide-sample.png": labels, "guide-texture.png": transparent}
         both = "guide-sample.png=guide-texture.png"
-        self._add("guide", (own, np.where(wanted == 0, np.nan, wanted)), "--guide", both)
+        self._add("guide", (labels, np.where(wanted == 0, np.nan, wanted)), "--guide", both)
         self._add("labels", True)
 
     def _classes(self, message: Message) -> None:

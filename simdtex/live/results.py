@@ -137,8 +137,8 @@ class PageResults(dict[int, Result]):
 
     def add(self, job: PageJob, image: NDArray[Any], output: Output, seconds: float) -> Result:
         """Add a result, and return it."""
-        number = 1 + max(self, default=0)
-        result = self[number] = Result(number, job, image, output, seconds)
+        key = 1 + max(self, default=0)
+        result = self[key] = Result(key, job, image, output, seconds)
         while len(self) > MAX_RESULTS or (len(self) > 1 and self.nbytes > MAX_BYTES):
             self.dropped.append(min(self))
             del self[self.dropped[-1]]
@@ -172,8 +172,8 @@ class Inside:
         if level is None:
             self.moment = self._instant = None
             return
-        for name, number in (("level", level), ("sweep", sweep), ("sets", sets)):
-            whole(name, number, 0)
+        for name, value in (("level", level), ("sweep", sweep), ("sets", sets)):
+            whole(name, value, 0)
         level = min(level, self.sweeps[0].level)
         places = [n for n, entry in enumerate(self.sweeps) if entry.level == level]
         if not places:  # a level without a sweep looks like the one above
@@ -195,12 +195,12 @@ class Inside:
     def describe(self) -> dict[str, Any]:
         """Return the data for the page: the sample's size, the sweeps of the run, and the moment."""
         rows, cols = self.sample.shape
-        return {"width": cols, "height": rows, "sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
+        return {"width": cols, "height": rows, "sweeps": [list(sweep) for sweep in self.sweeps], "moment": self.moment}
 
     def explain(self, row: Any, col: Any, **other: Any) -> dict[str, Any]:
         """Return an explanation of the shown value of an output pixel, with another ``order`` or ``trust``."""
-        for name, number, side in zip(("row", "column"), (row, col), self.job.shape, strict=True):
-            whole(f"the {name} of the pixel", number, 0, side - 1)
+        for name, index, side in zip(("row", "column"), (row, col), self.job.shape, strict=True):
+            whole(f"the {name} of the pixel", index, 0, side - 1)
         sweep, sets = self.moment or (-1, None)
         why = self._replay.explain_pixel(row, col, sweep, sets, **other)
         sample = self.job.sample

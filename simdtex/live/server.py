@@ -206,8 +206,8 @@ def _response(connection: ServerConnection, status: int, text: str, kind: str = 
 
 def is_own_name(host: str, address: str) -> bool:
     """Return whether a Host header names this server, and not a name of another site that resolves to it."""
-    found = re.fullmatch(r"(?:\[([0-9a-f:.]*:[0-9a-f:.]*)\]|([^][:@/]+))(:[0-9]+)?", host.lower())
-    name = (found[1] or found[2]) if found else ""
+    match = re.fullmatch(r"(?:\[([0-9a-f:.]*:[0-9a-f:.]*)\]|([^][:@/]+))(:[0-9]+)?", host.lower())
+    name = (match[1] or match[2]) if match else ""
     if name in (*LOOPBACK, address.lower()):
         return True
     with suppress(ValueError):

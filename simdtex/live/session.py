@@ -339,16 +339,16 @@ class Session:
         self._unseen = max(0, self._unseen - 1)
 
     def _on_select(self, message: Message, buffers: Sequence[Any]) -> None:
-        number = message.get("result")
-        if number is not None:
-            self.results.find(number)
-        self._select(number, restore=True)
+        key = message.get("result")
+        if key is not None:
+            self.results.find(key)
+        self._select(key, restore=True)
 
     def _on_forget(self, message: Message, buffers: Sequence[Any]) -> None:
         """Delete a result; of those that are left, the page shows the latest if it showed this one."""
-        number = self.results.find(message.get("result")).number
-        del self.results[number]
-        if number == self._selected:
+        key = self.results.find(message.get("result")).number
+        del self.results[key]
+        if key == self._selected:
             self._select(max(self.results, default=None))
 
     def _on_inside(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -362,12 +362,12 @@ class Session:
         if shown is None:
             raise ValueError("there is no result to look into yet; make one first")
         kept, self._inside = self._inside, {}
-        both = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
+        both = [self.results.find(key) for key in dict.fromkeys([shown, message.get("beside") or shown])]
         self._inside = {each.number: kept.get(each.number) or Inside(each.job, self._machine) for each in both}
         samples = [frames.thumbnail(inside.sample, PREVIEW) for inside in self._inside.values()]
         panes = [
-            {"result": number, "preview": [small.width, small.height], **inside.describe()}
-            for small, (number, inside) in zip(samples, self._inside.items(), strict=True)
+            {"result": key, "preview": [small.width, small.height], **inside.describe()}
+            for small, (key, inside) in zip(samples, self._inside.items(), strict=True)
         ]
         self._stale = True
         self.send({"kind": "inside", "panes": panes}, [small.pixels for small in samples])
@@ -421,12 +421,12 @@ class Session:
         dropped = self.results.dropped
         self.send({"kind": "result", **result.describe(), "dropped": dropped}, [result.thumbnail.pixels])
 
-    def _select(self, number: int | None, *, restore: bool = False) -> None:
+    def _select(self, key: int | None, *, restore: bool = False) -> None:
         """Select the result to show, or the run; with ``restore`` also its picture, its maps and its settings."""
-        if number not in self._inside:
+        if key not in self._inside:
             self._inside = {}
-        self._selected, self._stale = number, True
-        job = self._job if number is None else self.results[number].job
+        self._selected, self._stale = key, True
+        job = self._job if key is None else self.results[key].job
         settings = None
         if job and restore:
             settings = self._asked = job.message
@@ -437,7 +437,7 @@ class Session:
             if [id(each) for each in before] != [id(each) for each in after]:
                 self._picture, self._maps = picture, dict(maps)
                 self._send_picture(new=False)
-        self.send({"kind": "selected", "result": number, "settings": settings}, [])
+        self.send({"kind": "selected", "result": key, "settings": settings}, [])
 
     def _send_frame(
         self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True, pane: int = 0
@@ -457,8 +457,8 @@ class Session:
 
     def _show_selected(self) -> None:
         """Send a frame of the selected result and of the one beside it, or of the sample."""
-        for pane, (number, inside) in enumerate(self._inside.items()):
-            self._send_frame(inside.layers(self.results[number].layers), number, pane=pane)
+        for pane, (key, inside) in enumerate(self._inside.items()):
+            self._send_frame(inside.layers(self.results[key].layers), key, pane=pane)
         if self._inside:
             return
         if result := self.results.get(self._selected or 0):

@@ -54,18 +54,18 @@ class Account:
         self._grid, self._flop = grid, FLOP * len(self._offsets) * self._channels * candidates
         mp1 = MP1(None, self.array, (grid.pixels[0], grid.pixels[1]), inf)
         any_value = np.broadcast_to(np.float32(0), (len(self._offsets), self._channels, candidates))
-        number = any_value[0, 0].astype(np.int32)
-        level = ArrayLevel(0, grid, choice, number, any_value[0], any_value, number)
+        index = any_value[0, 0].astype(np.int32)
+        level = ArrayLevel(0, grid, choice, index, any_value[0], any_value, index)
         program = Program(mp1, Problem(np.zeros((1 + self._channels, 1), np.int32), self._offsets, 1, -1, 0))
         relaxation = Pass(program, level, Walk(mp1, grid, self._offsets))
 
         def counted(layers: int) -> Counter[str]:
             mp1.counts.clear()
             relaxation.relax(Mask(np.arange(mp1.layers)[:, None] < layers), 1)
-            found: Counter[str] = Counter()
+            kinds: Counter[str] = Counter()
             for (_, kind), count in mp1.counts.items():
-                found[kind] += count.instructions
-            return found
+                kinds[kind] += count.instructions
+            return kinds
 
         self._step = counted(0)
         self._pass = counted(1) - self._step

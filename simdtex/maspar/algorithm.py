@@ -143,8 +143,8 @@ class Pass:
                         noise = {"integer": NOISE["integer"], "float": NOISE["float"] + self.shares}
                         self._each(**noise, broadcast=1 + self.shares)
                     best = (self.near, self.least, self.chosen)
-                    given = (choice.spread, program.place, key)
-                    mp1.execute(instructions.lcpdf_choose, self.sample, *best, *given, C=self.channels)
+                    draw = (choice.spread, program.place, key)
+                    mp1.execute(instructions.lcpdf_choose, self.sample, *best, *draw, C=self.channels)
                     if choice.mode:
                         self._mode()
             self._take(key)
@@ -156,9 +156,9 @@ class Pass:
         """Fetch the neighbours by one walk, keep them in canonical order, and add up their temperatures."""
         mp1 = self.mp1
         self.heat.set(0)
-        for number, there in self.walk.neighbours(self.program.state):
+        for offset, there in self.walk.neighbours(self.program.state):
             mp1.count(float=1 + self.channels, integer=1)
-            mp1.execute(instructions.lcpdf_keep, self.near, number, there, self.heat, C=self.channels)
+            mp1.execute(instructions.lcpdf_keep, self.near, offset, there, self.heat, C=self.channels)
 
     def _broadcast(self, **each: int) -> None:
         """Count the broadcast of all candidates, the distances (12), summed by lane, and instructions for each."""
@@ -168,7 +168,7 @@ class Pass:
         self._each(**each)
 
     def _each(self, **numbers: int) -> None:
-        self.mp1.count(**{kind: number * self.level.own.shape[1] for kind, number in numbers.items()})
+        self.mp1.count(**{kind: count * self.level.own.shape[1] for kind, count in numbers.items()})
 
     def _mode(self) -> None:
         """Move from the nearest candidates to the mode, channel by channel, and choose those that give most."""

@@ -123,7 +123,7 @@ def path(offsets: NDArray[np.int32]) -> list[tuple[int, int, int | None]]:
     The path goes to the offset with the fewest free ones around it. Where it is enclosed, it goes to the nearest offset
     by way of others, whose numbers are then None. Order 8 takes 24 moves, and order 18 takes 60.
     """
-    free = {(i, j): number for number, (i, j) in enumerate(offsets.tolist())}
+    free = {(i, j): index for index, (i, j) in enumerate(offsets.tolist())}
     at, moves = (0, 0), []
 
     def around(i: int, j: int) -> list[tuple[int, int]]:

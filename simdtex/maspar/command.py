@@ -92,9 +92,9 @@ def maspar(sample: Path, output: Path, size: str | None, film: str, **options: A
         return synthesize(material.array, shape, channel_axis=material.channel_axis, **given(options), **call)
 
     def report(folder: Path, made: Any, run: Any) -> None:
-        own = {name: value for name, value in given(options).items() if name in EXECUTED}
-        own |= used | {"rng": run.statistics["seed"]}
-        pictures = {name: develop(material.array, shape, name, **own) for name in names}
+        settings = {name: value for name, value in given(options).items() if name in EXECUTED}
+        settings |= used | {"rng": run.statistics["seed"]}
+        pictures = {name: develop(material.array, shape, name, **settings) for name in names}
         write_array(folder, material.pixels[0], made, run, pictures, command_line())
 
     height, width = material.sizes[0]

@@ -39,8 +39,8 @@ def _share(x: Array, y: Array) -> Array:
 
 
 def _lowest(x: Array, _: Array) -> Array:
-    one, ones = x.dtype.type(1), x & ~(x + x.dtype.type(1))
-    return sum(((ones >> x.dtype.type(k)) & one for k in range(8 * x.itemsize)), np.zeros_like(x))
+    unit, ones = x.dtype.type(1), x & ~(x + x.dtype.type(1))
+    return sum(((ones >> x.dtype.type(k)) & unit for k in range(8 * x.itemsize)), np.zeros_like(x))
 
 
 COMPARISONS = {
@@ -96,11 +96,11 @@ def table(on: On, to: Array, entries: Array, index: Array) -> None:
     to[..., 0][on.at] = entries[index[..., 0][on.at]]
 
 
-def lcpdf_keep(on: On, near: Array, number: int, arrived: Array, heat: Array) -> None:
+def lcpdf_keep(on: On, near: Array, offset: int, arrived: Array, heat: Array) -> None:
     """Keep x u and u = 1 - t of the words x and t that arrived from a neighbour, and add t to ``heat``."""
     x, t = np.split(arrived[on.at], [-1], 1)
     u = (1024 - t).astype(np.float32) / np.float32(1024)
-    words = slice(number * arrived.shape[-1], (number + 1) * arrived.shape[-1])
+    words = slice(offset * arrived.shape[-1], (offset + 1) * arrived.shape[-1])
     near[..., words][on.at] = np.concatenate([x.astype(np.float32) * u, u], 1)
     heat[on.at] += t
 

@@ -185,24 +185,24 @@ class Emulation:
             held = machine.get(of.data)
             return np.moveaxis(held.reshape(-1, held.shape[-1])[address], -1, 0)
 
-        def picture(number: int) -> NDArray[Any]:
-            grid = run.grid(number)
+        def picture(level: int) -> NDArray[Any]:
+            grid = run.grid(level)
             x, source = values(program.state)[:-1].astype(np.uint16), values(program.source)[0]
             return run.sample.picture(grid.decimated(x), grid.decimated(source))
 
         expected, seen, left = expected_work(run), (-1, 0), 1.0
-        for number in reversed(range(run.levels)):
-            for sweep, active in program.relax(level_of(run, number)):
-                steps.append(Step(number, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
+        for level in reversed(range(run.levels)):
+            for sweep, active in program.relax(level_of(run, level)):
+                steps.append(Step(level, sweep, np.packbits(active), (mp1.layers, array.rows, array.cols)))
                 if callback is None:
                     continue
-                if seen != (number, sweep):
-                    seen, t = (number, sweep), values(program.state)[-1]
-                    left = float(run.grid(number).decimated(t).mean()) / 1024
-                share = fraction_done(expected, number, 1 - sqrt(min(1.0, left)), 0.0)
-                doing, now = f"level {number}, sweep {sweep}", partial(picture, number)
-                callback(Progress(level=number, levels=run.levels, fraction=share, doing=doing, image=now))
-            stages.append(Stage(number, picture(number)))
+                if seen != (level, sweep):
+                    seen, t = (level, sweep), values(program.state)[-1]
+                    left = float(run.grid(level).decimated(t).mean()) / 1024
+                share = fraction_done(expected, level, 1 - sqrt(min(1.0, left)), 0.0)
+                doing, now = f"level {level}, sweep {sweep}", partial(picture, level)
+                callback(Progress(level=level, levels=run.levels, fraction=share, doing=doing, image=now))
+            stages.append(Stage(level, picture(level)))
         counts: dict[str, dict[str, Count]] = {}
         for (section, kind), count in mp1.counts.items():
             counts.setdefault(section, {})[kind] = count
@@ -222,14 +222,14 @@ def problem(run: Lattices) -> Problem:
     return Problem(first, run.offsets[by_lane(run.offsets)], run.options.neighbourhood, xi, run.seed)
 
 
-def level_of(run: Lattices, number: int) -> ArrayLevel:
+def level_of(run: Lattices, level: int) -> ArrayLevel:
     """Return the input of the program for a level."""
-    places, working = run.places(number), run.sample.working.astype(np.float32)
-    reach, own = places.reach[by_lane(run.offsets)], working[:, places.positions]
+    places, working = run.places(level), run.sample.working.astype(np.float32)
+    reach, centre = places.reach[by_lane(run.offsets)], working[:, places.positions]
     around = np.moveaxis(working[:, reach[:, None] + places.positions], 1, 0)
     cols = places.col.size
     runs = min(places.spacing // places.step, cols)  # as in simdtex.methods.mrf.square.Square
     row, col = np.divmod(np.arange(places.positions.size, dtype=np.int32), cols)
     noise = (row * runs + col % runs) * -(-cols // (runs * LANES)) * LANES + col // runs
-    free = run.free_sweeps(number), run.kept_only
-    return ArrayLevel(number, run.grid(number), run.choice(number), places.positions, own, around, noise, *free)
+    free = run.free_sweeps(level), run.kept_only
+    return ArrayLevel(level, run.grid(level), run.choice(level), places.positions, centre, around, noise, *free)

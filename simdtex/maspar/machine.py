@@ -97,7 +97,7 @@ class Mask:
     def layers(self) -> list[Mask]:
         """The virtual layers that have active PEs."""
         each = [slice(n, n + 1) for n in range(len(self.active))]
-        return [Mask(self.active, self.plane, one) for one, count in zip(each, self.counts, strict=True) if count]
+        return [Mask(self.active, self.plane, layer) for layer, count in zip(each, self.counts, strict=True) if count]
 
     @cached_property
     def at(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -262,8 +262,8 @@ class MP1:
     def count(self, **numbers: int | list[int]) -> None:
         """Count numbers of instructions, by kind as in `COSTS`, for every layer, or one number for each."""
         counts = self.mask.counts
-        for kind, number in numbers.items():
-            each = number[self.mask.over] if isinstance(number, list) else [number] * len(counts)
+        for kind, amount in numbers.items():
+            each = amount[self.mask.over] if isinstance(amount, list) else [amount] * len(counts)
             total = self.counts[self._section, kind]
             total.instructions += sum(each)
             total.active += sum(map(mul, each, counts))
@@ -279,10 +279,10 @@ class MP1:
             rows, cols, blocks = self.array.rows, self.array.cols, self.array.mapping == "hierarchical"
             high, wide, over = self.layout.high, self.layout.wide, self.mask.over
             struct = np.array((rows, cols, high, wide, blocks, over.start, over.stop), LAYOUT)[()]
-            given = [part for arg in args for part in _expanded(launcher, arg)]
+            expanded = [part for arg in args for part in _expanded(launcher, arg)]
             defines |= {"V": launcher.vector} if "C" in defines else {}
             name, group = f"maspar_{instruction.__name__}", (gcd(self.array.size, 64),)
-            launcher.launch(name, (self.array.size,), struct, self.mask.plane, *given, local=group, defines=defines)
+            launcher.launch(name, (self.array.size,), struct, self.mask.plane, *expanded, local=group, defines=defines)
 
     def alu(self, operation: str, to: Plural, a: Plural, b: Plural | float = 0) -> Plural:
         """Set a plural to an operation of the arithmetic unit, and return it."""
@@ -290,10 +290,10 @@ class MP1:
         real = kind.kind == "f"
         cost = {"float" if real and operation not in ("copy", "put") else "integer": kind.itemsize // 4}
         self.count(**cost, broadcast=int(singular and operation not in ("copy", "bit", "lowest")))
-        number = kind.type(b if singular else 0)
+        scalar = kind.type(b if singular else 0)
         defines = {"T": TYPES[kind.name], "TO": TYPES[to.data.dtype.name]} | ({} if real else {"WHOLE": 1})
         code = [*OPERATIONS].index(operation)
-        self.execute(instructions.alu, code, to, a, a if singular else b, int(singular), number, **defines)
+        self.execute(instructions.alu, code, to, a, a if singular else b, int(singular), scalar, **defines)
         return to
 
     def xnet(self, plural: Plural, down: int, right: int, distance: int = 1) -> Plural:
@@ -304,7 +304,7 @@ class MP1:
         """
         kind, size = plural.data.dtype, plural.data.shape[-1]
         moves = self.array.moves(self.layout.grid, down * distance, right * distance)
-        self.count(**{"x-net": [size * kind.itemsize // 4 * one for one in moves]})
+        self.count(**{"x-net": [size * kind.itemsize // 4 * move for move in moves]})
         to = self.expression(kind.name, size)
         self.execute(instructions.xnet, to, plural[0], down, right, distance, T=TYPES[kind.name])
         return to
@@ -348,10 +348,10 @@ class MP1:
 
     def seconds(self) -> dict[str, dict[str, float]]:
         """Return the modelled seconds of a MasPar MP-1 by section of the program and kind of instruction."""
-        found: dict[str, dict[str, float]] = {}
+        table: dict[str, dict[str, float]] = {}
         for (section, kind), count in self.counts.items():
-            found.setdefault(section, {})[kind] = count.instructions * COSTS[kind].seconds
-        return found
+            table.setdefault(section, {})[kind] = count.instructions * COSTS[kind].seconds
+        return table
 
 
 def _viewed(arg: Any) -> Any:

@@ -91,7 +91,7 @@ def write_array(
         Section("PEs at work", [Figure("active.png", _utilisation(run), ACTIVE)]),
         Section("Schedules", [WHY, Figure("film.png", moving, FILM)]),
     ]
-    results = {"seconds": run.seconds, "statistics": facts, "utilisation": [one.active.mean() for one in run.steps]}
+    results = {"seconds": run.seconds, "statistics": facts, "utilisation": [step.active.mean() for step in run.steps]}
     write_report(folder, "The processor array of 1998", lead, page, results, command)
 
 
@@ -112,16 +112,16 @@ def section_table(run: Execution) -> Table:
 def _idle(run: Execution, sections: Sequence[str]) -> float:
     """Return the share of PEs under the mask, over the seconds of sections."""
     rows, cols = (int(side) for side in run.statistics["array"].split("x"))
-    pairs = [(run.seconds[name][kind], one) for name in sections for kind, one in run.counts[name].items()]
+    pairs = [(run.seconds[name][kind], count) for name in sections for kind, count in run.counts[name].items()]
     time = sum(seconds for seconds, _ in pairs)
-    busy = sum(seconds * one.active / max(1, one.instructions * rows * cols) for seconds, one in pairs)
+    busy = sum(seconds * count.active / max(1, count.instructions * rows * cols) for seconds, count in pairs)
     return 1 - busy / time if time else 0.0
 
 
 def _utilisation(run: Execution) -> Plot:
     """Return a plot of the share of active PEs in each step, over the virtual layers with an active PE."""
-    shares = [one.active[one.active.any((1, 2))].mean() for one in run.steps]
-    levels = np.array([one.level for one in run.steps])
+    shares = [step.active[step.active.any((1, 2))].mean() for step in run.steps]
+    levels = np.array([step.level for step in run.steps])
     plot = new_figure(7.2, 3.0)
     axes = plot.add_subplot()
     for level in sorted(set(levels.tolist()), reverse=True):
@@ -173,20 +173,20 @@ def film(shown: Mapping[str, Steps], pictures: Mapping[str, Sequence[NDArray[Any
     """Return an animated PNG: the sites of each schedule side by side, a frame for each step, above its picture."""
     font, frames = PIL.ImageFont.load_default(TEXT), []
     done: dict[str, Any] = dict.fromkeys(shown, False)
-    for number in range(1, FRAMES + 1):
+    for step in range(1, FRAMES + 1):
         panels = []
         for name, ahead in shown.items():
             now = next(ahead)
             before = np.broadcast_to(done[name] & ~np.any(done[name] & now), now.shape)  # a site again: a new sweep
             done[name] = before | now
             colours = magnified(COLOURS[np.where(now, 2, before.astype(int))], max(1, round(SIDE / max(now.shape))))
-            made = PIL.Image.fromarray(rgb(pictures[name][number - 1])).resize(colours.shape[1::-1], 0)  # nearest
+            made = PIL.Image.fromarray(rgb(pictures[name][step - 1])).resize(colours.shape[1::-1], 0)  # nearest
             colours = np.concatenate([colours, np.full_like(colours[:GAP], 255), np.array(made)])
             panels.append((f"{name}\n{np.count_nonzero(now):,} of {now.size:,} sites", colours))
-        width = sum(len(one[0]) + GAP for _, one in panels) + GAP
+        width = sum(len(image[0]) + GAP for _, image in panels) + GAP
         frame = PIL.Image.new("RGB", (width, len(panels[0][1]) + 4 * TEXT + 2 * GAP), "white")
         pen, left = PIL.ImageDraw.Draw(frame), GAP
-        pen.text((GAP, 4), f"step {number}", fill="black", font=font)
+        pen.text((GAP, 4), f"step {step}", fill="black", font=font)
         for text, colours in panels:
             pen.multiline_text((left, 8 + TEXT), text, fill="black", font=font)
             frame.paste(PIL.Image.fromarray(colours), (left, 4 * TEXT + GAP))

@@ -49,12 +49,12 @@ class Walk:
             self._beyond = {by: self._seam(*by) for by in DIRECTIONS if np.dot(np.abs(by), self._open)}
             self._wrapped = {(axis, by): self._pixel(axis, by) for axis in (0, 1) for by in (-1, 0, 1) if self._beyond}
             self._inside: dict[int, Mask] = {}
-            for number, (down, right) in enumerate(offsets.tolist()):
+            for index, (down, right) in enumerate(offsets.tolist()):
                 if grid.torus and (down % sides[0] or right % sides[1]):
-                    self._inside[number] = self.sites
+                    self._inside[index] = self.sites
                 elif not grid.torus:
                     with mp1.where(self._within(self.row + down, 0) & self._within(self.col + right, 1)) as inside:
-                        self._inside[number] = inside
+                        self._inside[index] = inside
                         self.members.set(self.members + 1)
             if grid.torus:
                 self.members.set(len(self._inside))
@@ -65,11 +65,11 @@ class Walk:
 
     def _seam(self, down: int, right: int) -> Mask:
         """Return the mask of sites whose neighbour in a direction is across a seam that the X-Net does not close."""
-        found = self.row * 0
+        beyond = self.row * 0
         for axis, by, place in ((0, down, self.row), (1, right, self.col)):
             if self._open[axis] and by:
-                found = found | (place == ((self.grid.rows, self.grid.cols)[axis] - 1 if by > 0 else 0))
-        with self.mp1.where(found) as mask:
+                beyond = beyond | (place == ((self.grid.rows, self.grid.cols)[axis] - 1 if by > 0 else 0))
+        with self.mp1.where(beyond) as mask:
             return mask
 
     def _pixel(self, axis: int, by: int) -> Plural:
@@ -81,16 +81,16 @@ class Walk:
     def neighbours(self, plural: Plural) -> Iterator[tuple[int, Plural]]:
         """Yield the number of each offset, and all words of a variable from there; sites without it are then masked."""
         mp1 = self.mp1
-        for down, right, number in self._path:
+        for down, right, offset in self._path:
             with mp1.where(self.sites if self.grid.torus else mp1.everywhere):  # values may pass outside the picture
                 arrived = mp1.xnet(plural, down, right, self.grid.step)
             if (down, right) in self._beyond:
                 with mp1.where(self._beyond[down, right]):
                     mp1.router(arrived, plural, self._wrapped[0, down], self._wrapped[1, right])
             plural = arrived
-            if number in self._inside:
-                with mp1.where(self._inside[number]):
-                    yield number, arrived
+            if offset in self._inside:
+                with mp1.where(self._inside[offset]):
+                    yield offset, arrived
 
 
 def coloring(mp1: MP1, walk: Walk, order: int, seed: int) -> tuple[Plural, int]:
@@ -102,16 +102,16 @@ def coloring(mp1: MP1, walk: Walk, order: int, seed: int) -> tuple[Plural, int]:
     if grid.torus:
         seamless = coloring_sublattice(order, grid.rows, grid.cols, limit=max(best.index, enough))
     with mp1.where(walk.sites), mp1.frame():
-        found = None
+        colors = None
         if seamless != best:
             most = max(best.index, seamless.index - 1) if seamless else 0
-            found = along_seam(mp1, walk, best, seed, most)
-        if found is None:
+            colors = along_seam(mp1, walk, best, seed, most)
+        if colors is None:
             assert seamless is not None  # otherwise greedy colours have no limit
-            found = seamless.coset(walk.row, walk.col)
+            colors = seamless.coset(walk.row, walk.col)
         numbers = 0
         for number in range(max(enough, best.index, seamless.index if seamless else 0)):
-            here = found == number
+            here = colors == number
             if mp1.any(here):  # colours that are used get consecutive numbers
                 with mp1.where(here):
                     color.set(numbers)
@@ -125,18 +125,18 @@ def along_seam(mp1: MP1, walk: Walk, pattern: Sublattice, seed: int, most: int) 
     ``most`` 0 is no limit.
     """
     rows, cols = walk.grid.rows, walk.grid.cols
-    number, own, color = walk.row * cols + walk.col, pattern.coset(walk.row, walk.col), mp1.plural()
-    color.set(own)
+    site, coset, color = walk.row * cols + walk.col, pattern.coset(walk.row, walk.col), mp1.plural()
+    color.set(coset)
     bare = mp1.plural()
     for down, right in walk.offsets.tolist():  # the later site of each pair of neighbours in one coset
         row, col = walk.row + down, walk.col + right
         across = (row < 0) | (row >= rows) | (col < 0) | (col >= cols)
         row, col = row % rows, col % cols
-        met = (pattern.coset(row, col) == own) & (row * cols + col < number)
+        met = (pattern.coset(row, col) == coset) & (row * cols + col < site)
         bare.set(bare | (across & met))
     carried = mp1.plural("uint64", 2)  # the colour plus 1, or 0 of a site without one; and then its key
-    key = mp1.random(number, Key(seed, 0, 0), random.COLOR) & (2**32 - 1)
-    carried[1].set((key * 2**32 + number.as_type("uint64")) * bare.as_type("uint64"))
+    key = mp1.random(site, Key(seed, 0, 0), random.COLOR) & (2**32 - 1)
+    carried[1].set((key * 2**32 + site.as_type("uint64")) * bare.as_type("uint64"))
     carried[0].set(((color + 1) * (bare == 0)).as_type("uint64"))
     taken, first = mp1.plural("uint64", max(len(walk.offsets) + 1, pattern.index) // BITS + 1), mp1.plural()
     while mp1.any(bare):

@@ -102,8 +102,8 @@ class Info(NamedTuple):
         """Yield the steps one by one, their sites on the host."""
         sites = self.sites if isinstance(self.sites, np.ndarray) else machine.get(self.sites)
         ranges = self.ranges.tolist()
-        for number, (begin, end) in enumerate(ranges, 1):
-            yield Info(sites[begin:end], self.turn, self.last and number == len(ranges))
+        for step, (begin, end) in enumerate(ranges, 1):
+            yield Info(sites[begin:end], self.turn, self.last and step == len(ranges))
 
 
 @runtime_checkable
@@ -238,8 +238,8 @@ class Trimmed(Watched):
         state, info = super().step(setting, state, active)
         sites = info.sites if isinstance(info.sites, np.ndarray) else setting.machine.get(info.sites)
         ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.cols
-        for number, (begin, end) in enumerate(ranges.tolist(), 1):
-            reach = (len(ranges) - number) * radius
+        for step, (begin, end) in enumerate(ranges.tolist(), 1):
+            reach = (len(ranges) - step) * radius
             rows = np.array([max(0, self.top - reach), self.bottom + reach], np.int64) * width
-            ranges[number - 1] = begin + np.searchsorted(sites[begin:end], rows)
+            ranges[step - 1] = begin + np.searchsorted(sites[begin:end], rows)
         return state, info._replace(steps=ranges)

@@ -119,11 +119,11 @@ def coloring(machine: Launcher | None, grid: Grid, plan: LatticeColoring) -> Arr
         site = row * grid.whole.cols + col
         at = np.searchsorted(plan.seam, site)
         return np.where(np.append(plan.seam, -1)[at] == site, np.append(plan.own, 0)[at], color).astype(np.int32)
-    colors, (names, seam, own) = (
+    colors, (names, seam, greedy) = (
         machine.empty(grid.shape, np.int32),
         map(machine.put, (plan.names, plan.seam, plan.own)),
     )
-    table = names, names.size, seam, own, seam.size
+    table = names, names.size, seam, greedy, seam.size
     machine.launch("coloring_sites", (grid.size,), grid.struct, *astuple(plan.pattern), *table, colors)
     return colors
 
@@ -163,24 +163,24 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> La
     assert best is not None  # a square pattern always exists in the plane
     offsets = neighbourhood_offsets(order).astype(np.int64)
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, len(offsets) + 1)) if torus else best
-    seam, own = NOTHING, None
+    seam, greedy = NOTHING, None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
         seam = _clashing(rows, cols, offsets, best)
         priority = random.draw4(seed, 0, 0, seam, random.COLOR)[0].astype(np.int64)
         most = max(best.index, seamless.index - 1) if seamless else inf
-        own = _greedy(rows, cols, offsets, best, seam, priority, most)
-    if own is None:
+        greedy = _greedy(rows, cols, offsets, best, seam, priority, most)
+    if greedy is None:
         assert seamless is not None  # otherwise greedy colours have no limit
-        best, seam, own = seamless, NOTHING, NOTHING
-    used, radius = np.zeros(1 + max(best.index - 1, int(own.max(initial=0))), bool), int(offsets.max())
-    used[own] = True
+        best, seam, greedy = seamless, NOTHING, NOTHING
+    used, radius = np.zeros(1 + max(best.index - 1, int(greedy.max(initial=0))), bool), int(offsets.max())
+    used[greedy] = True
     if rows - radius >= best.a and cols - 2 * radius >= best.c:
         used[: best.index] = True  # away from the seam lies one site of each coset
     else:
         used[best.coset(*np.divmod(np.delete(np.arange(rows * cols), seam), cols))] = True
     names = (np.cumsum(used) - 1).astype(np.int32)
-    return LatticeColoring(best, int(used.sum()), seam, names[own], names)
+    return LatticeColoring(best, int(used.sum()), seam, names[greedy], names)
 
 
 def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
@@ -192,8 +192,8 @@ def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublatt
         row, col = np.divmod(here, cols)
         k, m = row + offsets[:, :1], col + offsets[:, 1:]
         across = np.nonzero((k < 0) | (k >= rows) | (m < 0) | (m >= cols))
-        k, m, own = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
-        met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == own)
+        k, m, color = k[across] % rows, m[across] % cols, pattern.coset(row, col)[across[1]]
+        met = (k * cols + m < here[across[1]]) & (pattern.coset(k, m) == color)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
     return np.compress(np.concatenate(clash), site)
 

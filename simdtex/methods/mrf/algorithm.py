@@ -63,8 +63,8 @@ class MrfRun(Lattices):
             return self.enter(state.level - 1, state.field, state.penalty), SweepInfo(state.level - 1)
         level = self.level(state.level)
         state, chosen = sweep(level, state, watch)  # 6.2
-        number = state.cooling + state.free
-        return state, SweepInfo(level.number, number, tuple(chosen), self.at_equilibrium(state))
+        turn = state.cooling + state.free
+        return state, SweepInfo(level.number, turn, tuple(chosen), self.at_equilibrium(state))
 
     def at_equilibrium(self, state: MrfState) -> bool:
         """Return whether all temperatures of the level are 0 and its free sweeps are done."""

@@ -51,20 +51,20 @@ class Conditions(ABC):
         self.confidences = confidences
 
     @abstractmethod
-    def at(self, number: int, grid: Grid) -> Held | None:
+    def at(self, level: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level at the sites of its lattice or a window of it; None without any."""
 
     @abstractmethod
-    def scattered(self, number: int) -> Data | None:
+    def scattered(self, level: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
 
     @abstractmethod
     def coarser(self, plan: Input) -> Conditions:
         """Return the conditions of the levels that have a reduced input."""
 
-    def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
+    def entered(self, machine: Machine, level: int, grid: Grid, field: Field) -> Field:
         """Return the field at the beginning of a level, with its known sites at temperature 0."""
-        held = self.at(number, grid)
+        held = self.at(level, grid)
         if held is None:
             return field
         values, source, temperature = (np.array(machine.get(plane)) for plane in field)
@@ -76,12 +76,12 @@ class Conditions(ABC):
             source[known], temperature[known] = held.source[known], 0
         return Field(*map(machine.put, (values, source, temperature)))
 
-    def movable(self, machine: Machine, number: int, grid: Grid, kept: bool) -> Array | None:
+    def movable(self, machine: Machine, level: int, grid: Grid, kept: bool) -> Array | None:
         """Return an (H, W) uint16 array that is 0 at sites that a free sweep does not relax; None if it relaxes all.
 
         These are the known sites and, with ``kept``, those that are not on the lattice of the level above.
         """
-        held, free = self.at(number, grid), np.ones(grid.shape, bool)
+        held, free = self.at(level, grid), np.ones(grid.shape, bool)
         if held is not None:
             free &= ~held.known
         for line in np.ix_(*grid.lines()) if kept else ():
@@ -99,28 +99,28 @@ class Conditioning(Conditions):
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
         guides, known = len(sample.guides), sample.known_variables
         here = np.float32(centre_known(plan.options, neighbours))
-        own = Confidences(guides, guides > 0 or hard, centre, weight, known, here)
-        super().__init__(confidences or own)
+        standard = Confidences(guides, guides > 0 or hard, centre, weight, known, here)
+        super().__init__(confidences or standard)
         self.guides, self.planes = sample.guides, planes
         self.plan = plan
         self._held: dict[int, Held] = {}
 
-    def at(self, number: int, grid: Grid) -> Held | None:
+    def at(self, level: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level at the sites of its lattice or a window of it."""
         if self.planes is None and not len(self.guides):
             return None
-        if number not in self._held:
-            self._held = {number: self._whole(self.plan.grid(number))}  # one level is enough
-        held = self._held[number]
+        if level not in self._held:
+            self._held = {level: self._whole(self.plan.grid(level))}  # one level is enough
+        held = self._held[level]
         return Held(*(grid.cut(plane) for plane in held))
 
     def coarser(self, plan: Input) -> Conditioning:
         """Return the conditions of the levels that have a reduced input, with the same confidences."""
         return Conditioning(plan, self.confidences)
 
-    def scattered(self, number: int) -> Data | None:
+    def scattered(self, level: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        grid = self.plan.grid(number)
+        grid = self.plan.grid(level)
         if self.planes is None or grid.step == 1:
             return None
         place = between(self.planes.data, grid)

@@ -172,9 +172,9 @@ class Costs(NamedTuple):
         if self.novelty:
             times = np.zeros(cost.shape, np.float32)
             pairs = (continuing(candidates, around.source), 1), (candidates.number_of(around.source), AGAIN)
-            for number, often in pairs:
-                for one in np.where(number < 0, -2, number):  # -1 is an empty slot
-                    times += np.float32(often) * (numbers == one)
+            for repeated, often in pairs:
+                for candidate in np.where(repeated < 0, -2, repeated):  # -1 is an empty slot
+                    times += np.float32(often) * (numbers == candidate)
             more["novelty"] = self.novelty * times
         for term in more.values():
             cost = cost + term

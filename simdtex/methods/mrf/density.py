@@ -90,8 +90,8 @@ def near(
     squared = ((sites[:, None] - place[None]).astype(np.int64) ** 2).sum(-1)
     key = squared * len(place) + np.arange(len(place))
     most = min(most, len(place))
-    found = np.argpartition(key, range(most), 1)[:, :most] if most else np.zeros((len(sites), 0), np.intp)
-    return found, (np.take_along_axis(squared, found, 1) <= reach**2).sum(1)
+    nearest = np.argpartition(key, range(most), 1)[:, :most] if most else np.zeros((len(sites), 0), np.intp)
+    return nearest, (np.take_along_axis(squared, nearest, 1) <= reach**2).sum(1)
 
 
 def given_data(
@@ -119,7 +119,7 @@ def given_data(
     square = relaxation.proposal.square
     kind = np.zeros(square.levels.shape[1], np.float32)
     kind[machine.get(square.at)] = of
-    own = machine.put(kind[None])
+    category = machine.put(kind[None])
     step = max(1, min(machine.chunk(3 * size, 1, sample.channels, 12 * kinds), AT_ONCE, PAIRS // kinds))
     together = max(1, PAIRS // max(1, len(data.place)))
     for first in range(0, len(sites), together):
@@ -148,5 +148,5 @@ def given_data(
                     choice=relaxation.choice._replace(window=window._replace(scale=scale)),
                 )
                 numbered = machine.put(np.arange(here.size, dtype=np.int32))
-                mass = machine.get(lcpdf.density(machine, numbered, field, rule, own)).astype(np.float64)
+                mass = machine.get(lcpdf.density(machine, numbered, field, rule, category)).astype(np.float64)
                 yield first + here, mass / np.cumsum(mass, 1)[:, -1:]

@@ -52,10 +52,10 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
     choice, candidates = relaxation.choice, relaxation.proposal.candidates
 
     terms: dict[str, NDArray[np.float32]] = {}
-    found = relaxation.evaluate(pixel, field, moment.turn, terms)
-    evaluated = np.flatnonzero(np.isfinite(found.cost[:, 0]))  # the other slots have no candidate
-    total, numbers = found.cost[evaluated, 0], found.numbers[evaluated, 0]
-    costs = {name: np.broadcast_to(term, found.cost.shape)[evaluated, 0] for name, term in terms.items()}
+    result = relaxation.evaluate(pixel, field, moment.turn, terms)
+    evaluated = np.flatnonzero(np.isfinite(result.cost[:, 0]))  # the other slots have no candidate
+    total, numbers = result.cost[evaluated, 0], result.numbers[evaluated, 0]
+    costs = {name: np.broadcast_to(term, result.cost.shape)[evaluated, 0] for name, term in terms.items()}
     relaxed, cooled = relax_out_of_place.reference(
         pixel, field, np.zeros(field.source.shape, np.int32), relaxation, moment.turn
     )
@@ -142,12 +142,12 @@ def with_trust(moment: Moment, pixel: int, trust: float) -> Moment:
     return moment._replace(field=moment.field._replace(temperature=temperature))
 
 
-def site_number(run: Lattices, number: int, site: tuple[int, ...]) -> int:
+def site_number(run: Lattices, level: int, site: tuple[int, ...]) -> int:
     """Return the number of a site of a level; raise ValueError if it is not of the level's lattice."""
-    shape = run.grid(number).shape
+    shape = run.grid(level).shape
     if len(site) != len(shape) or not all(0 <= n < side for n, side in zip(site, shape, strict=True)):
         sides = " x ".join(map(str, shape))
-        raise ValueError(f"site {site} is not of the {sides} sites of level {number}; give one of these, from 0")
+        raise ValueError(f"site {site} is not of the {sides} sites of level {level}; give one of these, from 0")
     return int(np.ravel_multi_index(site, shape))
 
 
@@ -167,9 +167,9 @@ def _neighbours(
     there, made = r >= 0, len(values[0]) - relaxation.confidences.guides
     pixels = sample.picture(values[:, :made].transpose(1, 0, 2), gathered(field.source.ravel(), r, -1))[:, 0]
     if given:
-        number = np.where(there, r % grid.size, -1)[:, 0]
+        index = np.where(there, r % grid.size, -1)[:, 0]
         planes = (grid.decimated(np.moveaxis(plane, -1, 0)) for plane in (given.known, given.values))
-        known, told = (gathered(plane.reshape(len(plane), -1), number, 0).T for plane in planes)
+        known, told = (gathered(plane.reshape(len(plane), -1), index, 0).T for plane in planes)
         pixels = np.where(known, told, pixels)
     neighbours = Neighbours(
         offsets=offsets.astype(np.int32),

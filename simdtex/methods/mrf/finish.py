@@ -35,7 +35,7 @@ def gaussian_offsets(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
 def finish(
     machine: Launcher | None,
     field: Field,
-    given: Array,
+    known: Array,
     grid: Grid,
     planes: Array,
     sample: Sample,
@@ -45,7 +45,7 @@ def finish(
     """Return the difference of pixels from their sources, (channels, count), on the host.
 
     It has the sites of ``rows`` of the grid, in working levels for 8-bit samples and in 1/8 of a working level for all
-    others. ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, those of the sample, are arrays of
+    others. ``field``, ``known`` (H, W) uint8, 1 if a value is given, and ``planes``, those of the sample, are arrays of
     the machine. Cost: N channels gathers per site.
     """
     offsets, weights = gaussian_offsets(sd)
@@ -55,22 +55,22 @@ def finish(
         source = field.source.ravel()
         shown, usable = sample.working[: sample.shown].astype(np.int64), sample.inside.ravel()
         values = field.values[: sample.shown].reshape(sample.shown, -1).astype(np.int64)
-        own = gathered(shown, source[sites], 0)
+        centre = gathered(shown, source[sites], 0)
 
         def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> NDArray[np.int64]:
             row, col = (np.stack(np.divmod(pixel, np.int32(sample.cols))) + offset[:, None]).astype(np.int64)
             at = np.stack([row, col]) - sample.margin
             there = (pixel >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
-            found = np.where(there, row * sample.cols + col, -1)
-            return np.where(gathered(usable, found, False), found, -1)
+            index = np.where(there, row * sample.cols + col, -1)
+            return np.where(gathered(usable, index, False), index, -1)
 
-        total, sums = np.zeros(sites.size, np.int64), np.zeros(own.shape, np.int64)
+        total, sums = np.zeros(sites.size, np.int64), np.zeros(centre.shape, np.int64)
         for offset, weight in zip(offsets, weights.tolist(), strict=True):
             r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
             p = within(gathered(source, r, -1), -offset)
-            q = np.where((p < 0) & (gathered(given.ravel(), r, 0) > 0), within(source[sites], offset), -1)
+            q = np.where((p < 0) & (gathered(known.ravel(), r, 0) > 0), within(source[sites], offset), -1)
             there = (source[sites] >= 0) & ((p >= 0) | (q >= 0))
-            by = np.where(p < 0, gathered(values, r, 0) - gathered(shown, q, 0), gathered(shown, p, 0) - own)
+            by = np.where(p < 0, gathered(values, r, 0) - gathered(shown, q, 0), gathered(shown, p, 0) - centre)
             total += weight * there
             sums += weight * np.where(there, by, 0)
         return ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
@@ -80,9 +80,9 @@ def finish(
         (count,),
         *(grid.struct, first, count, field.source, machine.constant(offsets), machine.constant(weights)),
         *(len(offsets), planes, planes.shape[1], sample.cols, sample.margin),
-        *(sample.height, sample.width, machine.put(sample.inside.view(np.uint8)), given, field.values),
+        *(sample.height, sample.width, machine.put(sample.inside.view(np.uint8)), known, field.values),
         *(prod(field.source.shape), sample.fine, out),
         defines={"C": sample.shown},
     )
-    found: NDArray[np.int16] = machine.get(out)
-    return found
+    finished: NDArray[np.int16] = machine.get(out)
+    return finished

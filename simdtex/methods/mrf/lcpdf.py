@@ -239,22 +239,22 @@ def spread(mass: NDArray[np.uint64], win: ParzenWindow) -> NDArray[np.float32]:
 
 
 @Operation
-def density(machine: Launcher | None, sites: Array, field: Field, relaxation: Rule, own: Array | None = None) -> Array:
+def density(machine: Launcher | None, sites: Array, field: Field, relaxation: Rule, kind: Array | None = None) -> Array:
     """Return the density of one channel at each grey level, up to a factor, (S, greys) float32.
 
-    ``relaxation`` proposes all candidates, and its random numbers are not read. ``own`` (1, plane) float32 is the grey
+    ``relaxation`` proposes all candidates, and its random numbers are not read. ``kind`` (1, plane) float32 is the grey
     level of each candidate at its place in the square's ``levels``; None: these.
     """
     if machine is None:
         cost = relaxation.evaluate(sites, field, 0).cost
         return smoothed(
-            _greys(relaxation, own), weights(cost, relaxation.choice.window.scale), relaxation.choice.window
+            _greys(relaxation, kind), weights(cost, relaxation.choice.window.scale), relaxation.choice.window
         ).T
-    return density_and_mode(machine, sites, field, relaxation, own)[0]
+    return density_and_mode(machine, sites, field, relaxation, kind)[0]
 
 
 def density_and_mode(
-    machine: Launcher, sites: Array, field: Field, relaxation: Rule, own: Array | None = None
+    machine: Launcher, sites: Array, field: Field, relaxation: Rule, kind: Array | None = None
 ) -> tuple[Array, Relaxed]:
     """Return the density of the last channel, (S, greys), and the mode that each site takes, on a device."""
     made, win = len(field.values) - relaxation.confidences.guides, relaxation.choice.window
@@ -262,7 +262,7 @@ def density_and_mode(
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     mode = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     arguments = (machine.constant(win.gauss), mass, table, *mode)
-    _table(machine, "lcpdf_density", sites, field, relaxation, own, shape[1], *arguments)
+    _table(machine, "lcpdf_density", sites, field, relaxation, kind, shape[1], *arguments)
     return table, mode
 
 
@@ -270,19 +270,19 @@ def density_and_mode(
 def histogram(machine: Launcher | None, sites: Array, field: Field, relaxation: Rule, greys: int) -> Array:
     """Return the number of candidates of each grey level that match a site exactly, (S, greys) uint32: (4) and (5)."""
     if machine is None:
-        cost, found = relaxation.evaluate(sites, field, 0).cost, np.zeros((sites.size, greys), np.uint32)
+        cost, tally = relaxation.evaluate(sites, field, 0).cost, np.zeros((sites.size, greys), np.uint32)
         p, s = np.nonzero(cost == 0)
-        np.add.at(found, (s, _greys(relaxation, None)[p]), 1)
-        return found
+        np.add.at(tally, (s, _greys(relaxation, None)[p]), 1)
+        return tally
     counts = machine.empty((sites.size, greys), np.uint32)
     _table(machine, "lcpdf_histogram", sites, field, relaxation, None, greys, counts)
     return counts
 
 
-def _greys(relaxation: Rule, own: NDArray[np.float32] | None) -> NDArray[np.int64]:
+def _greys(relaxation: Rule, kind: NDArray[np.float32] | None) -> NDArray[np.int64]:
     """Return the grey level of each candidate in the first channel."""
     square = relaxation.proposal.square
-    greys: NDArray[np.int64] = (square.levels if own is None else own)[0][square.at].astype(np.int64)
+    greys: NDArray[np.int64] = (square.levels if kind is None else kind)[0][square.at].astype(np.int64)
     return greys
 
 
@@ -292,11 +292,11 @@ def _table(
     sites: Array,
     field: Field,
     relaxation: Rule,
-    own: Array | None,
+    kind: Array | None,
     greys: int,
     *results: Array,
 ) -> None:
     defines, arguments = relaxation.arguments(machine, sites, field)
-    levels = relaxation.proposal.square.levels if own is None else own
-    defines |= {} if own is None else {"CHANNELS": len(own)}
+    levels = relaxation.proposal.square.levels if kind is None else kind
+    defines |= {} if kind is None else {"CHANNELS": len(kind)}
     machine.launch(kernel, (sites.size,), *arguments, levels, greys, *results, defines=defines)

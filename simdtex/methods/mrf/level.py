@@ -133,13 +133,13 @@ class Lattices:
         self._whole: Level | None = None
         self._in_phase: Any = None  # positions and their phases, which most levels share
 
-    def of(self, number: int) -> Lattices:
+    def of(self, level: int) -> Lattices:
         """Return the lattices that have the sample of a level: these, or coarser ones."""
-        return self.coarser.of(number) if self.coarser and self.plan.of(number) is not self.plan else self
+        return self.coarser.of(level) if self.coarser and self.plan.of(level) is not self.plan else self
 
-    def spacing(self, number: int) -> int:
+    def spacing(self, level: int) -> int:
         """Return the number of pixels of the sample from site to site of a level."""
-        return int(2**number // self.plan.reduction)
+        return int(2**level // self.plan.reduction)
 
     @cached_property
     def squares(self) -> NDArray[np.int32] | None:
@@ -154,38 +154,38 @@ class Lattices:
         first = self.sample.index(coarser.place(np.arange(coarser.inside.size, dtype=np.int32)))
         return np.where(coarser.inside.ravel(), first, np.int32(-1))
 
-    def grid(self, number: int) -> Grid:
+    def grid(self, level: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the level's sample."""
-        return self.plan.of(number).grid(number)
+        return self.plan.of(level).grid(level)
 
-    def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
+    def level(self, level: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
 
         ``window`` is (first row, first column, rows, columns) of a window of the lattice; the arrays of the state then
         hold only the sites of the window. None: the whole lattice.
         """
-        lattices = self.of(number)
+        lattices = self.of(level)
         if lattices is not self:
-            return lattices.level(number, window)
-        if self._last is None or self._last.number != number:
+            return lattices.level(level, window)
+        if self._last is None or self._last.number != level:
             self._last = self._whole = None  # the arrays of one level are enough to keep
-            self._last = self._level(number)
+            self._last = self._level(level)
         if window is not None:
-            return self._on(self._last, self.grid(number).window(*window))
-        self._whole = self._whole or self._on(self._last, self.grid(number))
+            return self._on(self._last, self.grid(level).window(*window))
+        self._whole = self._whole or self._on(self._last, self.grid(level))
         return self._whole
 
-    def _level(self, number: int) -> Level:
+    def _level(self, level: int) -> Level:
         """Return a level without its parts that depend on the window."""
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
-        grid, places = self.grid(number), self.places(number)
-        coarsest, count = number == self.levels - 1, places.positions.size
-        every, spaced = self.exhaustive(number), count // (places.spacing // places.step) ** offsets.shape[1]
+        grid, places = self.grid(level), self.places(level)
+        coarsest, count = level == self.levels - 1, places.positions.size
+        every, spaced = self.exhaustive(level), count // (places.spacing // places.step) ** offsets.shape[1]
         candidates = sample.candidates(machine, places, self.planes, every)
         square = square_of(machine, sample, places, every)
         proposal: AllCandidates | CandidateList = AllCandidates(candidates, square)
         if not every:
-            proposal = CandidateList(candidates, square, len(offsets), self.chance(number), self._of_phase(candidates))
+            proposal = CandidateList(candidates, square, len(offsets), self.chance(level), self._of_phase(candidates))
         novelty = options.novelty * min(1.0, WHOLE / spaced, (spaced / SMALL) ** 2) if coarsest else 0.0
         relaxation = Relaxation(
             grid=grid,
@@ -195,24 +195,24 @@ class Lattices:
                 penalty=None,
                 discount=np.float32(1 / (1 + options.coherence)),
                 novelty=np.float32(novelty * sample.channels * sample.variance),
-                phased=self._phased(number, candidates),
+                phased=self._phased(level, candidates),
                 kinds=self._kinds(candidates),
             ),
-            choice=self.choice(number),  # 6.2.2.2
+            choice=self.choice(level),  # 6.2.2.2
             xi=min(-1, round(options.xi * 1024)),  # 6.2.2.3 the temperature, equation (13)
             seed=self.seed,
-            level=number,
+            level=level,
             confidences=self.conditions.confidences,
         )
-        setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, number)
-        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(number), self.regions)
+        setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, level)
+        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(level), self.regions)
 
-    def choice(self, number: int) -> SiteChoice:
+    def choice(self, level: int) -> SiteChoice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
-        options, sample, count = self.options, self.sample, self.places(number).positions.size
+        options, sample, count = self.options, self.sample, self.places(level).positions.size
         dimensions = sample.channels * (len(self.offsets) + 1)
         h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, count, dimensions)
-        draws = options.relaxation == "gibbs" or number == self.levels - 1
+        draws = options.relaxation == "gibbs" or level == self.levels - 1
         return SiteChoice(draws, options.pixel == "density", lcpdf.window(h, sample.top))
 
     def _on(self, level: Level, grid: Grid) -> Level:
@@ -241,9 +241,9 @@ class Lattices:
             lists={},
         )
 
-    def _alike(self, number: int, proposal: CandidateList, grid: Grid) -> InPhase:
+    def _alike(self, level: int, proposal: CandidateList, grid: Grid) -> InPhase:
         """Return the phases of a proposal, and more of them: candidates alike in the variables known at some sites."""
-        machine, known, held = self.machine, self.conditions.confidences.known, self.conditions.at(number, grid)
+        machine, known, held = self.machine, self.conditions.confidences.known, self.conditions.at(level, grid)
         assert held
         size = proposal.candidates.size
         begin, numbers, phase = np.array([0, size]), np.arange(size), np.zeros(grid.shape, np.int32)
@@ -284,20 +284,20 @@ class Lattices:
         p = np.broadcast_to(p, (len(p), *grid.shape))
         return Regions(p, of, self.sample.category, grid, int(self.offsets.max()), unit)
 
-    def _phased(self, number: int, candidates: Candidates) -> Phased | None:
+    def _phased(self, level: int, candidates: Candidates) -> Phased | None:
         """Return the phases of candidates of a regular sample, and their weights; None if the sample is not regular."""
         waves = self.sample.waves
         if not waves:
             return None
         weight = np.float32(round(sqrt(1.25 * len(self.offsets))))  # weight of a guide at the neighbours and the site
-        tolerance = np.float32(round(float(weight) ** 2 * waves.half(self.places(number).step)))
+        tolerance = np.float32(round(float(weight) ** 2 * waves.half(self.places(level).step)))
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))
         return Phased(self.machine.put(those), None, weight, tolerance)
 
-    def _scattered(self, number: int, grid: Grid) -> ScatteredData | None:
+    def _scattered(self, level: int, grid: Grid) -> ScatteredData | None:
         """Return the conditioning data between the sites of a lattice or a window of it; None if there are none."""
-        data = self.conditions.scattered(number)
+        data = self.conditions.scattered(level)
         if data is None:
             return None
         site, datum, apart = nearest_data(data.place, grid, self.options.neighbourhood)
@@ -319,35 +319,35 @@ class Lattices:
         """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
         return 0.0 if self.coarser else self.options.balance * self.typical_distance
 
-    def free_sweeps(self, number: int) -> int:
+    def free_sweeps(self, level: int) -> int:
         """Return the number of free sweeps of a level."""
         kept = self.options.free_sites == "kept"
-        return 0 if kept and not 0 == number < self.levels - 1 else self.options.free_sweeps
+        return 0 if kept and not 0 == level < self.levels - 1 else self.options.free_sweeps
 
     @property
     def kept_only(self) -> bool:
         """Whether free sweeps relax only the sites that are also on the level above."""
         return self.options.free_sites == "kept" and not self.coarser  # else all are: see `squares`
 
-    def exhaustive(self, number: int) -> bool:
+    def exhaustive(self, level: int) -> bool:
         """Return whether a site of a level evaluates all its candidates."""
-        if self.options.search == "exact" or (number == self.levels - 1 and not self.phased):
+        if self.options.search == "exact" or (level == self.levels - 1 and not self.phased):
             return True
-        return bool(self.places(number).positions.size <= EXHAUSTIVE)
+        return bool(self.places(level).positions.size <= EXHAUSTIVE)
 
-    def fair_use(self, number: int) -> FairUse:
+    def fair_use(self, level: int) -> FairUse:
         """Return the positions of the candidates of a level, and the fair use of each."""
-        places = self.places(number)
+        places = self.places(level)
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
-        fair, listed = self.sample.fair(places), not self.exhaustive(number)
-        gain = GAIN if number == self.levels - 1 else 2 * GAIN
-        asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(number)), "gain": gain} if self.regions else {}
+        fair, listed = self.sample.fair(places), not self.exhaustive(level)
+        gain = GAIN if level == self.levels - 1 else 2 * GAIN
+        asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(level)), "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 
-    def places(self, number: int) -> Places:
+    def places(self, level: int) -> Places:
         """Return the places of the candidates of a level: all of a regular sample, since few are of a site's phase."""
-        spacing, phases = self.spacing(number), self.options.phases
-        if number == self.levels - 1:  # a place of it is one of every finer level, whatever their phases
+        spacing, phases = self.spacing(level), self.options.phases
+        if level == self.levels - 1:  # a place of it is one of every finer level, whatever their phases
             decimated = self.sample.height * self.sample.width // spacing**2
             phases = min(phases, max(1, isqrt(ALL // max(1, decimated))))
         edges = "reflect" if self.options.edges == "auto" and self.plan.reduction > 1 else self.options.edges
@@ -358,14 +358,14 @@ class Lattices:
         """Whether the candidates of a site are of its phase on the lattice of a regular sample."""
         return self.sample.waves is not None and self.options.search == "coherent"
 
-    def chance(self, number: int) -> int:
+    def chance(self, level: int) -> int:
         """Return the number of random candidates of a level.
 
         Of a regular sample they are all of a phase at the coarsest level, and a quarter as many at each finer level,
         which has four times as many sites.
         """
-        chance = self.options.chance_at(number)
-        return max(chance, IN_PHASE >> 2 * (self.levels - 1 - number)) if self.phased else chance
+        chance = self.options.chance_at(level)
+        return max(chance, IN_PHASE >> 2 * (self.levels - 1 - level)) if self.phased else chance
 
     def _of_phase(self, candidates: Candidates) -> InPhase | None:
         """Return the candidates of each phase, without the sites' phases; None if the sample is not regular."""
@@ -493,14 +493,14 @@ def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int
     """
     held: list[tuple[int, int]] = []
     sites = begun = 0
-    for number, (begin, end) in enumerate(ranges.tolist(), 1):
+    for step, (begin, end) in enumerate(ranges.tolist(), 1):
         for first in range(begin, max(end, begin + 1), most):
             last = min(end, first + most)
             if held and sites + last - first > most:
                 yield np.array(held, np.int64), begun, False
                 held, sites = [], 0
             held.append((first, last))
-            sites, begun = sites + last - first, number
+            sites, begun = sites + last - first, step
     yield np.array(held, np.int64), begun, True
 
 

@@ -441,7 +441,7 @@ class Options:
         plain = self.pixel == "density" or pictures.deep
         finish, structure = 0.0 if pictures.deep else finish, 0.0 if plain else self.structure
         lattice = "none" if plain or named else self.lattice
-        least = min(min(one.shape[:-1]) for one in pictures.pixels)
+        least = min(min(picture.shape[:-1]) for picture in pictures.pixels)
         order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
         return replace(self, order=order, search=search, finish=finish, structure=structure, lattice=lattice)
 
@@ -469,5 +469,5 @@ def largest_order(side: int) -> int:
 
 def of_palette(pictures: Sequence[NDArray[Any]]) -> bool:
     """Return whether a sample, pictures (rows, cols, C), has so few different pixels that a mean is a new one."""
-    pixels, channels = sum(one[..., 0].size for one in pictures), pictures[0].shape[-1]
+    pixels, channels = sum(picture[..., 0].size for picture in pictures), pictures[0].shape[-1]
     return few(pictures, max(CATEGORIES, min(COLOURS, pixels // 4)) if channels > 2 else CATEGORIES)

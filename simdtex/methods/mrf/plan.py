@@ -203,8 +203,8 @@ def sampled(
             *(scene.pictures, values, margin, options.structure, step, scene.guides, far, scene.regular, reduction)
         )
         try:
-            for number in range(fewer):
-                sample.places(offsets, 2**number, options.phases, options.edges)
+            for level in range(fewer):
+                sample.places(offsets, 2**level, options.phases, options.edges)
         except NothingUsable:
             if fewer == 1 or options.levels is not None:
                 raise

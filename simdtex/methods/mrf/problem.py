@@ -64,11 +64,11 @@ class Input:
         key = first, cols, self.reduction
         return replace(self, key=key, coarser=self.coarser and self.coarser.keyed(first, cols))
 
-    def grid(self, number: int) -> Grid:
+    def grid(self, level: int) -> Grid:
         """Return the lattice of a level, equation (10), in pixels of the sample."""
-        grid = Grid.of(self.shape, 2**number // self.reduction, self.options.boundary == "torus")
+        grid = Grid.of(self.shape, 2**level // self.reduction, self.options.boundary == "torus")
         return replace(grid, key=self.key)
 
-    def of(self, number: int) -> Input:
+    def of(self, level: int) -> Input:
         """Return the input of a level: this one, or a coarser one."""
-        return self.coarser.of(number) if self.coarser and 2**number > self.reduction else self
+        return self.coarser.of(level) if self.coarser and 2**level > self.reduction else self

@@ -49,9 +49,9 @@ class MrfRecord(Observer):
         left = state.temperature_sum / (1024 * sites)
         self._done = part.sites + (0 if self._ended else self._done)
         report = self.reports[-1]
-        for what, number in {"sweeps": self._ended, "steps": part.steps, "relaxations": part.sites}.items():
-            report[what] += int(number)
-            report["equilibrium"][what] += 0 if free else int(number)
+        for what, count in {"sweeps": self._ended, "steps": part.steps, "relaxations": part.sites}.items():
+            report[what] += int(count)
+            report["equilibrium"][what] += 0 if free else int(count)
         report["fma"] += 0 if self._listed else level.work * part.sites
         self._ended, self._first_left = part.last, self._first_left or left
         self._advance(level.number, state, left, min(1.0, self._done / max(1, state.active or sites)))
@@ -189,22 +189,22 @@ def expected_work(whole: Lattices) -> dict[int, tuple[float, float]]:
     sites about 6 times; a sweep has about 0.6 (|N| + 1) steps.
     """
     work = {}
-    for number in range(whole.levels):
-        run, grid = whole.of(number), whole.grid(number)
-        coarsest = number == run.levels - 1
+    for level in range(whole.levels):
+        run, grid = whole.of(level), whole.grid(level)
+        coarsest = level == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / float(run.options.xi)) if coarsest else 6 * 0.75
-        each = run.places(number).positions.size
-        if not run.exhaustive(number):
-            each = LISTED * min(each, most_listed(len(run.offsets), run.chance(number)))
+        each = run.places(level).positions.size
+        if not run.exhaustive(level):
+            each = LISTED * min(each, most_listed(len(run.offsets), run.chance(level)))
         sweeps = 0.0 if run.coarser else sweeps  # it begins with an arrangement
         sweep = grid.size * each + STEP * min(grid.size, 0.6 * (len(run.offsets) + 1))
         share = 0.25 if run.kept_only else 1.0
-        work[number] = (sweep * sweeps, sweep * share * run.free_sweeps(number))
+        work[level] = (sweep * sweeps, sweep * share * run.free_sweeps(level))
     return work
 
 
 def fraction_done(expected: dict[int, tuple[float, float]], level: int, cooled: float, free: float) -> float:
     """Return the finished share of the expected work, at the shares ``cooled`` and ``free`` of a level's sweeps."""
     cooling, sweeps = expected[level]
-    before = sum(sum(work) for number, work in expected.items() if number > level)
+    before = sum(sum(work) for coarser, work in expected.items() if coarser > level)
     return min(1.0, (before + cooling * cooled + sweeps * free) / sum(map(sum, expected.values())))

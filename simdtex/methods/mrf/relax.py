@@ -71,9 +71,9 @@ class AllCandidates(NamedTuple):
     def propose(self, around: Near, relaxation: Relaxation, turn: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the numbers (slots, 1) of the candidates, and a mask (slots, S) of those that are coherent."""
         coherent = np.zeros((self.slots, around.sites.size), bool)
-        number = continuing(self.candidates, around.source)
-        k, s = np.nonzero(number >= 0)
-        coherent[number[k, s], s] = True
+        candidate = continuing(self.candidates, around.source)
+        k, s = np.nonzero(candidate >= 0)
+        coherent[candidate[k, s], s] = True
         return np.arange(self.slots)[:, None], coherent
 
 
@@ -158,9 +158,9 @@ class CandidateList(NamedTuple):
         numbers = np.full((self.slots + 1, sites.size), -1)  # one more for a repeated number
         size = np.zeros(sites.size, np.int64)
 
-        def add(number: NDArray[np.integer[Any]]) -> None:
-            new = (number >= 0) & ~(numbers == number).any(0)
-            numbers[size[new], np.flatnonzero(new)] = number[new]
+        def add(candidate: NDArray[np.integer[Any]]) -> None:
+            new = (candidate >= 0) & ~(numbers == candidate).any(0)
+            numbers[size[new], np.flatnonzero(new)] = candidate[new]
             size[new] += 1
 
         for suggestion in continuing(self.candidates, around.source)[:SUGGESTING]:
@@ -172,11 +172,11 @@ class CandidateList(NamedTuple):
         first, many = every if self.phases is None else self._of_phase(sites)
         for k in range(draws.max()):
             word = random.draw4(relaxation.seed, relaxation.level, turn, places, random.SEARCH, k // 4)[k % 4]
-            number = ((word.astype(np.uint64) * many.astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
+            candidate = ((word.astype(np.uint64) * many.astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
             if self.phases is not None:  # if there are no more than draws, each of them once
-                number = np.where(many <= draws, np.where(k < many, k, -1), number)
-                number = np.where(number < 0, -1, self.phases.numbers[np.maximum(first + number, 0)])
-            add(np.where(k < draws, number, -1))
+                candidate = np.where(many <= draws, np.where(k < many, k, -1), candidate)
+                candidate = np.where(candidate < 0, -1, self.phases.numbers[np.maximum(first + candidate, 0)])
+            add(np.where(k < draws, candidate, -1))
         return numbers[:-1], coherent
 
     def _of_phase(self, sites: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -268,10 +268,10 @@ class Relaxation(NamedTuple):
         draws, at = np.unique(unit // 4 * LANES + lane, return_inverse=True)
         at = at.reshape(numbers.shape)
         words = np.stack(random.draw4(self.seed, self.level, turn, places, random.GUMBEL, draws[:, None]))
-        found = minus_gumbel(words[unit % 4, at, np.arange(places.size)])
+        noise = minus_gumbel(words[unit % 4, at, np.arange(places.size)])
         for plane in candidates.pixels if self.choice.density else ():
-            found = found - lcpdf.log_legal(plane[candidates.positions[np.maximum(numbers, 0)]], self.choice.window)
-        return found
+            noise = noise - lcpdf.log_legal(plane[candidates.positions[np.maximum(numbers, 0)]], self.choice.window)
+        return noise
 
     def arguments(self, machine: Launcher, sites: Array, field: Field) -> tuple[dict[str, int], list[Any]]:
         """Return the -D constants and the first arguments of kernels that evaluate candidates."""

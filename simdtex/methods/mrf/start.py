@@ -47,10 +47,10 @@ def start(
         source = positions[random.below(lo, hi, positions.size)].reshape(shape)
         field = Field(pixels[:, source].astype(np.uint16), source, np.full(shape, 1024, np.uint16))
         if above is not None:
-            shared, own = (tuple(slice(first % 2, None, n) for first in grid.first) for n in (2, None))
+            shared, every = (tuple(slice(first % 2, None, n) for first in grid.first) for n in (2, None))
             for made, kept in zip(field, above, strict=True):
                 to = made[(..., *shared)]
-                to[...] = kept[(..., *own)][..., : to.shape[-2], :]  # without an older picture below it
+                to[...] = kept[(..., *every)][..., : to.shape[-2], :]  # without an older picture below it
         return field
     values = machine.empty((channels, *shape), np.uint16)
     field = Field(values, machine.empty(shape, np.int32), machine.empty(shape, np.uint16))

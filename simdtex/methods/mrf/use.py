@@ -100,8 +100,8 @@ class Regions:
         """Return the number of sites with t < 1 and a source of each kind in each region, (regions x kinds,)."""
         source, region = grid.latest(field.source), self.at(grid)
         there = (grid.latest(field.temperature) < 1024) & (source >= 0) & (region >= 0)
-        number = region[there] * len(self.p) + self.kinds(source[there])
-        return np.bincount(number, minlength=2 * len(self.bordered) * len(self.p))
+        cell = region[there] * len(self.p) + self.kinds(source[there])
+        return np.bincount(cell, minlength=2 * len(self.bordered) * len(self.p))
 
     def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
@@ -119,8 +119,8 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
     """
     if machine is None:
         known = grid.latest(field.temperature) < 1024
-        number = candidates.number_of(grid.latest(field.source)[known])
-        return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
+        index = candidates.number_of(grid.latest(field.source)[known])
+        return np.bincount(index[index >= 0], minlength=candidates.size).astype(np.int32)
     counts = machine.put(np.zeros(candidates.size, np.int32))
     sites = grid.size
     machine.launch("use", (sites,), sites, field.source, field.temperature, candidates.index_of, counts)

@@ -100,7 +100,7 @@ class MultiresRun:
         channels = len(analysis.sample.planes)
         within_32_bits(shape, max(VALUES, channels))
         self.machine, self.analysis, self.options, self.seed = machine, analysis, options, seed
-        self.shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
+        self.shapes = [tiled(shape, analysis.shapes[0], size, 2**level) for level, size in enumerate(analysis.shapes)]
         held = 4 * (pixels(analysis.shapes) * channels + prod(analysis.features.shape))
         on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + held
         memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
@@ -212,9 +212,9 @@ class MultiresRecord(Observer):
             )
 
 
-def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
+def tiled(shape: tuple[int, int], sample: tuple[int, int], size: tuple[int, int], spacing: int) -> tuple[int, int]:
     """Return rows and columns of a level of the output: tiles like the sample's level, and the beginning of one."""
-    rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
+    rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, size, strict=True))
     return rows, cols
 
 

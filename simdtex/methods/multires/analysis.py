@@ -212,10 +212,10 @@ def structure_of(machine: Machine, analysis: Analysis, options: Options) -> Stru
     return Structure(analysis.features, machine.put(most), machine.put(lattice(analysis.shapes, 1)))
 
 
-def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
+def copied(machine: Machine, shapes: Sequence[tuple[int, int]], shape: tuple[int, int]) -> Sampled:
     """Return the top level, filled with copies of the sample's, and empty levels below it."""
     row, col = np.indices(shapes[-1], np.int32)
-    top = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
+    top = row % np.int32(shape[0]) * np.int32(shape[1]) + col % np.int32(shape[1])
     source = np.concatenate([np.zeros(pixels(shapes[:-1]), np.int32), top.ravel()])
     counts = np.zeros((source.size, 2), np.int32)
     counts[-top.size :, 0] = 1  # all other levels are still to be counted

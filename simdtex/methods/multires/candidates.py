@@ -62,8 +62,8 @@ def _drawn(
         compared += passing.sum(1)
         rows, cols, start, ragged = structure.lattice[k]
         above = (i // tile[0] * rows + (p >> k - level), j // tile[1] * cols + (q >> k - level))
-        own = sampled.source[sampled.lattice[k, 2] + above[0] * sampled.lattice[k, 1] + above[1]]
-        u = structure.features[start + own].astype(np.int64)
+        place = sampled.source[sampled.lattice[k, 2] + above[0] * sampled.lattice[k, 1] + above[1]]
+        u = structure.features[start + place].astype(np.int64)
         v = structure.features[start + row * cols + col].astype(np.int64)
         for m, threshold in enumerate(structure.threshold[k]):
             passing &= abs(u[:, None, m] - v[None, :, m]) <= threshold
@@ -72,14 +72,14 @@ def _drawn(
         else:
             parent, row, col = _children(row, col, structure.lattice[k - 1])
             passing = passing[:, parent]
-    number = np.cumsum(passing, 1)
+    count = np.cumsum(passing, 1)
     lo, hi, *_ = random.draw4(seed, level, 0, sites, random.DRAW, 0)
-    wanted = random.below(lo, hi, number[:, -1])
-    drawn = (number > wanted[:, None]).argmax(1)
+    wanted = random.below(lo, hi, count[:, -1])
+    drawn = (count > wanted[:, None]).argmax(1)
     row, col = row[drawn], col[drawn]
     if match:
         row, col = 2 * row + p % 2, 2 * col + q % 2
-    return row * tile[1] + col, np.stack([number[:, -1], compared], -1)
+    return row * tile[1] + col, np.stack([count[:, -1], compared], -1)
 
 
 def _whole(node: NDArray[np.intp], parent: NDArray[np.intp], count: int, ragged: int) -> NDArray[np.bool_]:

@@ -77,11 +77,11 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
     best = starts[int(np.argmin(least))]
     first, last = (_path(c, closed)[:, None] for c in _seams(there, values[:, best : best + 2 * reach]))
     col = np.arange(2 * reach)
-    own = np.roll(place, turn, 1)
-    covered = own[:, left : left + 2 * reach]
+    rolled = np.roll(place, turn, 1)
+    covered = rolled[:, left : left + 2 * reach]
     inside = (col > first) & (col <= reach + last)
-    own[:, left : left + 2 * reach] = np.where(inside, place[:, best : best + 2 * reach], covered)
-    return np.roll(own, -turn, 1)
+    rolled[:, left : left + 2 * reach] = np.where(inside, place[:, best : best + 2 * reach], covered)
+    return np.roll(rolled, -turn, 1)
 
 
 def _seams(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

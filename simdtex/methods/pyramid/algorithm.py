@@ -90,9 +90,9 @@ def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids:
     stretched = Stretched(sample)
     colours = palette([stretched.planes], [1.0], options.color == "decorrelate")
     scale = decorrelated([stretched.planes], [colours])
-    found = [histograms(machine, channel, *pyramids) for channel in scale.channels[0]]
-    own = np.sort(sample, axis=None) if sample.shape[-1] == 1 and options.match == "rank" else None
-    return Texture(found, colours, scale, stretched, own)
+    measured = [histograms(machine, channel, *pyramids) for channel in scale.channels[0]]
+    ranked = np.sort(sample, axis=None) if sample.shape[-1] == 1 and options.match == "rank" else None
+    return Texture(measured, colours, scale, stretched, ranked)
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class PyramidRun:
         self.levels, self.seed, self._turn = levels, seed, turn
         self.matcher = Matcher(machine, options, seed)
         found = texture.histograms
-        self.busy = [c for c, own in enumerate(found) if own.pixels[0, 0] < own.pixels[0, -1]]  # others are flat
+        self.busy = [c for c, plane in enumerate(found) if plane.pixels[0, 0] < plane.pixels[0, -1]]  # others are flat
         self._pixels = [self.matcher.wanted(found[c].pixels, found[c].pixels) for c in self.busy]
         self._subbands = [[self.matcher.wanted(band, found[c].pixels) for band in found[c].subbands] for c in self.busy]
 
@@ -215,21 +215,21 @@ class PyramidRun:
 
     def read(self, pictures: tuple[Array, ...]) -> NDArray[Any]:
         """Return the image of the channels' pictures, read back."""
-        found = dict(zip(self.busy, pictures, strict=True))
+        shown = dict(zip(self.busy, pictures, strict=True))
         return self.texture.image(
             [
-                self.machine.get(found[c]).reshape(self.shape) if c in found else np.full(self.shape, own.pixels[0, 0])
-                for c, own in enumerate(self.texture.histograms)
+                self.machine.get(shown[c]).reshape(self.shape) if c in shown else np.full(self.shape, flat.pixels[0, 0])
+                for c, flat in enumerate(self.texture.histograms)
             ]
         )
 
     def result(self, state: PyramidState, observer: PyramidRecord) -> tuple[NDArray[Any], Output]:
         """Return the image (*shape, channels) in the sample's type, and the statistics."""
-        own, machine = self.texture.own, self.machine
-        if own is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
-            ranks = machine.put(np.arange(own.size, dtype=np.int32)[None])
+        ranked, machine = self.texture.own, self.machine
+        if ranked is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
+            ranks = machine.put(np.arange(ranked.size, dtype=np.int32)[None])
             order = self.matcher.order(state.pictures[0].reshape((1, prod(self.shape))))
-            image = own[machine.get(match_ranks(machine, order, ranks)).reshape(*self.shape, 1)]
+            image = ranked[machine.get(match_ranks(machine, order, ranks)).reshape(*self.shape, 1)]
         else:
             image = self.read(state.pictures)
         options = {name: value for name, value in vars(self.options).items() if name != "start"}
@@ -268,8 +268,8 @@ def _begin(
         raise ValueError(f"start has shape {start.shape}; give one of {size} pixels, grey or with {channels} channels")
     planes = Stretched(start.reshape(-1, 1, channels)).planes
     normal = palette([planes], [1.0]).decorrelated(planes)
-    own = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)  # in 2**-14 standard deviations
-    return lambda c: machine.put(own[c].reshape(1, 1, *shape))
+    scaled = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)  # in 2**-14 standard deviations
+    return lambda c: machine.put(scaled[c].reshape(1, 1, *shape))
 
 
 class PyramidRecord(Observer):

@@ -85,8 +85,8 @@ def _expanded(
     g = coarse.astype(np.int64)
     for axis in (1, 2):
         n = g.shape[axis]
-        number, place = np.divmod(np.arange(shape[axis - 1]), tile[axis - 1])
-        parent = number * half(tile)[axis - 1] + place // 2
+        index, place = np.divmod(np.arange(shape[axis - 1]), tile[axis - 1])
+        parent = index * half(tile)[axis - 1] + place // 2
         near = [g.take(within(parent + a, n, torus), axis) for a in (-1, 0, 1)]
         first = (place % 2 == 0).reshape((-1, 1) if axis == 1 else -1)
         g = np.where(first, near[0] + 6 * near[1] + near[2], 4 * near[1] + 4 * near[2])
@@ -100,8 +100,8 @@ def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> 
     for a, b in product((-1, 0, 1), repeat=2):
         near, step = zip(*(shifted(n, d, torus) for n, d in zip(source.shape, (a, b), strict=True)), strict=True)
         row, col = (
-            within(own[np.ix_(*near)].astype(np.intp) - by, n, torus)
-            for own, by, n in zip(place, (step[0][:, None], step[1]), (rows, cols), strict=True)
+            within(axis[np.ix_(*near)].astype(np.intp) - by, n, torus)
+            for axis, by, n in zip(place, (step[0][:, None], step[1]), (rows, cols), strict=True)
         )
         total += (2 - abs(a)) * (2 - abs(b)) * band[:, row, col].astype(np.int64)
     return (total + 8) >> 4
@@ -109,9 +109,9 @@ def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> 
 
 def shifted(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the neighbours on one side of n pixels in a line, and their offsets; an end pixel may be its own."""
-    own = np.arange(n)
-    near = own + by
-    return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - own)
+    line = np.arange(n)
+    near = line + by
+    return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - line)
 
 
 @Operation
@@ -157,8 +157,8 @@ def laplacian_collapse(
     pixel of the band, to the bit.
     """
     if machine is None:
-        own = _joined(band, source, torus) if blend else band.reshape(len(band), -1)[:, source]
-        return (own + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
+        detail = _joined(band, source, torus) if blend else band.reshape(len(band), -1)[:, source]
+        return (detail + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
     planes, (rows, cols) = band.shape[0], source.shape
     fine = machine.empty((planes, rows, cols), np.int32)
     machine.launch(
@@ -217,16 +217,16 @@ def filters(machine: Launcher | None, picture: Array, band: Array, taps: Array, 
     if machine is None:
         reach = side // 2
         row, col = (within(np.arange(-reach, n + reach), n, torus) for n in (rows, cols))
-        found = []
-        for g, own in zip(picture, band, strict=True):
+        responses = []
+        for g, detail in zip(picture, band, strict=True):
             around = g[np.ix_(row, col)].astype(np.int64)
-            found.append(own)
+            responses.append(detail)
             for f in taps:
                 total = np.zeros((rows, cols), np.int64)
                 for a, b in np.ndindex(f.shape):
                     total += f[a, b] * around[a : a + rows, b : b + cols]
-                found.append((total + (1 << UNIT_BITS - 1)) >> UNIT_BITS)
-        return np.stack(found, -1).reshape(rows * cols, -1).astype(np.int32)
+                responses.append((total + (1 << UNIT_BITS - 1)) >> UNIT_BITS)
+        return np.stack(responses, -1).reshape(rows * cols, -1).astype(np.int32)
     features = machine.empty((rows * cols, planes * (1 + count)), np.int32)
     machine.launch(
         "filters",

@@ -55,11 +55,11 @@ def average(parts: Sequence[Sorted], weights: Sequence[float]) -> Sorted:
     shares = np.concatenate([np.full(part.shape[1], weight / total / part.shape[1]) for part, weight in kept])
     values = np.concatenate([part for part, _ in kept], 1)
     averaged = np.empty((len(values), m), np.int32)
-    for band, own in zip(averaged, values, strict=True):
-        order = np.argsort(own, kind="stable")
+    for band, row in zip(averaged, values, strict=True):
+        order = np.argsort(row, kind="stable")
         below = np.cumsum(shares[order])
         at = np.searchsorted(below, (np.arange(m) + 0.5) / m * below[-1])
-        band[:] = own[order][np.minimum(at, own.size - 1)]
+        band[:] = row[order][np.minimum(at, row.size - 1)]
     return averaged
 
 
@@ -148,9 +148,9 @@ class Matcher:
 
     def distances(self) -> dict[str, float]:
         """Return how far each subband's values were moved since the last call, mean, in its standard deviations."""
-        found: dict[str, list[float]] = {}
+        shifts: dict[str, list[float]] = {}
         for name, moved, scale in self.moved:
             total = np.asarray(self._machine.get(moved)).reshape(len(scale), -1).sum(1)
-            found.setdefault(name, []).append(float((total / scale).mean()))
+            shifts.setdefault(name, []).append(float((total / scale).mean()))
         self.moved.clear()
-        return {name: float(np.mean(several)) for name, several in found.items()}
+        return {name: float(np.mean(several)) for name, several in shifts.items()}

@@ -80,8 +80,8 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     """
     low, high = int(sorted_values[0]), int(sorted_values[-1])
     width, m = high - low, len(sorted_values)
-    number = _bins_of(sorted_values.astype(np.int64) - low, np.int64(width), bins)
-    below = np.concatenate(([0], np.cumsum(np.bincount(number, minlength=bins))))
+    index = _bins_of(sorted_values.astype(np.int64) - low, np.int64(width), bins)
+    below = np.concatenate(([0], np.cumsum(np.bincount(index, minlength=bins))))
     table = [low]
     for i in range(1, bins + 1):
         rank = i * m  # in values / bins, so that it is an integer
@@ -94,8 +94,8 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
 
 def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins: int) -> NDArray[np.int64]:
     """Return the bins of values ``above`` the least; the greatest value is at the end of the last bin."""
-    number: NDArray[np.int64] = np.minimum(above * bins // np.maximum(width, 1), bins - 1)
-    return number
+    index: NDArray[np.int64] = np.minimum(above * bins // np.maximum(width, 1), bins - 1)
+    return index
 
 
 @Operation
@@ -128,7 +128,7 @@ def match_lookup(machine: Launcher | None, values: Array, tables: Array) -> Arra
     (segments, n), bins = values.shape, tables.shape[1] - 1
     each = segments // tables.shape[0]
     if machine is None:
-        looked = [_looked_up(own, tables[segment // each], bins) for segment, own in enumerate(values.astype(np.int64))]
+        looked = [_looked_up(row, tables[segment // each], bins) for segment, row in enumerate(values.astype(np.int64))]
         return np.array(looked, np.int32)
     runs, shape = _runs(machine, segments, n, bins)
     ranges, spans = machine.empty((segments, runs, 2), np.int32), machine.empty((segments, 2), np.int32)
@@ -144,9 +144,9 @@ def match_lookup(machine: Launcher | None, values: Array, tables: Array) -> Arra
     return result
 
 
-def _looked_up(own: NDArray[np.int64], targets: NDArray[np.int32], bins: int) -> NDArray[np.int64]:
-    table, n = targets.astype(np.int64), own.size
-    above, width = own - own.min(), own.max() - own.min()
+def _looked_up(values: NDArray[np.int64], targets: NDArray[np.int32], bins: int) -> NDArray[np.int64]:
+    table, n = targets.astype(np.int64), values.size
+    above, width = values - values.min(), values.max() - values.min()
     place = np.full(n, bins << FRACTION - 1, np.int64)
     if width > 0:
         b = _bins_of(above, width, bins)

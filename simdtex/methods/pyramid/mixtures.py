@@ -57,15 +57,15 @@ class Mixture:
         if self.sides is not None:
             low, high, split = self.sides
             finest = _high_subbands(split, levels, options.pyramid)
-            found = [spliced(a, b, finest) for a, b in zip(every[low], every[high], strict=True)]
+            patterns = [spliced(a, b, finest) for a, b in zip(every[low], every[high], strict=True)]
         else:
-            found = [averaged(channel, weights) for channel in zip(*every.values(), strict=True)]
+            patterns = [averaged(channel, weights) for channel in zip(*every.values(), strict=True)]
         if shown:  # the pixels of the palette; a channel in which the pattern is flat, as in grey, has their mean
             pixels: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in scale.channels[-1]]
-            for c, pattern in enumerate(found):
+            for c, pattern in enumerate(patterns):
                 varies = any((band[:, 0] < band[:, -1]).any() for band in pattern.subbands)
-                found[c] = Histograms(pixels[c] if varies else np.zeros((1, 1), np.int32), pattern.subbands)
-        texture = pyramid.Texture(found, palette, scale, stretched)
+                patterns[c] = Histograms(pixels[c] if varies else np.zeros((1, 1), np.int32), pattern.subbands)
+        texture = pyramid.Texture(patterns, palette, scale, stretched)
         return pyramid.picture_run(machine, texture, self, levels, seed)
 
 

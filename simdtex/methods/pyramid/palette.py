@@ -70,7 +70,7 @@ def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], dec
     """
     shares = [float(weight) / float(sum(weights)) for weight in weights]
     means = [picture.reshape(len(picture), -1).mean(1, dtype=np.float64) for picture in pictures]
-    mean = np.rint(sum(share * own for share, own in zip(shares, means, strict=True))).astype(np.int64)
+    mean = np.rint(sum(share * centre for share, centre in zip(shares, means, strict=True))).astype(np.int64)
     channels = len(mean)
     first, second = np.zeros(channels), np.zeros((channels, channels))
     for share, picture in zip(shares, pictures, strict=True):

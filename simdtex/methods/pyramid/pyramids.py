@@ -87,9 +87,9 @@ class Transform:
         if not self._steerable:
             return self._collapse_laplacian(subbands)
         high, *bands, low = subbands
-        for own in reversed(bands):
-            terms = [(own, self._bands, 1), self._previous(low, own.shape[2:])]
-            low = steerable_join(self._machine, terms, own.shape[2:], self._torus)
+        for band in reversed(bands):
+            terms = [(band, self._bands, 1), self._previous(low, band.shape[2:])]
+            low = steerable_join(self._machine, terms, band.shape[2:], self._torus)
             low = low.reshape((1, *low.shape))
         return steerable_join(self._machine, [(high, self._high, 1), (low, self._low, 1)], high.shape[2:], self._torus)
 

@@ -90,9 +90,9 @@ class SolidPlan:
         def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
             block, of_block, of_slices = block.reshape(shape), wanted[: levels + 1], wanted[levels + 1 :]
             solids = [_matched_block(machine, block, of_block, matcher)]
-            for number, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
+            for index, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
                 machine.sync()
-                tell((1 + number) / (1 + len(FAMILIES)))
+                tell((1 + index) / (1 + len(FAMILIES)))
                 before = solids[-1] if options.solids == "turns" else block
                 synthesis_pyr = slices.make(solid_turn(machine, before, axes))
                 names = [f"{name} {band}" for band in slices.names]

@@ -73,10 +73,10 @@ def steerable_split(machine: Launcher | None, picture: Array, taps: Array, torus
     count, side, _ = taps.shape
     if machine is None:
         around, (rows, cols) = _around(picture, side // 2, torus), size
-        found = np.zeros((count, *picture[:, ::step, ::step].shape), np.float32)
+        total = np.zeros((count, *picture[:, ::step, ::step].shape), np.float32)
         for a, b in np.ndindex(side, side):
-            found = _fma(taps[:, a, b, None, None, None], around[:, a : a + rows : step, b : b + cols : step], found)
-        return np.rint(found).astype(np.int32)
+            total = _fma(taps[:, a, b, None, None, None], around[:, a : a + rows : step, b : b + cols : step], total)
+        return np.rint(total).astype(np.int32)
     rows, cols = (-(-n // step) for n in size)
     bands = machine.empty((count, planes, rows, cols), np.int32)
     v, unit = machine.vector, ROWS.get(count, 1)
@@ -135,7 +135,7 @@ def steerable_join(
         if padded is None:  # the first piece is the largest
             padded = machine.empty(most * together * height * pitch, np.float32)
             total = padded if len(terms) == 1 else machine.empty(together * some * across, np.float32)
-        for number, (bands, taps, step) in enumerate(terms):
+        for index, (bands, taps, step) in enumerate(terms):
             count, own = taps.shape[:2]
             # Every other row is zero, unless rows repeat after an odd number, where even rows meet odd ones.
             skip = 1 if rows == 1 or (torus and rows % 2) else step
@@ -149,7 +149,7 @@ def steerable_join(
                 "steerable_join",
                 (_up(some, ROWS[1] * skip) // ROWS[1] * across // v, together),
                 *(padded, together, height, pitch, taps, count, own, skip),
-                *(number == 0, number == len(terms) - 1, total, rows, cols, first, first_row, some, picture),
+                *(index == 0, index == len(terms) - 1, total, rows, cols, first, first_row, some, picture),
                 defines={"V": v, "ROWS": ROWS[1]},
             )
     return picture

@@ -75,9 +75,9 @@ class Stretched:
         return made
 
     def _picture(self, values: NDArray[np.int32], source: NDArray[np.int32] | None) -> NDArray[Any]:
-        own: NDArray[Any] = self.pixels.min()
+        pixels: NDArray[Any] = self.pixels.min()
         by = np.moveaxis(values, 0, -1).astype(np.float64)
         if source is not None:
-            own = self.pixels.reshape(-1, self.pixels.shape[-1])[source]
+            pixels = self.pixels.reshape(-1, self.pixels.shape[-1])[source]
             by -= np.moveaxis(self.planes.reshape(len(self.planes), -1)[:, source], 0, -1)
-        return moved(own, by, self.unit, self.pixels)
+        return moved(pixels, by, self.unit, self.pixels)
