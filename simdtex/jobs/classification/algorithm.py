@@ -124,7 +124,7 @@ class ClassificationRun:
         self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
         self._levels = prepared(machine, model.scale, plan.image, model.experts[-1].level + 1)
-        self._on_host = [np.asarray(machine.get(one)) for one in self._levels]
+        self._on_host = [np.asarray(machine.get(level)) for level in self._levels]
         self._exemplars = [known.on(machine) for known in model.exemplars]
         self._classes = machine.put(np.arange(len(plan.names), dtype=np.int32))
 
@@ -152,8 +152,8 @@ class ClassificationRun:
         for e, (expert, known) in enumerate(zip(self.model.experts, self._exemplars, strict=True)):
             offsets = machine.put(expert.offsets)
             values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
-            found = machine.get(exemplars(machine, values, known))
-            state.logs[e, :, state.done : end] = found.reshape(len(found), -1, cols)
+            nearest = machine.get(exemplars(machine, values, known))
+            state.logs[e, :, state.done : end] = nearest.reshape(len(nearest), -1, cols)
         band = max(FEWEST_ROWS, SITES_AT_ONCE // cols)
         for first in range(-(-state.done // band) * band, end, band):
             state.logs[-1, :, first : first + band] = self._patterned(first, min(first + band, self.grid.rows))
@@ -175,16 +175,16 @@ class ClassificationRun:
         """Return the evidence of single sites, (classes, ...) int32 in 2**-18: equation (6), and patterns."""
         total = np.empty(logs.shape[1:], np.int32)
         total[:] = self.model.offsets.reshape(-1, *[1] * (total.ndim - 1))
-        for factor, one in zip((*(expert.factor for expert in self.model.experts), PATTERN_FACTOR), logs, strict=True):
-            total -= np.int32(factor) * one.astype(np.int32)
+        for factor, log in zip((*(expert.factor for expert in self.model.experts), PATTERN_FACTOR), logs, strict=True):
+            total -= np.int32(factor) * log.astype(np.int32)
         return total
 
     def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
         """Return the evidence of each class averaged over the window ``smoothing``, (classes, rows, cols) int32."""
         total = self._single(logs)
         if self.options.smoothing:
-            for one in total:
-                one[:] = blurred(one, gaussian(self.options.smoothing))
+            for plane in total:
+                plane[:] = blurred(plane, gaussian(self.options.smoothing))
         return total
 
     def _votes(self, labels: Array) -> Array:
@@ -196,13 +196,13 @@ class ClassificationRun:
         evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
         for after, chosen in schedules.decisions(self.schedule, self._setting, state.schedule, self._everywhere):
             memory = after
-            for one in chosen.apart(machine):
-                if one.sites.size:
-                    sites = machine.put(one.sites.astype(np.int32))
+            for group in chosen.apart(machine):
+                if group.sites.size:
+                    sites = machine.put(group.sites.astype(np.int32))
                     labels = potts(machine, sites, evidence, self._votes(labels), self._weight, labels)
-        found = machine.get(labels)
-        changed = int(np.count_nonzero(found != state.labels))
-        return ClassificationState(state.done, state.logs, found, memory, (*state.changed, changed))
+        swept = machine.get(labels)
+        changed = int(np.count_nonzero(swept != state.labels))
+        return ClassificationState(state.done, state.logs, swept, memory, (*state.changed, changed))
 
     def ended(self, state: ClassificationState) -> bool:
         """Return whether all rows are compared, and the last sweep changed no label or no sweep is left."""
@@ -212,7 +212,7 @@ class ClassificationRun:
     def result(self, state: ClassificationState, observer: ClassificationRecord) -> tuple[NDArray[Any], Output]:
         """Return labels (rows, cols, 1) uint8, 0 unknown; fits and probabilities."""
         fit, rejected = self._fits(state)
-        found = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
+        index = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
         energy = self._evidence(state.logs)
         votes = self.machine.get(self._votes(self.machine.put(state.labels))).view(np.int32)
         energy += np.int32(self._weight) * votes // WEIGHTS
@@ -220,7 +220,7 @@ class ClassificationRun:
         chance = np.exp(energy.astype(np.float32) / np.float32(UNITS))
         chance /= chance.sum(0)
         names = {0: "unknown"} | self.plan.names
-        shares = np.bincount(found.ravel(), minlength=len(names)) / found.size
+        shares = np.bincount(index.ravel(), minlength=len(names)) / index.size
         options = vars(self.options) | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name}
         statistics: dict[str, Any] = {
             "options": options,
@@ -233,7 +233,7 @@ class ClassificationRun:
         for c, about in enumerate(statistics["classes"][1:]):
             about |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
         more = {"fit": np.moveaxis(fit, 0, -1), "probability": np.moveaxis(chance, 0, -1)}
-        return self.labels[found][..., None], Output(None, statistics=statistics, **more)
+        return self.labels[index][..., None], Output(None, statistics=statistics, **more)
 
     def _fits(self, state: ClassificationState) -> tuple[NDArray[np.float32], Mask]:
         """Return the fit of each class at each site, (classes, rows, cols), and a mask of sites of a rejected class."""
@@ -252,12 +252,12 @@ class ClassificationRun:
             inside[first - slab.start :][:band] = True
             patterned, segments = patterns(self._on_host, slab), []
             for label in np.unique(state.labels[here]):
-                own = labels == label
-                inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
-                (box,) = ndimage.find_objects(own.astype(np.int8))
+                members = labels == label
+                inner = ndimage.minimum_filter(members, size, mode="nearest")  # no neighbour beyond the segment
+                (box,) = ndimage.find_objects(members.astype(np.int8))
                 part = tuple(slice(max(0, side.start - reach), side.stop + reach) for side in box)
-                segment = _Segment(part, *(mask[part] for mask in (own, inner, own & inside)))
-                segments.append((label, segment, self._means(patterned, np.zeros_like(own), segment)))
+                segment = _Segment(part, *(mask[part] for mask in (members, inner, members & inside)))
+                segments.append((label, segment, self._means(patterned, np.zeros_like(members), segment)))
             for c, null in enumerate(self.model.nulls):
                 logs = state.logs[:-1, c, slab]
                 copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
@@ -274,9 +274,9 @@ class ClassificationRun:
         """Return the means of planes over the windows of the tested sites of a segment, without copies."""
         part, own, inner, at = segment
         planes, copied = np.ascontiguousarray(planes[:, *part]), copied[part]
-        means, found = windowed(self.machine, planes, inner & ~copied, self._taps, at)
-        if not (found | copied[at]).all():  # a narrow segment
-            means = np.where(found, means, windowed(self.machine, planes, own & ~copied, self._taps, at)[0])
+        means, filled = windowed(self.machine, planes, inner & ~copied, self._taps, at)
+        if not (filled | copied[at]).all():  # a narrow segment
+            means = np.where(filled, means, windowed(self.machine, planes, own & ~copied, self._taps, at)[0])
         return means
 
     def save(self, state: ClassificationState) -> dict[str, Any]:

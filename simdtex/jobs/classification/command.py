@@ -144,17 +144,17 @@ def classify(
 
 def read_classes(flag: str, named: Named, picture: Material) -> dict[str, list[NDArray[Any]]]:
     """Read the samples of classes, masked where they are transparent; ``flag`` is the option that names them."""
-    found: dict[str, list[NDArray[Any]]] = {}
+    samples: dict[str, list[NDArray[Any]]] = {}
     for name, paths in named:
-        if name in found:
+        if name in samples:
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
-        found[name] = []
+        samples[name] = []
         for file in paths:
-            one = read_pixels(file, Reading(ascending=picture.ascending))
-            pixels = without_alpha(one, channels(picture.array))
+            material = read_pixels(file, Reading(ascending=picture.ascending))
+            pixels = without_alpha(material, channels(picture.array))
             check_alike(str(file), planes(pixels), str(picture.paths[0]), planes(picture.array))
-            found[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
-    return found
+            samples[name].append(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]))
+    return samples
 
 
 def _shares(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:

@@ -139,7 +139,7 @@ def _sampled(
             raise ValueError(f"class {name!r} has {len(shown)} samples and {len(limits)} masks; give one for each")
         regions = [_region(name, one, limit, like, channel_axis) for one, limit in zip(shown, limits, strict=True)]
         held = _listed(validation[name], channel_axis) if name in validation else []
-        regions += [_region(name, one, None, like, channel_axis)._replace(judged=True) for one in held]
+        regions += [_region(name, sample, None, like, channel_axis)._replace(judged=True) for sample in held]
         classes.append(regions)
     return classes
 
@@ -179,11 +179,11 @@ def _painted(painted: Sequence[tuple[NDArray[Any], Mask, Any]]) -> dict[int, lis
             sites = (numbers == label) & ~unknown
             regions.setdefault(label, []).append(Region(completed(pixels, unknown), sites, whole=False))
     _check_count(len(regions), painted[0][0].shape[-1])
-    found = dict(sorted(regions.items()))
-    for label, own in found.items():
-        if (count := sum(int(one.sites.sum()) for one in own)) < FEWEST_NEIGHBOURHOODS:
+    by_label = dict(sorted(regions.items()))
+    for label, shown in by_label.items():
+        if (count := sum(int(region.sites.sum()) for region in shown)) < FEWEST_NEIGHBOURHOODS:
             raise ValueError(f"label {label} is painted on {count} pixels; paint {FEWEST_NEIGHBOURHOODS} or more")
-    return found
+    return by_label
 
 
 def _check_count(count: int, bands: int) -> None:
@@ -243,7 +243,7 @@ class TextureClassifier:
 
     def __repr__(self) -> str:
         usual = type(self)().get_params()
-        changed = [f"{name}={one!r}" for name, one in self.get_params().items() if repr(one) != repr(usual[name])]
+        changed = [f"{name}={value!r}" for name, value in self.get_params().items() if repr(value) != repr(usual[name])]
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __getstate__(self) -> dict[str, Any]:
@@ -253,7 +253,7 @@ class TextureClassifier:
         return vars(self) | {"device": device, "_machine": None}
 
     def __sklearn_clone__(self) -> Self:
-        parameters = {name: one if name == "device" else deepcopy(one) for name, one in self.get_params().items()}
+        parameters = {name: value if name == "device" else deepcopy(value) for name, value in self.get_params().items()}
         return type(self)(**parameters)
 
     def __sklearn_tags__(self) -> Any:
@@ -295,17 +295,17 @@ class TextureClassifier:
         if len(images) != len(painted):
             raise ValueError(f"there are {len(images)} pictures and {len(painted)} of labels; give one for each")
         shown = [check_picture(one, self.channel_axis) for one in images]
-        for number, (pixels, _) in enumerate(shown):
-            check_alike(f"picture {number}", pixels, "picture 0", shown[0][0])
-        found = _painted([(*one, marked) for one, marked in zip(shown, painted, strict=True)])
-        self.classes_ = np.array(list(found))
+        for n, (pixels, _) in enumerate(shown):
+            check_alike(f"picture {n}", pixels, "picture 0", shown[0][0])
+        taught = _painted([(*one, marked) for one, marked in zip(shown, painted, strict=True)])
+        self.classes_ = np.array(list(taught))
         self.n_features_in_ = shown[0][0].shape[-1]
         self._like = shown[0][0][:1, :1].copy()
         self._chosen = resolve(Options, "classify", {name: vars(self)[name] for name in table(Options)})
         self._seed, machine = as_seed(self.rng), open_machine(self.device)
-        self._names = {label: str(label) for label in found}
+        self._names = {label: str(label) for label in taught}
         names = list(self._names.values())
-        self._model: Model = learn(machine, list(found.values()), names, self._chosen, self._seed)
+        self._model: Model = learn(machine, list(taught.values()), names, self._chosen, self._seed)
         self._machine = machine
         return self
 

@@ -87,14 +87,14 @@ class Expert(NamedTuple):
 def experts_of(options: Options, levels: int) -> list[Expert]:
     """Return the experts of levels, raw and contrast-compressed ones at each; weights add up to 1 / `TEMPERATURE`."""
     total = sum(FINER[:levels])
-    found = []
+    experts = []
     for level in range(levels):
         for contrast, order, share in ((False, options.order, RAW), (True, 2 * options.order, 1 - RAW)):
             near = neighbourhood_offsets(order) * 2**level
             offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
             factor = round(UNITS / LOGS * FINER[level] * share / total / TEMPERATURE)
-            found.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
-    return found
+            experts.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
+    return experts
 
 
 class Region(NamedTuple):
@@ -138,10 +138,10 @@ class Model:
 def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
     """Return the levels of a picture on a machine, smoothed by `SMOOTHING`: (B, rows, cols) uint16 in sixteenths."""
     planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
-    found = [machine.put(planes.astype(np.uint16))]
+    stack = [machine.put(planes.astype(np.uint16))]
     for level in range(1, levels):
-        found.append(machine.put(blurred(planes, gaussian(SMOOTHING[level])).astype(np.uint16)))
-    return found
+        stack.append(machine.put(blurred(planes, gaussian(SMOOTHING[level])).astype(np.uint16)))
+    return stack
 
 
 def measured(means: NDArray[np.int64], patterned: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -281,7 +281,7 @@ class _Class:
         for place, region in enumerate(self.regions):
             logs = np.zeros((len(self._experts), *region.sites.shape), np.uint16)
             judged = np.zeros(region.sites.shape, bool)
-            patterned = patterns([np.asarray(machine.get(one)) for one in self._levels[place]], slice(None))
+            patterned = patterns([np.asarray(machine.get(level)) for level in self._levels[place]], slice(None))
             for sites in _quarters(region.sites):
                 shown = np.flatnonzero(_boxed(sites))
                 for e, expert in enumerate(self._experts):
@@ -293,7 +293,7 @@ class _Class:
                     MEANS * planes.reshape(len(planes), -1)[:, shown].sum(1, keepdims=True, dtype=np.int64)
                     for planes in (logs, patterned)
                 ]
-                parts.append(measured(*(one // len(shown) for one in sums))[:, 0])
+                parts.append(measured(*(plane // len(shown) for plane in sums))[:, 0])
                 own.append(sums[0][:, 0] / (MEANS * len(shown) * LOGS))
             windows.append(measured(*(windowed(machine, one, judged, taps, judged)[0] for one in (logs, patterned))))
             near.append(roots(windowed(machine, patterned, judged, NEAR, judged)[0] / float(MEANS)))
@@ -339,13 +339,13 @@ def windowed(
 
 def _nulls(selves: Sequence[OwnDistances]) -> tuple[list[Null], int]:
     """Return the distribution of each class, and the degrees of freedom of the drift, which is pooled over classes."""
-    within = [_spread(one.windows)[1] for one in selves]
+    within = [_spread(distances.windows)[1] for distances in selves]
     pooled: NDArray[np.float64] = np.add.accumulate(within)[-1] / len(within)
-    several = [one.parts.T for one in selves if len(one.parts) > 1]
+    several = [distances.parts.T for distances in selves if len(distances.parts) > 1]
     drift = sum((_spread(parts)[1] for parts in several), np.zeros_like(pooled)) / max(1, len(several))
     nulls = [
-        Null(_spread(one.windows)[0], OWN * own + (1 - OWN) * pooled + drift + FLOOR)
-        for one, own in zip(selves, within, strict=True)
+        Null(_spread(distances.windows)[0], OWN * own + (1 - OWN) * pooled + drift + FLOOR)
+        for distances, own in zip(selves, within, strict=True)
     ]
     return nulls, max(1, sum(parts.shape[1] - 1 for parts in several))
 

@@ -33,14 +33,14 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
         inverse = exp32(np.float32(-0.5) * log32(np.maximum(square, np.float32(1))))
         gain = np.float32(40) * log32(fma32(square * inverse, np.float32(0.2), np.float32(1))) * inverse * unit
         return np.rint(z.reshape(bands * count, -1).astype(np.float32) * gain)
-    found = machine.empty((bands * count, sites.size), np.float32)
+    out = machine.empty((bands * count, sites.size), np.float32)
     machine.launch(
         "features_contrast" if contrast else "features_raw",
         (sites.size,),
         *(levels, bands, rows, cols, sites, sites.size, offsets, count),
-        *((unit, found) if contrast else (found,)),
+        *((unit, out) if contrast else (out,)),
     )
-    return found
+    return out
 
 
 EXEMPLAR_MULTIPLE = 4
@@ -67,7 +67,7 @@ class Exemplars(NamedTuple):
 
 def stacked(classes: list[NDArray[np.float32]]) -> Exemplars:
     """Return the exemplars of classes, each (n, K), in NumPy."""
-    filled = [np.concatenate([one, np.repeat(one[-1:], -len(one) % EXEMPLAR_MULTIPLE, 0)]) for one in classes]
+    filled = [np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % EXEMPLAR_MULTIPLE, 0)]) for rows in classes]
     y = np.concatenate(filled)
     starts = np.cumsum([0, *map(len, filled)]).astype(np.int32)
     return Exemplars(-2 * y, (y * y).sum(1), starts)
@@ -78,13 +78,13 @@ def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Ar
     """Return log(d^2 + 1) of the nearest exemplar of each class, (classes, S) uint16 in 1/256: O(S M K)."""
     count, classes = features.shape[1], known.starts.shape[0] - 1
     if machine is None:
-        own = (features * features).sum(0)
+        norms = (features * features).sum(0)
         least = np.empty((classes, count), np.float32)
         for c, (begin, end) in enumerate(zip(known.starts, known.starts[1:], strict=False)):
             for s in range(0, count, PART):
                 products = known.doubled[begin:end] @ features[:, s : s + PART]
                 least[c, s : s + PART] = (products + known.squares[begin:end, None]).min(0)
-        return np.rint(log32(least + own + np.float32(1)) * np.float32(LOGS)).astype(np.uint16)
+        return np.rint(log32(least + norms + np.float32(1)) * np.float32(LOGS)).astype(np.uint16)
     logs = machine.empty((classes, count), np.uint16)
     machine.launch(
         "exemplars",

@@ -48,7 +48,7 @@ _ROOT, _WHITE = 2**12, 2**20  # units in 1 of roots, and of whitening matrices
 
 def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.uint16]:
     """Return where binary patterns occur in some rows, (levels x `PATTERNS`, rows, cols): shares of the bands."""
-    found = []
+    counts = []
     for level, values in enumerate(levels):
         bands, height, width = values.shape
         near = [
@@ -59,8 +59,8 @@ def patterns(levels: Sequence[NDArray[np.uint16]], rows: slice) -> NDArray[np.ui
         greater = [values[:, near[0][y]][..., near[1][x]] >= values[:, rows] for y, x in ring]
         changes = sum((a != b).astype(np.uint8) for a, b in zip(greater, greater[1:] + greater[:1], strict=True))
         code = np.where(changes <= 2, np.sum(greater, 0, dtype=np.uint8), PATTERNS - 1)
-        found += [(code == one).sum(0, dtype=np.uint16) * (OCCURRENCE // bands) for one in range(PATTERNS)]
-    return np.array(found, np.uint16)
+        counts += [(code == pattern).sum(0, dtype=np.uint16) * (OCCURRENCE // bands) for pattern in range(PATTERNS)]
+    return np.array(counts, np.uint16)
 
 
 def roots(patterned: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -80,7 +80,7 @@ class Discriminant(NamedTuple):
         """Return the densities of classes by the roots in n windows, (P, n), and in parts of samples, (parts, P)."""
         # products of integers have exact sums
         means, within_class = zip(*map(_covariance, windows), strict=True)
-        drift = [_covariance(one.T)[1] for one in parts if len(one) > 1]
+        drift = [_covariance(part.T)[1] for part in parts if len(part) > 1]
         shared = (1 - OWN) * sum(within_class) / len(means) + DRIFT * sum(drift) / max(1, len(drift))
         whitening, logs = [], []
         for own in within_class:
@@ -94,9 +94,9 @@ class Discriminant(NamedTuple):
         """Return -log of the probability of each class, (classes, n) uint16 in 1 / `LOGS`: O(classes P^2 n)."""
         values = np.rint(roots(patterned) * _ROOT)
         energy = np.empty((len(self.means), values.shape[1]))
-        for one, mean, white, log in zip(energy, self.means, self.whitening, self.logs, strict=True):
+        for plane, mean, white, log in zip(energy, self.means, self.whitening, self.logs, strict=True):
             whitened = white @ (values - mean[:, None]) / _WHITE  # sums of integers are the same in any order
-            one[:] = ((whitened * whitened).sum(0) / 2 + log) / TEMPERATURE
+            plane[:] = ((whitened * whitened).sum(0) / 2 + log) / TEMPERATURE
         chance = exp32(np.maximum(energy.min(0) - energy, -80))
         chance /= np.add.accumulate(chance)[-1]
         least, most = np.float32(FLOOR), np.float32(1 + FLOOR)

@@ -31,19 +31,19 @@ def write_classification(
     statistics, fit = output.statistics, output.fit
     assert fit is not None
     classes = statistics["classes"]
-    names, count, colours = [one["name"] for one in classes], len(classes), label_colours(256)
-    number = np.full(256, count)  # of the class of each label
-    number[[one["label"] for one in classes]] = np.arange(count)
+    names, count, colours = [about["name"] for about in classes], len(classes), label_colours(256)
+    index = np.full(256, count)  # of the class of each label
+    index[[about["label"] for about in classes]] = np.arange(count)
     sheet = [("the picture", rgb(image)), ("the labels", colours[labels])]
     if truth is not None:
-        known = number[truth][..., None] < count
+        known = index[truth][..., None] < count
         sheet.append(("the truth", np.where(known, colours[truth], UNTOLD)))
     legend = [
         {
-            **{"Label": str(one["label"]), "Class": one["name"]},
-            **{"Colour": f"#{bytes(colours[one['label']]).hex()}", "Share": f"{one['share']:.1%}"},
+            **{"Label": str(about["label"]), "Class": about["name"]},
+            **{"Colour": f"#{bytes(colours[about['label']]).hex()}", "Share": f"{about['share']:.1%}"},
         }
-        for one in classes
+        for about in classes
     ]
     pictures = contact_sheet(sheet, columns=len(sheet))
     caption = "The picture and its labels. Black is unknown; grey is where the truth is not known."
@@ -63,7 +63,7 @@ def write_classification(
     ]
     results: dict[str, Any] = {"shape": labels.shape, "statistics": statistics}
     if truth is not None:
-        confusion = confusion_matrix(number[labels], number[truth], count)
+        confusion = confusion_matrix(index[labels], index[truth], count)
         rows = [
             {"True class": name, **{other: str(n) for other, n in zip(names, line, strict=True)}}
             for name, line in zip(names, confusion, strict=True)

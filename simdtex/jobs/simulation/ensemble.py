@@ -44,10 +44,10 @@ MOST_CATEGORIES = 16  # integers with more values are continuous
 IMAGE, VOLUME, ENSEMBLE = "(rows, cols)", "(layers, rows, cols)", "(realisations, rows, cols)"
 
 
-def checked(given: ArrayLike, name: str = "image", *shapes: str) -> Array:
+def checked(data: ArrayLike, name: str = "image", *shapes: str) -> Array:
     """Return an array of one of some shapes, by default an image, checked."""
-    unmasked(f"the {name}", given)
-    array, shapes = np.asarray(given), shapes or (IMAGE,)
+    unmasked(f"the {name}", data)
+    array, shapes = np.asarray(data), shapes or (IMAGE,)
     if array.size == 0 or array.ndim not in [shape.count(",") + 1 for shape in shapes]:
         raise ValueError(f"the {name} has the shape {array.shape}: give {' or '.join(shapes)}, none of them 0")
     if array.dtype.kind not in "biuf":
@@ -65,16 +65,16 @@ def as_index(array: Array, categories: ArrayLike, name: str) -> tuple[NDArray[np
     if len(np.unique(values)) < len(values):
         raise ValueError("a category is named twice: name each once")
     order = np.argsort(values)
-    found = position(array, values[order])
-    if (found < 0).any():
-        raise ValueError(f"the {name} holds {array[found < 0][0]}, which is no category: name it among the categories")
-    return order[found], len(values)
+    index = position(array, values[order])
+    if (index < 0).any():
+        raise ValueError(f"the {name} holds {array[index < 0][0]}, which is no category: name it among the categories")
+    return order[index], len(values)
 
 
 def position(array: Array, values: Array) -> NDArray[np.intp]:
     """Return the index of every element in a sorted list; -1 if it is not in the list."""
-    found = np.minimum(np.searchsorted(values, array), len(values) - 1)
-    return np.where(values[found] == array, found, -1)
+    index = np.minimum(np.searchsorted(values, array), len(values) - 1)
+    return np.where(values[index] == array, index, -1)
 
 
 def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) -> Array:
@@ -222,9 +222,9 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     stumps = _free_ends(pruned) & inside
     pieces, _ = ndimage.label((lines & ~pruned) | stumps, np.ones((3, 3)))
     places = [_tip(np.argwhere(pieces == pieces[tuple(stump)]), stump, width / 2) for stump in np.argwhere(stumps)]
-    found = np.array(sorted(places), dtype=np.intp).reshape(-1, 2) - beyond
-    counts = (found >= MARGIN) & (found < np.array(pixels.shape) - MARGIN)
-    return np.asarray(found[counts.all(axis=1)])
+    sites = np.array(sorted(places), dtype=np.intp).reshape(-1, 2) - beyond
+    counts = (sites >= MARGIN) & (sites < np.array(pixels.shape) - MARGIN)
+    return np.asarray(sites[counts.all(axis=1)])
 
 
 def _filled(figure: Mask) -> Mask:
@@ -287,20 +287,20 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
         raise ValueError(f"side is {side}: give 1 to {least}, a side of the images")
     values = np.unique(image)
 
-    def hashed(one: Array) -> NDArray[np.uint64]:
-        return hashes(position(one, values)[..., np.newaxis], side)
+    def hashed(layer: Array) -> NDArray[np.uint64]:
+        return hashes(position(layer, values)[..., np.newaxis], side)
 
     layers = image.reshape(-1, *image.shape[-2:])
-    found = np.stack([hashed(one) for one in layers])
-    known, first = np.unique(found, return_index=True)
-    pixel = np.append(np.ravel_multi_index(np.unravel_index(first, found.shape), layers.shape), ABSENT)  # for -1
+    codes = np.stack([hashed(layer) for layer in layers])
+    known, first = np.unique(codes, return_index=True)
+    pixel = np.append(np.ravel_multi_index(np.unravel_index(first, codes.shape), layers.shape), ABSENT)  # for -1
     middle = tuple(slice(side // 2, n - (side - 1) // 2) for n in array.shape[-2:])
 
-    def placed(one: Array) -> NDArray[np.int32]:
-        plain = (minimum_filter(one, side) == maximum_filter(one, side))[middle]
-        return np.where(plain, np.int32(PLAIN), pixel[position(hashed(one), known)].astype(np.int32))
+    def placed(field: Array) -> NDArray[np.int32]:
+        plain = (minimum_filter(field, side) == maximum_filter(field, side))[middle]
+        return np.where(plain, np.int32(PLAIN), pixel[position(hashed(field), known)].astype(np.int32))
 
-    places = np.stack([placed(one) for one in array.reshape(-1, *array.shape[-2:])])
+    places = np.stack([placed(field) for field in array.reshape(-1, *array.shape[-2:])])
     return places.reshape(*array.shape[:-2], *places.shape[1:])
 
 
@@ -313,8 +313,8 @@ def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
         The result of `copies`. Windows with a single value are left out.
     """
     places = places.reshape(len(places), -1)
-    counted, found = (places != PLAIN).sum(1), (places >= 0).sum(1)
-    return np.where(counted > 0, found / np.maximum(counted, 1), np.nan)
+    counted, held = (places != PLAIN).sum(1), (places >= 0).sum(1)
+    return np.where(counted > 0, held / np.maximum(counted, 1), np.nan)
 
 
 Floats = NDArray[np.float64]
@@ -418,14 +418,14 @@ def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: in
         raise ValueError(f"there are {len(present)} different patterns: give smaller or fewer images")
     rows = [np.bincount(np.searchsorted(present, codes), minlength=len(present)) / len(codes) for codes in coded]
     histograms = np.stack(rows)
-    found = np.zeros((len(rows), len(rows)))
+    apart = np.zeros((len(rows), len(rows)))
     step = max(1, BLOCK // len(present))
-    for one in range(len(rows)):
-        for start in range(one + 1, len(rows), step):
+    for row in range(len(rows)):
+        for start in range(row + 1, len(rows), step):
             block = histograms[start : start + step]
-            found[one, start : start + step] = jensenshannon(histograms[one][np.newaxis], block, base=2, axis=1)
-    found = np.nan_to_num(found)  # rounding may leave the root of a negative number between equal ones
-    return found + found.T
+            apart[row, start : start + step] = jensenshannon(histograms[row][np.newaxis], block, base=2, axis=1)
+    apart = np.nan_to_num(apart)  # rounding may leave the root of a negative number between equal ones
+    return apart + apart.T
 
 
 def _patterns(image: NDArray[np.intp], count: int, side: int, spread: int) -> NDArray[np.int64]:
@@ -440,8 +440,8 @@ def _patterns(image: NDArray[np.intp], count: int, side: int, spread: int) -> ND
 
 def _means(distances: Floats) -> tuple[float, float]:
     """Return the mean distance between realisations, and of them from the training image."""
-    number = len(distances) - 1
-    pairs = distances[np.triu_indices(number, 1)] if number > 1 else np.array([np.nan])
+    last = len(distances) - 1
+    pairs = distances[np.triu_indices(last, 1)] if last > 1 else np.array([np.nan])
     return float(pairs.mean()), float(distances[-1, :-1].mean())
 
 
@@ -539,15 +539,15 @@ def summary(
     at_data = array[:, points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)]
     if len(known):
         left_open = np.asarray(entropy([(array == k).mean(axis=0) for k in known], base=2, axis=0))
-        fields = [[one == k for one in images] for k in (known[-1:] if len(known) == 2 else known)]
+        fields = [[field == k for field in images] for k in (known[-1:] if len(known) == 2 else known)]
         misses = (at_data != points[:, 2]).sum(axis=1).astype(np.float64)
     else:
         left_open = array.std(axis=0, ddof=int(number > 1), dtype=np.float64)
         fields = [images]
         misses = np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(number)
-    variograms = np.array([[[variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
-    found = [[connectivity(one, k, lag) for one in images] for k in known]
-    functions = np.array([one.function for row in found for one in row]).reshape(len(known), number + 1, 2, lag + 1)
+    variograms = np.array([[[variogram(field, axis, lag) for field in row] for row in fields] for axis in (0, 1)])
+    bodies = [[connectivity(field, k, lag) for field in images] for k in known]
+    functions = np.array([body.function for row in bodies for body in row]).reshape(len(known), number + 1, 2, lag + 1)
 
     def table(figure: Callable[[int, int], float]) -> Floats:
         return np.array([[figure(k, n) for n in range(number + 1)] for k in range(len(known))]).reshape(-1, number + 1)
@@ -559,8 +559,8 @@ def summary(
         open=left_open,
         variograms=np.repeat(variograms, 2, axis=1) if len(known) == 2 else variograms,  # of two they are the same
         connectivity=np.moveaxis(functions, 2, 0),
-        components=table(lambda k, n: found[k][n].components),
-        largest=table(lambda k, n: found[k][n].largest),
+        components=table(lambda k, n: bodies[k][n].components),
+        largest=table(lambda k, n: bodies[k][n].largest),
         dead_ends=table(lambda k, n: _ends_per_area(images[n], known[k])),
         anodi=anodi(array, image, categories=known.tolist()),
         copied=copied(copies(array, image)) if shortest >= WINDOW else np.full(number, nan),

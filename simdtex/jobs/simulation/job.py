@@ -193,13 +193,13 @@ def plan_simulation(
     true_or_false("source", source)
     if jobs is not None:
         whole("jobs", jobs, 1)
-    pictures, size, given = cells.training, cells.size, cells.given
-    inputs = check_inputs(pictures, size, cells.channel_axis, None, given["known"], None, given["guide"], cells.put)
+    pictures, size, arrays = cells.training, cells.size, cells.given
+    inputs = check_inputs(pictures, size, cells.channel_axis, None, arrays["known"], None, arrays["guide"], cells.put)
     missing: Any = None
-    if given["region"] is not None:
-        inputs, missing = maps.check_region(given["region"], size, inputs), maps.missing_value(pictures.pixels)
+    if arrays["region"] is not None:
+        inputs, missing = maps.check_region(arrays["region"], size, inputs), maps.missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
-    copies, training, guide = maps.copies_of(given, pictures, size), pictures, inputs.guide
+    copies, training, guide = maps.copies_of(arrays, pictures, size), pictures, inputs.guide
     if copies:
         if chosen.shares:
             raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
@@ -208,7 +208,7 @@ def plan_simulation(
     kinds = chosen.of(training)
     cells.check_several(kinds)
     categories = kinds.categories(0)
-    probabilities = maps.of_categories(given["probabilities"], categories, size, cells.put)
+    probabilities = maps.of_categories(arrays["probabilities"], categories, size, cells.put)
     soft = Soft(probabilities, copies.probability if copies else None)
     told = chosen.proportions or guide or probabilities is not None
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
@@ -222,7 +222,7 @@ def plan_simulation(
         shas["mask"] = digest(*pictures.usable)
     parts = (training, inputs.given, guide, soft, copies, source, chosen)
     axis = None if cells.channel_axis is None else -1
-    of_maps = maps.digests_of_maps(given)
+    of_maps = maps.digests_of_maps(arrays)
     return Simulation(of_maps, n, first, size, *parts, cells._replace(given={}), shas, missing, jobs, axis)
 
 
@@ -269,7 +269,7 @@ class Simulation:
     ) -> tuple[NDArray[Any], Output]:
         """Make all realisations, and return them; the source of the output is that of all."""
         batch = Batch(self, seed, callback, checkpointing)
-        left = [number for number in range(self.n) if number not in batch.finished]
+        left = [n for n in range(self.n) if n not in batch.finished]
         usual = 1 if machine.kind == "gpu" else min(MOST_TOGETHER, os.cpu_count() or 1)
         together = min(self.jobs or usual, self.n)
         # each has a queue, but a profile is of a single machine
@@ -300,7 +300,7 @@ class Simulation:
         asked = np.array(self.options.proportions or p[:, there].sum(1))
         reached = np.array([(made == category).sum() for category in categories])
         both = {"shares_asked": asked, "shares_reached": reached}
-        return {name: " ".join(f"{one:.3f}" for one in those / those.sum()) for name, those in both.items()}
+        return {name: " ".join(f"{share:.3f}" for share in those / those.sum()) for name, those in both.items()}
 
     def result(self, values: NDArray[Any], output: Output) -> Any:
         """Return the array or dataset of xarray."""
@@ -310,11 +310,11 @@ class Simulation:
         dims, numbers = [*lattice, "variable"][: values.ndim], range(self.first, self.first + self.n)
         along, sides = grid_axes(self.shape, self.cells.place)
         seed, device, shares = (output.statistics[name] for name in ("seed", "device", "shares"))
-        seeds = np.array([realisation_seed(seed, number) for number in numbers], np.uint64)
+        seeds = np.array([realisation_seed(seed, n) for n in numbers], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
         attributes = {"seed": seed, "version": version("simdtex"), "device": device}
         attributes["options"] = json.dumps(
-            vars(self.options), default=lambda one: one.tolist() if isinstance(one, np.generic) else str(one)
+            vars(self.options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
         )
         attributes |= self.digests | self.maps
         if self.outside is not None:
@@ -322,12 +322,12 @@ class Simulation:
             attributes |= {} if values.dtype.kind == "f" else {"missing": self.missing.item()}
         attributes |= shares | sides | self.cells.about
         made = Realisations(values, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
-        found = georeferenced(made, self.cells.place)
+        placed = georeferenced(made, self.cells.place)
         if not self.source:
-            return found
+            return placed
         assert output.source is not None
         places = {f"source_{name}": (lattice, output.source[..., k]) for k, name in enumerate(self.sources)}
-        return Results({"simulation": found, **places}, attrs=found.attrs)
+        return Results({"simulation": placed, **places}, attrs=placed.attrs)
 
 
 class Batch:
@@ -356,10 +356,10 @@ class Batch:
 
     def make(self, number: int) -> None:
         """Make a realisation on a free machine."""
-        job, own, machine = self.job, Checkpointing(None, self._offer), self.free.get()
+        job, nested, machine = self.job, Checkpointing(None, self._offer), self.free.get()
         told, seed = self.callback and partial(self._tell, number), realisation_seed(self.seed, job.first + number)
         try:
-            picture, output = drive(self.plan, machine, seed, told, own)
+            picture, output = drive(self.plan, machine, seed, told, nested)
         finally:
             self.free.put(machine)
         if job.outside is not None:

@@ -127,11 +127,11 @@ def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
         raise ValueError("region is False everywhere; set it True where cells are to be simulated")
     pixels = inputs.pictures.pixels[0]
     sides = (*shape, pixels.shape[-1])
-    given = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
-    if (given.known & ~inside[..., None]).any():
-        at = np.argwhere(given.known.any(-1) & ~inside)[0]
+    data = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
+    if (data.known & ~inside[..., None]).any():
+        at = np.argwhere(data.known.any(-1) & ~inside)[0]
         raise ValueError(f"known has a value at {_cell(at)}, outside region; leave it out, or widen region")
-    return inputs._replace(given=replace(given, known=given.known | ~inside[..., None], outside=~inside))
+    return inputs._replace(given=replace(data, known=data.known | ~inside[..., None], outside=~inside))
 
 
 def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
@@ -193,8 +193,8 @@ def plan_cells(
     require("simulate", "xarray")
     from simdtex.figures.show import described
 
-    training, given = ascending(training), {name: ascending(one) for name, one in given.items()}
-    place = located({named(name): one for name, one in given.items()}, training, origin, cell)
+    training, given = ascending(training), {name: ascending(value) for name, value in given.items()}
+    place = located({named(name): value for name, value in given.items()}, training, origin, cell)
     if place:
         origin, cell = place.frame
     first = training[0] if isinstance(training, (list, tuple)) and training else training
@@ -236,35 +236,35 @@ def _size(shape: Any, given: dict[str, Any], place: Location | None, axes: int, 
 def grid_axes(size: tuple[int, ...], place: Location | None) -> tuple[dict[str, Any], dict[str, float]]:
     """Return the coordinates of cells and the sizes of a cell as attributes; without a place, columns and rows."""
     at, sides = place.frame if place else ((), ())
-    found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
+    coords: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
     for axis, first, side in zip("xyz", at, sides, strict=False):
-        values, about = first + side * found.get(axis, 0), place.about.get(axis, {}) if place else {}
-        found[axis] = ((axis,) if axis in found else (), values, about)
-    return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
+        values, about = first + side * coords.get(axis, 0), place.about.get(axis, {}) if place else {}
+        coords[axis] = ((axis,) if axis in coords else (), values, about)
+    return coords, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
 
 
 def georeferenced(made: Any, place: Location | None) -> Any:
     """Return an array or dataset of xarray with its coordinate reference system and its units, if known, as in CF."""
     if place is None or not place.crs:
         return made
-    found = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
+    placed = made.assign_coords(spatial_ref=((), 0, {"crs_wkt": place.crs})).assign_attrs(crs=place.crs)
     with suppress(ImportError, ValueError):  # the extra rasters; a text that names no system
         from rasterio.crs import CRS
 
         system = CRS.from_user_input(place.crs)
         unit = {"metre": "m"}.get(system.units_factor[0], system.units_factor[0])
         for axis, degrees in (("x", "longitude degrees_east"), ("y", "latitude degrees_north")):
-            if axis in found.coords:
+            if axis in placed.coords:
                 named = degrees.split() if system.is_geographic else (f"projection_{axis}_coordinate", unit)
-                found[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | found[axis].attrs
-    for field in found.data_vars.values() if hasattr(found, "data_vars") else [found]:
+                placed[axis].attrs = dict(zip(("standard_name", "units"), named, strict=True)) | placed[axis].attrs
+    for field in placed.data_vars.values() if hasattr(placed, "data_vars") else [placed]:
         field.attrs["grid_mapping"] = "spatial_ref"  # in the encoding, xarray reads it as a variable of data
-    return found
+    return placed
 
 
-def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
+def digests(pictures: Pictures, data: Given | None) -> dict[str, str]:
     """Return the digests of hard data and of the training images, with their unknown pixels completed."""
-    found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
-    if given and given.given_mask.any():
-        found["hard_data"] = digest(np.where(given.given_mask, given.values, 0), given.given_mask)
-    return found
+    hashes = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
+    if data and data.given_mask.any():
+        hashes["hard_data"] = digest(np.where(data.given_mask, data.values, 0), data.given_mask)
+    return hashes

@@ -102,40 +102,40 @@ def write_ensemble(
     write_report(folder, "An ensemble of realisations", lead, sections, results, command)
 
 
-def _kept(found: Summary) -> str:
+def _kept(figures: Summary) -> str:
     """Return a sentence on whether the hard data are kept."""
-    number, realisations = len(found.data), len(found.misses)
+    number, realisations = len(figures.data), len(figures.misses)
     data = "hard datum" if number == 1 else f"{number} hard data"
     if number == 0:
         return "There are no hard data."
-    if not found.misses.any():
+    if not figures.misses.any():
         return f"Every realisation keeps the {data}."
-    if len(found.categories) == 0:
-        return f"Not every realisation keeps the {data}: the largest RMS error is {found.misses.max():.3g}."
-    share, bad = found.misses.sum() / (number * realisations), np.count_nonzero(found.misses)
+    if len(figures.categories) == 0:
+        return f"Not every realisation keeps the {data}: the largest RMS error is {figures.misses.max():.3g}."
+    share, bad = figures.misses.sum() / (number * realisations), np.count_nonzero(figures.misses)
     return f"Of the {data}, {share:.1%} are missed on average, in {bad} of the {realisations} realisations."
 
 
-def _drawn(found: Summary) -> list[int]:
+def _drawn(figures: Summary) -> list[int]:
     """Return the numbers of the categories that are drawn: all, or those of the largest shares."""
-    return sorted(np.argsort(-found.shares[:, -1], kind="stable")[:MOST_PANELS].tolist())
+    return sorted(np.argsort(-figures.shares[:, -1], kind="stable")[:MOST_PANELS].tolist())
 
 
-def _mapped(found: Summary) -> list[int]:
+def _mapped(figures: Summary) -> list[int]:
     """Return the categories that have a map; of two, the second is enough."""
-    return [1] if len(found.categories) == 2 else _drawn(found)
+    return [1] if len(figures.categories) == 2 else _drawn(figures)
 
 
-def _realisations(images: Array, own: Array, found: Summary) -> Figure:
+def _realisations(images: Array, own: Array, figures: Summary) -> Figure:
     """Return the training image and some realisations, in one scale."""
     number = min(SHOWN, len(images))
-    limits, palette = (float(own.min()), float(own.max())), category_colours(len(found.categories))
+    limits, palette = (float(own.min()), float(own.max())), category_colours(len(figures.categories))
     shown = []
     for label, image in [("the training image", own), *((f"realisation {i}", images[i]) for i in range(number))]:
-        if len(found.categories) == 0:
+        if len(figures.categories) == 0:
             picture = to_display(image.astype(np.float64), limits)
         else:
-            picture = palette[(image[..., np.newaxis] == found.categories).argmax(axis=-1)]
+            picture = palette[(image[..., np.newaxis] == figures.categories).argmax(axis=-1)]
         shown.append((label, picture))
     return Figure(
         "realisations.png",
@@ -229,35 +229,35 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
         hits = data[data[:, -1] == name, :-1]
         wells = [(f"x {x:g}, y {y:g}", hits[(hits[:, :2] == (x, y)).all(1)]) for x, y in np.unique(hits[:, :2], axis=0)]
         for well, at in [(f"all {len(wells)}", hits), *wells[:SHOWN]] if wells else []:
-            one = uncertainty.connected_volume(made, name, at)
-            drawn.setdefault(str(name), one)
-            cuts = map(number_text, one.quantile(QUANTILES).values)
+            curve = uncertainty.connected_volume(made, name, at)
+            drawn.setdefault(str(name), curve)
+            cuts = map(number_text, curve.quantile(QUANTILES).values)
             rows.append({"Category": str(name), "Well": well} | dict(zip(("P10", "P50", "P90"), cuts, strict=True)))
     if drawn:
         figure = new_figure(1 + 3.4 * len(drawn), 3)
-        for axes, one in zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.values(), strict=True):
-            one.plot.hist(ax=axes, color=THEIRS)
+        for axes, curve in zip(figure.subplots(1, len(drawn), squeeze=False)[0], drawn.values(), strict=True):
+            curve.plot.hist(ax=axes, color=THEIRS)
             tidy(axes, "", axes.get_xlabel(), "realisations")
-            for cut in one.quantile(QUANTILES).values:
+            for cut in curve.quantile(QUANTILES).values:
                 axes.axvline(cut, color=OWN, linestyle="--")
         caption = "Volumes (areas of a map) of all bodies that a well meets. The dashed lines are P10, P50 and P90."
         note = (
             "Cells are connected by their sides. A tenth of the realisations are below P10, which is P90 of reserves."
         )
-        table = Table(f"Connected volumes, {one.attrs.get('units', '')}".rstrip(", "), rows, note)
+        table = Table(f"Connected volumes, {curve.attrs.get('units', '')}".rstrip(", "), rows, note)
         parts: list[Part] = [Figure("volumes.png", figure, caption), table]
         sections.append(Section("Volumes connected to wells", parts))
     if (n := len(made)) > 1:
         curves: list[Any] = [uncertainty.standard_error(made, name) for name in names or [None]]
         figure = new_figure(5.6, 3)
         axes = figure.subplots()
-        for name, one in zip(names or [None], curves, strict=True):
-            one.plot.line(ax=axes, marker=".", label=name)
+        for name, curve in zip(names or [None], curves, strict=True):
+            curve.plot.line(ax=axes, marker=".", label=name)
         tidy(axes, "", axes.get_xlabel(), axes.get_ylabel())
         axes.set_ylim(0)
         if len(curves) > 1:
             axes.legend(title="category", frameon=False)
-        most = max(float(one[-1]) for one in curves)
+        most = max(float(curve[-1]) for curve in curves)
         after = f"{most:.2g} after {n} realisations, half of it after {4 * n}"
         caption = f"Standard error of the map, over all cells: {after}."
         sections.append(Section("How many realisations", [Figure("error.png", figure, caption)]))
@@ -266,15 +266,15 @@ def _measured(made: DataArray, names: list[Any], data: Floats) -> list[Section]:
 
 def _vertical(made: DataArray, training: Array, names: Array) -> Section:
     """Return the shares of categories layer by layer, of the realisations and of the training image."""
-    both: list[Any] = [uncertainty.vertical_proportions(one, names.tolist()) for one in (made, training)]
+    both: list[Any] = [uncertainty.vertical_proportions(data, names.tolist()) for data in (made, training)]
     theirs, own = both
     own = own.assign_coords(z=np.linspace(float(made["z"][0]), float(made["z"][-1]), len(training)))
     shown = np.sort(np.argsort(-own.values.mean(1), kind="stable")[:MOST_PANELS])
     figure = new_figure(1 + 2.4 * len(shown), 3.6)
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for k, axes in zip(shown, panels, strict=True):
-        for one in theirs[k]:
-            one.plot.line(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
+        for line in theirs[k]:
+            line.plot.line(y="z", ax=axes, color=THEIRS, alpha=0.4, label="realisations")
         own[k].plot.line(y="z", ax=axes, color=OWN, linestyle="--", label="training image")
         axes.set_title("")
         tidy(axes, f"category {names[k]}", "share of the layer", axes.get_ylabel() if axes is panels[0] else "")
@@ -371,9 +371,9 @@ def _spread(values: Floats) -> str:
 
 def _distances(found: Summary) -> list[Part]:
     """Return the analysis of distance."""
-    one = found.anodi
-    scales = {"all, weighted": (one.variety, one.likeness)}
-    scales |= {f"{1 << level}": (variety, likeness) for level, (variety, likeness) in enumerate(one.by_level)}
+    anodi = found.anodi
+    scales = {"all, weighted": (anodi.variety, anodi.likeness)}
+    scales |= {f"{1 << level}": (variety, likeness) for level, (variety, likeness) in enumerate(anodi.by_level)}
     rows = [
         {
             "Pixels apart": scale,
@@ -414,7 +414,7 @@ def _copies(images: Array, own: Array, found: Summary) -> list[Part]:
         words,
         Figure(
             "copies.png",
-            contact_sheet([(label, source_colours(one, own.shape)) for label, one in shown], columns=2),
+            contact_sheet([(label, source_colours(index_map, own.shape)) for label, index_map in shown], columns=2),
             "The index map: a colour for each place in the training image, and the pixels of the first realisation "
             "that lie in a copied window, in the colours of where it is first found. Black ones lie in none.",
         ),
@@ -453,7 +453,7 @@ def write_volumes(
     made = uncertainty.named(ensemble, "realisation", *AXES)
     names = np.unique(training) if categorical else np.zeros(0, training.dtype)
     images, drawn = [*made.values, training], names[-1] if categorical else None
-    fields = [(one == drawn if categorical else one).astype(np.float64) for one in images]
+    fields = [(image == drawn if categorical else image).astype(np.float64) for image in images]
     what = f"category {drawn}" if categorical else "the values"
     limits = (float(fields[-1].min()), float(fields[-1].max()))
     along = {axis: axis_place(made, axis)[1] * np.arange(n) for axis, n in zip(AXES, training.shape, strict=True)}
@@ -462,15 +462,15 @@ def write_volumes(
     middle = [uncertainty.probability(made, names[-1])] if categorical else [uncertainty.e_type(made), *cuts]
     shown = [
         ("training image", own),
-        *((f"{one.attrs['long_name']}{cut}", one) for one, cut in zip(middle, CUTS, strict=False)),
+        *((f"{field.attrs['long_name']}{cut}", field) for field, cut in zip(middle, CUTS, strict=False)),
     ]
     shown += [(f"realisation {k}", made[k].copy(data=fields[k])) for k in range(min(SLICED, len(made)))]
     panels: dict[str, Any] = {}
-    for name, one in shown:
+    for name, field in shown:
         for axis in AXES:
-            at = one[axis][one.sizes[axis] // 2]
+            at = field[axis][field.sizes[axis] // 2]
             title = f"{name}, {axis} = {float(at):g} {at.attrs.get('units', '')}".rstrip()
-            panels[title] = one.isel({axis: one.sizes[axis] // 2}), None
+            panels[title] = field.isel({axis: field.sizes[axis] // 2}), None
     lags = np.arange(max(1, min(*training.shape, *made.shape[1:]) // 3) + 1)
 
     def lagged(label: str, functions: list[Any]) -> Figure:
@@ -479,7 +479,7 @@ def write_volumes(
         caption = f"{of}. The training image's line should run inside the band."
         return Figure(f"{label}.png", _lagged(lags, table, [""], label, made), caption)
 
-    variograms = [np.array([variogram(one, axis, len(lags) - 1) for axis in range(3)]) for one in fields]
+    variograms = [np.array([variogram(field, axis, len(lags) - 1) for axis in range(3)]) for field in fields]
     slices = Figure(
         "slices.png",
         _maps(panels, np.empty((0, 2)), "viridis", limits, 3),
@@ -492,13 +492,13 @@ def write_volumes(
     results: dict[str, Any] = {"shape": made.shape, "training_shape": training.shape}
     results["variograms"] = [variograms[-1], *variograms[:-1]]
     if categorical:
-        found = [[connectivity(one, name, len(lags) - 1) for one in images] for name in names]
+        bodies = [[connectivity(image, name, len(lags) - 1) for image in images] for name in names]
         figures = {
-            "Share": np.array([[(one == name).mean() for one in images] for name in names]),
-            "Components in 10,000 voxels": np.array([[one.components for one in row] for row in found]),
-            "Share of the largest": np.array([[one.largest for one in row] for row in found]),
+            "Share": np.array([[(image == name).mean() for image in images] for name in names]),
+            "Components in 10,000 voxels": np.array([[body.components for body in row] for row in bodies]),
+            "Share of the largest": np.array([[body.largest for body in row] for row in bodies]),
         }
-        functions = [one.function for one in found[-1]]
+        functions = [body.function for body in bodies[-1]]
         table = _figures(names, figures, " Voxels are connected by their faces.")
         sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table]))
         results |= {"connectivity": [functions[-1], *functions[:-1]], "categories": names}

@@ -29,20 +29,20 @@ Array = NDArray[Any]
 
 def probability(realisations: DataArray, category: float) -> DataArray:
     """Return the share of the realisations in which each cell has a category, 0 to 1."""
-    found, what = _field(realisations, category).mean("realisation"), label(realisations, "category")
-    return _described(found, realisations, "probability", f"probability of {what} {category}", "")
+    field, what = _field(realisations, category).mean("realisation"), label(realisations, "category")
+    return _described(field, realisations, "probability", f"probability of {what} {category}", "")
 
 
 def e_type(realisations: DataArray) -> DataArray:
     """Return the mean of the realisations at each cell: the E-type estimate of a continuous variable."""
-    found = _field(realisations).mean("realisation")
-    return _described(found, realisations, "e_type", f"E-type of {label(realisations)}")
+    field = _field(realisations).mean("realisation")
+    return _described(field, realisations, "e_type", f"E-type of {label(realisations)}")
 
 
 def quantiles(realisations: DataArray, q: ArrayLike = (0.1, 0.5, 0.9)) -> DataArray:
     """Return quantiles of a continuous variable at each cell, with the dimension ``quantile`` (`numpy.quantile`)."""
-    found = _field(realisations).quantile(q, "realisation")
-    return _described(found, realisations, "quantiles", f"quantile of {label(realisations)}")
+    field = _field(realisations).quantile(q, "realisation")
+    return _described(field, realisations, "quantiles", f"quantile of {label(realisations)}")
 
 
 def connected_volume(realisations: DataArray, category: float, well: ArrayLike) -> DataArray:
@@ -75,8 +75,8 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     table = HardData(wells, np.ones((len(wells), 1)), ("well",))
     hit = ~np.ma.getmaskarray(place_hard_data(table, sizes, origin=origin, cell=cell))
 
-    def cells(one: Array) -> int:
-        labels, _ = ndimage.label(one == 1)
+    def cells(image: Array) -> int:
+        labels, _ = ndimage.label(image == 1)
         bodies = np.unique(labels[np.broadcast_to(hit, labels.shape)])
         return int(np.isin(labels, bodies[bodies > 0]).sum())
 
@@ -84,10 +84,10 @@ def connected_volume(realisations: DataArray, category: float, well: ArrayLike) 
     units = [realisations[axis].attrs.get("units", "") for axis in axes]
     unit = units[0] + " \u00b2\u00b3"[len(axes) - 1] if units[0] and len({*units}) == 1 else " ".join(units).strip()
     what = f"{'volume' if len(axes) > 2 else 'area'} of {label(realisations, 'category')} {category} at the well"
-    counts = np.array([cells(one) for one in field.values])
+    counts = np.array([cells(image) for image in field.values])
     volume = counts * prod(axis_place(realisations, axis)[1] for axis in axes)
-    found = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
-    return _described(found, realisations, "connected_volume", what, unit)
+    volumes = field.isel(dict.fromkeys(axes, 0), drop=True).copy(data=volume)
+    return _described(volumes, realisations, "connected_volume", what, unit)
 
 
 def vertical_proportions(data: DataArray | ArrayLike, categories: Sequence[int] | None = None) -> DataArray:
@@ -112,14 +112,14 @@ def standard_error(realisations: DataArray, category: float | None = None) -> Da
     field = _field(realisations, category).transpose("realisation", ...)
     total = squares = np.zeros(field.shape[1:])
     errors = []
-    for n, one in enumerate(field.values - field.values[0], 1):
-        total, squares = total + one, squares + one**2
+    for n, image in enumerate(field.values - field.values[0], 1):
+        total, squares = total + image, squares + image**2
         if n > 1:
             errors.append(sqrt(max(0.0, np.nanmean(squares - total**2 / n)) / (n * (n - 1))))
-    number = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
-    found = named(errors, "realisations", coords={"realisations": number})
+    counts = ("realisations", np.arange(2, len(field) + 1), {"long_name": "number of realisations"})
+    curve = named(errors, "realisations", coords={"realisations": counts})
     unit = None if category is None else ""
-    return _described(found, realisations, "standard_error", "standard error of the map", unit)
+    return _described(curve, realisations, "standard_error", "standard error of the map", unit)
 
 
 def named(data: Any, *dims: str, **about: Any) -> DataArray:
@@ -127,8 +127,8 @@ def named(data: Any, *dims: str, **about: Any) -> DataArray:
     require("simulate", "xarray")
     import xarray
 
-    found: DataArray = data if isinstance(data, xarray.DataArray) else xarray.DataArray(data, dims=dims, **about)
-    return found
+    array: DataArray = data if isinstance(data, xarray.DataArray) else xarray.DataArray(data, dims=dims, **about)
+    return array
 
 
 def _known(data: DataArray) -> DataArray:
@@ -143,8 +143,8 @@ def _field(data: DataArray, category: Any = None, of: str = "realisation") -> Da
         raise TypeError(f"give an xarray.DataArray with the dimension {of}, as simdtex.simulate returns")
     if category is None and json.loads(data.attrs.get("options", "{}")).get("categorical") is True:
         raise ValueError("the realisations are of categories, which have no mean; use probability, or name a category")
-    found: DataArray = (data if category is None else category == data).astype(float).where(_known(data))
-    return found
+    field: DataArray = (data if category is None else category == data).astype(float).where(_known(data))
+    return field
 
 
 def label(data: DataArray, unnamed: str = "the values") -> str:
@@ -152,12 +152,12 @@ def label(data: DataArray, unnamed: str = "the values") -> str:
     return str(data.attrs.get("long_name") or (unnamed if data.name in (None, "simulation") else data.name))
 
 
-def _described(found: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
+def _described(field: DataArray, data: DataArray, name: str, long_name: str, units: str | None = None) -> DataArray:
     """Return a result with a name, and with the attributes of its data but ``long_name`` and ``units``."""
-    alone = {key: one.item() for key, one in found.coords.items() if one.ndim == 0 and key not in found.dims}
+    alone = {key: coord.item() for key, coord in field.coords.items() if coord.ndim == 0 and key not in field.dims}
     units = data.attrs.get("units", "") if units is None else units
-    found = found.reset_coords([*alone], drop=True).rename(name)
-    found.attrs = {**data.attrs, **alone, "long_name": long_name, "units": units}
-    for unused in {"missing", "spatial_ref", *([] if units else ["units"])} & {*found.attrs}:
-        del found.attrs[unused]
-    return found
+    field = field.reset_coords([*alone], drop=True).rename(name)
+    field.attrs = {**data.attrs, **alone, "long_name": long_name, "units": units}
+    for unused in {"missing", "spatial_ref", *([] if units else ["units"])} & {*field.attrs}:
+        del field.attrs[unused]
+    return field

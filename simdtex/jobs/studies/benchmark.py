@@ -85,8 +85,8 @@ def chosen(device: str | None = None) -> list[DeviceInfo]:
         if info.kind == "reference":
             raise DeviceError("the reference is measured with every device; give an OpenCL device, or none for all")
         return [info]
-    found = [info for info in devices() if info.usable and info.kind != "reference" and not info.simulated]
-    return found or [find(None)]
+    usable = [info for info in devices() if info.usable and info.kind != "reference" and not info.simulated]
+    return usable or [find(None)]
 
 
 def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     for case in sizes.reference:
         tell(f"the NumPy reference: {case.name}")
         plain[case], _ = once(Reference(), case)
-    found = []
+    measured = []
     for info in infos:
         machine = OpenCL(info, profile=True)
         cases = []
@@ -123,7 +123,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
             ratio = plain[case] / seconds if case in plain else None
             cases.append({"name": case.name, "seconds": seconds, "busy": busy, "reference": ratio})
         about = {name: getattr(info, name) for name in ("kind", "version", "driver", "compute_units", "memory")}
-        found.append({"device": about | {"name": machine.name}, "cases": cases})
+        measured.append({"device": about | {"name": machine.name}, "cases": cases})
     return {
         "simdtex": simdtex.__version__,
         "date": date,
@@ -135,7 +135,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
             "python": platform.python_version(),
             "numpy": np.__version__,
         },
-        "devices": found,
+        "devices": measured,
     }
 
 
@@ -155,11 +155,11 @@ def once(machine: Machine, case: Case) -> tuple[float, float]:
 
     gravel: Any = data.gravel
     sample = np.ascontiguousarray(gravel()[: case.sample, : case.sample])
-    given: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
+    options: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
     began = perf_counter()
     if case.method == "solid":
-        _, output = simdtex.synthesize_solid(sample, (case.output,) * 3, **given)
+        _, output = simdtex.synthesize_solid(sample, (case.output,) * 3, **options)
     else:
-        given |= {"method": case.method, **({"order": case.order, "search": case.search} if case.order else {})}
-        _, output = simdtex.synthesize(sample, (case.output, case.output), **given)
+        options |= {"method": case.method, **({"order": case.order, "search": case.search} if case.order else {})}
+        _, output = simdtex.synthesize(sample, (case.output, case.output), **options)
     return perf_counter() - began, output.statistics["device_seconds"] or 0.0

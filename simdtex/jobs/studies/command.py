@@ -76,32 +76,32 @@ def schedules(
     whole("--seeds", seeds, 1)
     pixels, channel_axis = _sample(sample)
     began = time.perf_counter()
-    own = {"seeds": range(seed, seed + seeds), "channel_axis": channel_axis, **given(options)}
+    common = {"seeds": range(seed, seed + seeds), "channel_axis": channel_axis, **given(options)}
     if dry_run:
 
         def spin(callback: Any, device: str | None, **_: Any) -> None:
             of_schedules(chosen, device, seed, callback)
 
         def run(schedule: Schedule, callback: Any, **_: Any) -> None:
-            compare(pixels, shape, [schedule], callback=callback, **own)
+            compare(pixels, shape, [schedule], callback=callback, **common)
 
         told = expected(options["device"], *[spin] * ising, *(partial(run, one) for one in chosen))
         click.echo(f"{output}: {len(chosen)} schedules, {seeds} seeds, {told}; nothing was written")
         return
     with watching(quiet) as callback:
-        found = compare(pixels, shape, chosen, callback=callback, **own)
+        comparison = compare(pixels, shape, chosen, callback=callback, **common)
         spins = of_schedules(chosen, options["device"], seed, callback) if ising else None
     with afterwards():
-        write_comparison(output, found, command_line(), spins)
+        write_comparison(output, comparison, command_line(), spins)
     if quiet:
         return
-    for table in comparison_tables(found) + (ising_tables(spins.findings) if spins else []):
+    for table in comparison_tables(comparison) + (ising_tables(spins.findings) if spins else []):
         print_table(table)
     for sentence in conclusion(spins.findings) if spins else []:
         click.echo(sentence)
     click.echo(
         f"{output / 'index.html'}: {len(chosen)} schedules, {seeds} {'seed' if seeds == 1 else 'seeds'}, "
-        f"{time.perf_counter() - began:.0f} s on {found.device}"
+        f"{time.perf_counter() - began:.0f} s on {comparison.device}"
     )
 
 
@@ -149,11 +149,11 @@ def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> No
         if not quiet:
             click.echo(what, err=True)
 
-    found = benchmark.run(benchmark.QUICK if quick else benchmark.FULL, infos, tell)
+    times = benchmark.run(benchmark.QUICK if quick else benchmark.FULL, infos, tell)
     if path:
         with afterwards(), atomic_path(path) as whole:
-            whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+            whole.write_text(json.dumps(times, indent=1) + "\n", encoding="utf-8")
     if not quiet:
-        print_benchmark(found)
+        print_benchmark(times)
         if path:
             click.echo(path)

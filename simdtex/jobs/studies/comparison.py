@@ -179,24 +179,24 @@ def _figures(statistics: dict[str, Any], sweeps: Sequence[SweepRecord]) -> dict[
     """Return the figures of a run, except those of its output and its wall time."""
     levels = statistics["levels"]
     finest = next(level for level in levels if level["level"] == 0)
-    found: dict[str, float | None] = {"device_seconds": statistics["device_seconds"]}
+    figures: dict[str, float | None] = {"device_seconds": statistics["device_seconds"]}
     for what, name, per in (
         ("steps", "steps", 1),
         ("sweeps", "sweeps", 1),
         ("relaxations", "relaxations_per_site", finest["rows"] * finest["cols"]),
     ):
-        found[name] = finest["equilibrium"][what] / per
-        found[f"all_{name}"] = sum(level["equilibrium"][what] for level in levels) / per
-    found |= {name: float(statistics["accounting"][name]) for name in ("utilisation", "model_seconds", "passes")}
+        figures[name] = finest["equilibrium"][what] / per
+        figures[f"all_{name}"] = sum(level["equilibrium"][what] for level in levels) / per
+    figures |= {name: float(statistics["accounting"][name]) for name in ("utilisation", "model_seconds", "passes")}
     at_finest = [sweep for sweep in sweeps if sweep.level == 0]
     free = [sweep for sweep in at_finest if sweep.phase == "free"]
     for name, what, least in (("changed", "changed", 1), ("oscillation", "returned", 2)):
         cooling = [getattr(sweep, what) for sweep in at_finest if sweep.phase == "relax"]
         cooling = [value for value in cooling if value is not None]
-        found[f"{name}_cooling"] = mean(cooling) if cooling else None
+        figures[f"{name}_cooling"] = mean(cooling) if cooling else None
         # a change and its return both lie in free sweeps
-        found[f"{name}_free"] = getattr(free[-1], what) if len(free) >= least else None
-    return found
+        figures[f"{name}_free"] = getattr(free[-1], what) if len(free) >= least else None
+    return figures
 
 
 @dataclass(frozen=True)
@@ -372,7 +372,7 @@ def compare(
     size = _check_sides(as_planes(pixels).shape[:2], shape)
     machine = open_machine(device, profile=True)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
-    found: dict[str, list[tuple[ScheduleRun, tuple[bool, ...]]]] = {name: [] for name in chosen}
+    runs: dict[str, list[tuple[ScheduleRun, tuple[bool, ...]]]] = {name: [] for name in chosen}
     turns = [(seed, name) for seed in keys for name in chosen]  # so that changes of the load affect all alike
     for number, (seed, name) in enumerate(turns):
 
@@ -381,11 +381,11 @@ def compare(
                 job = f"run {number + 1} of {len(turns)}: {name}, seed {seed}"
                 callback(progress.within(number, len(turns), job))
 
-        if not found[name]:
+        if not runs[name]:
             call.build_kernels(chosen[name], size)
         run, claims, settings = call.run(chosen[name], seed, size, report)
-        found[name].append((run, claims))
-    entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in found.items()]
+        runs[name].append((run, claims))
+    entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in runs.items()]
     settings = {name: value for name, value in settings.items() if name != "schedule"}
     return Comparison(call.sample, size, channel_axis, tuple(keys), machine.name, settings, tuple(entries))
 
@@ -423,18 +423,18 @@ class _Call:
     def _synthesize(
         self, schedule: Schedule, seed: int, size: tuple[int, int], **more: Any
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        given: dict[str, Any] = {"channel_axis": self.channel_axis, "rng": seed, "device": self.machine}
+        common: dict[str, Any] = {"channel_axis": self.channel_axis, "rng": seed, "device": self.machine}
         options = {**self.options, "schedule": schedule, **more}
-        image, output = synthesize(self.sample, size, full_output=True, **given, **options)
+        image, output = synthesize(self.sample, size, full_output=True, **common, **options)
         return image, output.statistics
 
 
-def _check_distinct(what: str, given: Sequence[Any]) -> None:
-    if not given:
+def _check_distinct(what: str, items: Sequence[Any]) -> None:
+    if not items:
         raise ValueError(f"there are no {what}s to compare; give one or more")
-    for one in given:
-        if given.count(one) > 1:
-            raise ValueError(f"the {what} {one} is given twice; give each once")
+    for item in items:
+        if items.count(item) > 1:
+            raise ValueError(f"the {what} {item} is given twice; give each once")
 
 
 def _check_sides(sample: tuple[int, ...], shape: tuple[int, int]) -> tuple[int, int]:

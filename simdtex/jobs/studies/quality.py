@@ -114,9 +114,9 @@ def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apar
                 ]
                 score[(away[0] < apart) & (away[1] < apart)] = np.inf
             best = score.argmin(axis=1)
-            found = score[np.arange(len(part)), best]
-            closer = found < least
-            least[closer], where[closer] = found[closer], block[best[closer]]
+            lowest = score[np.arange(len(part)), best]
+            closer = lowest < least
+            least[closer], where[closer] = lowest[closer], block[best[closer]]
         # the distance itself without the cancellation of the product form
         difference = wanted - _patches(candidates, where, side)
         squares = np.einsum("ij,ij->i", difference, difference, dtype=np.float64)
@@ -137,10 +137,10 @@ def hashes(numbers: NDArray[np.integer], side: int) -> NDArray[np.uint64]:
     its channel. Of n different patches and m others, about n m / 2**64 have the same hash by chance.
     """
     weights = np.random.default_rng(0).integers(1, 2**64, (3, max(side, numbers.shape[2])), np.uint64) | 1
-    found: NDArray[np.uint64] = numbers.astype(np.uint64) @ weights[2, : numbers.shape[2]]
+    sums: NDArray[np.uint64] = numbers.astype(np.uint64) @ weights[2, : numbers.shape[2]]
     for axis in (0, 1):
-        found = sliding_window_view(found, side, axis) @ weights[axis, :side]
-    return found
+        sums = sliding_window_view(sums, side, axis) @ weights[axis, :side]
+    return sums
 
 
 def _places(planes: Planes, indices: Indices, side: int) -> tuple[Indices, Indices]:
@@ -352,15 +352,15 @@ def lattice_fault_map(sample: ArrayLike, output: ArrayLike) -> NDArray[np.bool_]
         return None
     (there,), _ = plain(Pictures((second,)), like=pictures)
     cell = _waves(here, lattice).reshape(len(ORDERS), -1).mean(1)
-    own = _likeness(here, lattice, cell, False)
-    usual, found = float(np.median(own.max((0, 1)))), []
-    if _out_of_place(own, usual).mean() >= OWN:
+    likeness = _likeness(here, lattice, cell, False)
+    usual, maps = float(np.median(likeness.max((0, 1)))), []
+    if _out_of_place(likeness, usual).mean() >= OWN:
         return None
     for other, torus in ((lattice, False), (lattice.fitted(there.shape), True)):
         if other is not None:
-            found.append(_out_of_place(_likeness(there, other, cell, torus), usual))
+            maps.append(_out_of_place(_likeness(there, other, cell, torus), usual))
     step = _step(lattice)
-    faults = min(found, key=lambda one: one.mean()).repeat(step, 0).repeat(step, 1)
+    faults = min(maps, key=lambda faulty: faulty.mean()).repeat(step, 0).repeat(step, 1)
     return faults[: there.shape[0], : there.shape[1]]
 
 
@@ -376,8 +376,8 @@ def _waves(picture: NDArray[np.int64], lattice: Lattice) -> NDArray[np.complex12
     """Return a picture minus its mean, times the waves of a lattice, (n, rows, cols)."""
     phases = lattice.phases(*np.indices(picture.shape))
     turned = np.exp(-2j * np.pi * np.tensordot(ORDERS, phases, 1))
-    found: NDArray[np.complex128] = turned * (picture - picture.mean())
-    return found
+    waves: NDArray[np.complex128] = turned * (picture - picture.mean())
+    return waves
 
 
 def _likeness(
@@ -395,18 +395,18 @@ def _likeness(
         ]
     )[:, ::step, ::step]
     shifts = np.exp(2j * np.pi * np.tensordot(ORDERS, np.indices((PHASES, PHASES)) / PHASES, 1))
-    found: NDArray[np.float64] = np.einsum("k,kij,kyx->ijyx", cell.conj(), shifts, local, optimize=True).real
-    return found
+    likeness: NDArray[np.float64] = np.einsum("k,kij,kyx->ijyx", cell.conj(), shifts, local, optimize=True).real
+    return likeness
 
 
 def _out_of_place(likeness: NDArray[np.float64], usual: float) -> NDArray[np.bool_]:
     """Return the mask of sites that look more like a cell of another phase than of the output's, or like none."""
-    own = np.unravel_index(likeness.mean((2, 3)).argmax(), likeness.shape[:2])
-    apart = (np.indices(likeness.shape[:2]).T - own + PHASES // 2) % PHASES - PHASES // 2
+    phase = np.unravel_index(likeness.mean((2, 3)).argmax(), likeness.shape[:2])
+    apart = (np.indices(likeness.shape[:2]).T - phase + PHASES // 2) % PHASES - PHASES // 2
     near = (np.abs(apart.T) <= OFF * PHASES).all(0)
     placed, elsewhere = likeness[near].max(0), likeness[~near].max(0)
-    found: NDArray[np.bool_] = (elsewhere > placed) | (placed < FAINT * usual)
-    return found
+    faulty: NDArray[np.bool_] = (elsewhere > placed) | (placed < FAINT * usual)
+    return faulty
 
 
 class Ends(NamedTuple):
@@ -543,7 +543,7 @@ def measure(sample: ArrayLike, output: ArrayLike, source: ArrayLike | None = Non
     Cost: about 1.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, most of it for
     plausibility and coverage.
     """
-    found = Quality(
+    quality = Quality(
         copying=copying(sample, output),
         plausibility=plausibility(sample, output),
         coverage=coverage(sample, output),
@@ -553,7 +553,7 @@ def measure(sample: ArrayLike, output: ArrayLike, source: ArrayLike | None = Non
         cut_ends=cut_ends(sample, output),
     )
     if source is None:
-        return found
+        return quality
     rows, cols = np.shape(sample)[:2]
     use = effective_use(source, (rows, cols))
-    return replace(found, effective_share=use.effective_share, most_used=use.most_used.times_fair_share)
+    return replace(quality, effective_share=use.effective_share, most_used=use.most_used.times_fair_share)

@@ -117,7 +117,7 @@ def write_comparison(
     if spins:
         parts.append(ising_section(spins))
         results["ising"] = {
-            "findings": [vars(one) for one in spins.findings],
+            "findings": [vars(finding) for finding in spins.findings],
             "conclusion": conclusion(spins.findings),
         }
     write_report(folder, "Parallel schedules compared", lead, parts, results, command)
@@ -174,13 +174,13 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
     ]
 
 
-def _text(name: str, found: Spread | None) -> str:
+def _text(name: str, spread: Spread | None) -> str:
     """Return the mean of a figure over the seeds and its standard deviation as text."""
-    if found is None:
+    if spread is None:
         return "n/a"
     factor, unit = (100, " %") if name in PERCENT else (1, "")
-    deviation = None if found.deviation is None else factor * found.deviation
-    return number_text(factor * found.mean, deviation, unit)
+    deviation = None if spread.deviation is None else factor * spread.deviation
+    return number_text(factor * spread.mean, deviation, unit)
 
 
 def _kept_levels(entry: Entry) -> str:
@@ -292,12 +292,12 @@ ERRORS = (
 )
 
 
-def conclusion(found: Sequence[Finding]) -> list[str]:
+def conclusion(findings: Sequence[Finding]) -> list[str]:
     """Return a sentence each on the schedules that agree everywhere and on those that do not."""
-    if any(one.chains < ENOUGH for one in found):
+    if any(finding.chains < ENOUGH for finding in findings):
         return [f"No verdict: it needs {ENOUGH} chains or more at each temperature."]
-    keeps = {one.schedule: one.independent for one in found}
-    wrong = [name for name in keeps if any(one.differs for one in found if one.schedule == name)]
+    keeps = {finding.schedule: finding.independent for finding in findings}
+    wrong = [name for name in keeps if any(finding.differs for finding in findings if finding.schedule == name)]
     right = [name for name in keeps if name not in wrong]
     odd = [name for name in keeps if keeps[name] == (name in wrong)]
     said = {
@@ -315,43 +315,43 @@ def ising_section(spins: Spins) -> Section:
         "on this very torus (Kaufman 1949). The conditional distributions are those of the Ising model under every "
         "schedule, so any deviation is due to the schedule."
     )
-    found = spins.findings
-    text = "\n\n".join([lead, *conclusion(found)])
-    return Section("The Ising model", [text, *ising_tables(found), _energy(found), _lattices(spins.pictures)])
+    findings = spins.findings
+    text = "\n\n".join([lead, *conclusion(findings)])
+    return Section("The Ising model", [text, *ising_tables(findings), _energy(findings), _lattices(spins.pictures)])
 
 
-def ising_tables(found: Sequence[Finding]) -> list[Table]:
+def ising_tables(findings: Sequence[Finding]) -> list[Table]:
     """Return a table of the schedules for each temperature."""
-    groups = _by_temperature(found)
+    groups = _by_temperature(findings)
     return [
         Table(
             f"T = {t:g}: exact energy {rows[0].exact:.5f} on this torus",
-            [_row(one) for one in rows],
+            [_row(row) for row in rows],
             ERRORS if t == groups[-1][0] else "",
         )
         for t, rows in groups
     ]
 
 
-def _by_temperature(found: Sequence[Finding]) -> list[tuple[float, list[Finding]]]:
-    return [(t, list(rows)) for t, rows in groupby(found, key=lambda one: one.temperature)]
+def _by_temperature(findings: Sequence[Finding]) -> list[tuple[float, list[Finding]]]:
+    return [(t, list(rows)) for t, rows in groupby(findings, key=lambda row: row.temperature)]
 
 
-def _row(one: Finding) -> dict[str, str]:
+def _row(row: Finding) -> dict[str, str]:
     return {
-        "Schedule": one.schedule,
-        "(14)": "keeps" if one.independent else "breaks",
-        "Verdict": one.verdict,
-        "Energy": f"{one.energy:.5f} ± {one.error:.5f}",
-        "Sigma": f"{one.sigmas:+.1f}",
-        "|m|": f"{one.magnetisation:.4f}",
-        "Neighbours": f"{one.neighbours:z.3f}",
+        "Schedule": row.schedule,
+        "(14)": "keeps" if row.independent else "breaks",
+        "Verdict": row.verdict,
+        "Energy": f"{row.energy:.5f} ± {row.error:.5f}",
+        "Sigma": f"{row.sigmas:+.1f}",
+        "|m|": f"{row.magnetisation:.4f}",
+        "Neighbours": f"{row.neighbours:z.3f}",
     }
 
 
-def _energy(found: Sequence[Finding]) -> Figure:
-    groups = _by_temperature(found)
-    looks = styles({row.schedule: row.independent for row in found})
+def _energy(findings: Sequence[Finding]) -> Figure:
+    groups = _by_temperature(findings)
+    looks = styles({row.schedule: row.independent for row in findings})
     plot = new_figure(1.4 + 3.6 * len(groups), 1.65 + 0.32 * len(looks))
     for axes, (t, rows) in zip(plot.subplots(1, len(groups), sharey=True, squeeze=False)[0], groups, strict=True):
         off = [row.energy - row.exact for row in rows]

@@ -31,8 +31,8 @@ def here(store: Store, device: str | Machine | None) -> Execute:
     name = store.about["name"]
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:
-        for number in range(tasks):
-            yield do(store.where, name, device, turn, number)
+        for task in range(tasks):
+            yield do(store.where, name, device, turn, task)
 
     return execute
 

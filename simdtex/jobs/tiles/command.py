@@ -73,19 +73,19 @@ def make_in_tiles(store: TileStore, job: Any) -> None:
     from simdtex.driver import run
     from simdtex.figures.tables import duration_text
 
-    given = click.get_current_context().params
-    unsaid = 0 if given["dry_run"] else short_seed()
-    tiles = store.plan(job, unsaid if given["seed"] is None else given["seed"])
-    if given["dry_run"] or not given["quiet"]:
+    params = click.get_current_context().params
+    unsaid = 0 if params["dry_run"] else short_seed()
+    tiles = store.plan(job, unsaid if params["seed"] is None else params["seed"])
+    if params["dry_run"] or not params["quiet"]:
         for line in tiles.layout.lines():
-            click.echo(line, err=not given["dry_run"])
-    if not given["dry_run"]:
-        with _going_on(store, given["quiet"]) as callback:
-            store.make(job, tiles, given["device"], callback)
+            click.echo(line, err=not params["dry_run"])
+    if not params["dry_run"]:
+        with _going_on(store, params["quiet"]) as callback:
+            store.make(job, tiles, params["device"], callback)
     elif job.given is None and job.guide is None:  # which have the size of the output
         side = min(CALIBRATED, *job.shape)
         part = replace(job, shape=(side, side))
-        seconds, _ = observed(lambda *, full_output, **how: run("synthesize", part, **how), given["device"])
+        seconds, _ = observed(lambda *, full_output, **how: run("synthesize", part, **how), params["device"])
         time_needed = duration_text(seconds * prod(job.shape) / side**2)
         click.echo(f"one process needs about {time_needed}; nothing was written")
 

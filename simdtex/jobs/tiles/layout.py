@@ -48,9 +48,9 @@ class Outputs(NamedTuple):
     def arrays(self, plan: MrfPlan) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return the axes after rows and columns, and the type, of each array by name."""
         sample = plan.sample
-        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
-        found |= {"source": ((2 + (len(sample.boxes) > 1),), np.dtype(np.int32))} if self.source else {}
-        return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in self.maps.items()}
+        arrays = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
+        arrays |= {"source": ((2 + (len(sample.boxes) > 1),), np.dtype(np.int32))} if self.source else {}
+        return arrays | {name: (images[0].shape[2:], images[0].dtype) for name, images in self.maps.items()}
 
 
 class Tile(NamedTuple):
@@ -93,13 +93,13 @@ class LevelLayout:
         """Number of tasks of a turn."""
         return ceil(self.count / self.together)
 
-    def task(self, number: int) -> list[Tile]:
+    def task(self, task: int) -> list[Tile]:
         """Return the tiles of a task."""
-        return [*map(self.tile, range(number * self.together, min(self.count, (number + 1) * self.together)))]
+        return [*map(self.tile, range(task * self.together, min(self.count, (task + 1) * self.together)))]
 
-    def tile(self, number: int) -> Tile:
+    def tile(self, index: int) -> Tile:
         """Return a tile by its number, row by row."""
-        i, j = divmod(number, self.across)
+        i, j = divmod(index, self.across)
         top, left = i * self.side, j * self.side
         return Tile(top, left, min(self.side, self.rows - top), min(self.side, self.cols - left))
 
@@ -187,12 +187,12 @@ def planned(plan: MrfPlan, seed: int, side: int, outputs: Outputs) -> TilePlan:
     if not isinstance(options.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
-        given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
-        raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or make no tiles")
+        cause = f"array {options.array}" if options.array else f"schedule {schedule.name}"
+        raise ValueError(f"{cause} needs the whole output at once; give the schedule coloring, or make no tiles")
     count = ceil(plan.shape[0] / side) * ceil(plan.shape[1] / side)
     if count > TILES:
         raise ValueError(f"tiles of {side}x{side} pixels are {count}, more than {TILES}; give larger ones")
-    levels = tuple(_level(plan, seed, number, side) for number in range(plan.levels))
+    levels = tuple(_level(plan, seed, level, side) for level in range(plan.levels))
     sample, channels, sd = plan.sample, plan.sample.working.shape[0], options.finish or 0
     shown = side + (2 * int(gaussian_offsets(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
     window = max(*(prod(one.window) for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))

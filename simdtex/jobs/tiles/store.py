@@ -158,14 +158,14 @@ class Files(zarr.storage.LocalStore):
 
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
         """Return the content of a file; if it is missing or damaged, None, but Damaged for a chunk."""
-        found = await super().get(key, prototype, byte_range)
-        if found is not None and key.startswith("work/"):
-            found, end = found[:-4], found[-4:]
-            if end.to_bytes() != self.placed(key, found.as_buffer_like()):
-                found = None
-        if found is None and key.rpartition("/")[2] not in NODES:
+        chunk = await super().get(key, prototype, byte_range)
+        if chunk is not None and key.startswith("work/"):
+            chunk, end = chunk[:-4], chunk[-4:]
+            if end.to_bytes() != self.placed(key, chunk.as_buffer_like()):
+                chunk = None
+        if chunk is None and key.rpartition("/")[2] not in NODES:
             raise Damaged(key)
-        return found
+        return chunk
 
     async def set(self, key: str, value: Any) -> None:
         """Write a file; raise Damaged if the store is gone."""
@@ -235,7 +235,7 @@ class Store:
         store, held, scattered = Store(where), False, {}
         store._files.name = secrets.token_hex(8)
         store.root.create_group("work")
-        plan, layout, given = tiles.plan, tiles.layout, tiles.plan.given
+        plan, layout, fixed = tiles.plan, tiles.layout, tiles.plan.given
         conditions = Conditioning(plan)
         for level in layout.levels:
             part = plan.of(level.number)
@@ -248,11 +248,11 @@ class Store:
                     store._sites(place, level, plane.dtype, before=plane.shape[:-2])[:] = plane
             if (data := conditions.scattered(level.number)) is not None:
                 scattered[str(level.number)] = data
-        if given is not None:
-            for name, array in (("values", given.values), ("known", given.known)):
+        if fixed is not None:
+            for name, array in (("values", fixed.values), ("known", fixed.known)):
                 store._sites(f"work/given/{name}", layout.levels[0], array.dtype, after=array.shape[2:])[:] = array
         about |= {"format": FORMAT, "version": version("simdtex"), "seed": tiles.seed}
-        conditioned = list(conditions.confidences), held, given is not None, scattered
+        conditioned = list(conditions.confidences), held, fixed is not None, scattered
         store._keep("run", about, [described(plan), list(tiles.outputs), layout.levels[0].side, *conditioned])
         store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
@@ -366,15 +366,15 @@ class Store:
         if not (level or part == "work/turn"):  # the current turn finds the missing parts
             return "it is made again"
         first = int(level[1]) if level else 0
-        for number in range(first, len(self.work.layout.levels)):
+        for index in range(first, len(self.work.layout.levels)):
             try:
-                turn = Turn(*self._state(f"begun{number}")[1][0])
+                turn = Turn(*self._state(f"begun{index}")[1][0])
             except Damaged:
                 continue
-            for finer in range(number + 1):
+            for finer in range(index + 1):
                 self._remove(f"level{finer}/")
             self.save(turn)
-            return f"level {number} begins again"
+            return f"level {index} begins again"
         return None
 
     def note(self, turn: Turn, task: int, tally: Tally) -> None:
@@ -392,8 +392,8 @@ class Store:
                     continue
                 for name in names:
                     self._at(name)[spans(tile)]
-                where, found = self._checksums(names, tile)
-                if not np.array_equal(self._at("checksums")[where], found):
+                where, sums = self._checksums(names, tile)
+                if not np.array_equal(self._at("checksums")[where], sums):
                     return False
         except Damaged:
             return False
@@ -431,8 +431,8 @@ class Store:
         """Write a tile of the arrays of the output."""
         for name, array in arrays.items():
             self._at(name)[spans(tile)] = array
-        where, found = self._checksums(list(arrays), tile)
-        self._at("checksums")[where] = found
+        where, sums = self._checksums(list(arrays), tile)
+        self._at("checksums")[where] = sums
 
     def _checksums(self, names: list[str], tile: Tile) -> tuple[tuple[slice, ...], NDArray[np.uint32]]:
         """Return the position of the checksums of an output tile, and the checksums in its chunks."""
@@ -441,8 +441,8 @@ class Store:
             slice(span.start // side, -(-span.stop // side)) for span, side in zip(spans(tile), sides, strict=False)
         )
         places = [(row, col) for row in range(rows.start, rows.stop) for col in range(cols.start, cols.stop)]
-        found = np.array([[self._checksum(name, *place) for place in places] for name in names], np.uint32)
-        return (slice(None), rows, cols), found.reshape(len(names), rows.stop - rows.start, -1)
+        sums = np.array([[self._checksum(name, *place) for place in places] for name in names], np.uint32)
+        return (slice(None), rows, cols), sums.reshape(len(names), rows.stop - rows.start, -1)
 
     def _checksum(self, name: str, row: int, col: int) -> int:
         """Return the checksum of a chunk of the output, its last four bytes, combined with the store's name."""
@@ -495,7 +495,7 @@ class Store:
     def _remove(self, name: str) -> None:
         """Remove arrays of ``work``, complete or not."""
         shutil.rmtree(self._file(name), ignore_errors=True)
-        self._arrays = {path: one for path, one in self._arrays.items() if not path.startswith(f"work/{name}")}
+        self._arrays = {path: array for path, array in self._arrays.items() if not path.startswith(f"work/{name}")}
 
     def _at(self, name: str) -> CheckedArray:
         """Return an array, opened once."""

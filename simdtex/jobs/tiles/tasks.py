@@ -74,8 +74,8 @@ def _sweep(store: Store, run: MrfRun, turn: Turn, tile: Tile) -> Tally:
     sweeps = turn.cooling + turn.free  # the only part of the schedule's state that persists
     memory = level.schedule.init(level.setting)._replace(sweep=sweeps)
     before = _on(machine, store.read(turn.level, turn.number - 1, window))
-    found, *_ = run_steps(level, MrfState(*before, penalty, memory, turn.level, active=turn.active))
-    inside = Field(*(np.ascontiguousarray(plane[..., rows, cols]) for plane in _off(machine, found)))
+    after, *_ = run_steps(level, MrfState(*before, penalty, memory, turn.level, active=turn.active))
+    inside = Field(*(np.ascontiguousarray(plane[..., rows, cols]) for plane in _off(machine, after)))
     store.write(turn, tile, inside)
     return _tally(level, _on(machine, inside), run.grid(turn.level).window(*tile))
 

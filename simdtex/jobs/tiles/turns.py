@@ -90,17 +90,17 @@ class Turns:
         (active, temperature_sum), counts = total[:2].tolist(), total[2:]
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
-        number = turn.number + 1
-        after = Turn(number, "sweep", turn.level, cooling, free, active, temperature_sum)
+        following = turn.number + 1
+        after = Turn(following, "sweep", turn.level, cooling, free, active, temperature_sum)
         fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
         if turn.phase != "whole":
             penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn))
             if after.active or after.free < lattices.free_sweeps(turn.level):
                 return store.save(after, penalty)
         if turn.level:
-            below = Turn(number, phase_of(self.levels[turn.level - 1]), turn.level - 1)
+            below = Turn(following, phase_of(self.levels[turn.level - 1]), turn.level - 1)
             return store.save(below, fair_use.split(penalty)[1])
-        return store.save(Turn(number, "show", 0))
+        return store.save(Turn(following, "show", 0))
 
 
 class Watch(Observer):
@@ -146,13 +146,13 @@ class Watch(Observer):
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` on a side."""
         levels = self._run.levels
-        number, step = turn.reads, -(-max(level.rows, level.cols) // SHOWN)
-        sample = self._run.lattices.of(min(number, len(levels) - 1)).sample
-        if number == len(levels):
+        reads, step = turn.reads, -(-max(level.rows, level.cols) // SHOWN)
+        sample = self._run.lattices.of(min(reads, len(levels) - 1)).sample
+        if reads == len(levels):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
-        found = []
-        for row in range(0, levels[number].rows, step):
-            line = Tile(row, 0, 1, levels[number].cols)
-            values, source, _ = self._run.store.read(number, turn.number - 1, line)
-            found.append(sample.picture(values[..., ::step], source[:, ::step]))
-        return np.concatenate(found)
+        lines = []
+        for row in range(0, levels[reads].rows, step):
+            line = Tile(row, 0, 1, levels[reads].cols)
+            values, source, _ = self._run.store.read(reads, turn.number - 1, line)
+            lines.append(sample.picture(values[..., ::step], source[:, ::step]))
+        return np.concatenate(lines)

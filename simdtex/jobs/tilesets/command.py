@@ -122,8 +122,8 @@ def write(output: Path, maps: list[Also], names: list[str], normals: bool, made:
         made = unit_normals(made, (made != maps[0].carried(run.source)).any(axis=2))
     corners = np.random.default_rng(run.statistics["seed"]).integers(0, colours, (PLANE + 1, PLANE + 1))
     with atomic_folder(output) as folder:
-        for number, also in enumerate(maps):
-            packed = also.carried(run.source) if number else made
+        for n, also in enumerate(maps):
+            packed = also.carried(run.source) if n else made
             image.write(folder / also.out, packed, also.maps.metadata)
             for row, col in np.ndindex(grid.shape[:2]):
                 which = "".join(map(str, grid[row, col]))

@@ -58,8 +58,8 @@ def tiled_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: N
     corners = _element(_element(root, "wangsets"), "wangset", name="corners", type="corner", tile=-1)
     for name, colour in zip(names, COLOURS, strict=False):
         _element(corners, "wangcolor", name=name, color=colour, tile=-1, probability=1)
-    for number, (a, b, c, d) in enumerate((grid + 1).reshape(-1, 4).tolist()):
-        _element(corners, "wangtile", tileid=number, wangid=f"0,{b},0,{d},0,{c},0,{a}")  # clockwise from the top
+    for n, (a, b, c, d) in enumerate((grid + 1).reshape(-1, 4).tolist()):
+        _element(corners, "wangtile", tileid=n, wangid=f"0,{b},0,{d},0,{c},0,{a}")  # clockwise from the top
     return _text(root)
 
 
@@ -84,13 +84,13 @@ def godot_set(picture: str, tile: tuple[int, int], names: Sequence[str], grid: N
     for row in range(len(grid)):
         for col, colours in enumerate(grid[row].tolist()):
             values = {"": 0, "/terrain_set": 0, "/terrain": max(sorted(colours), key=colours.count)}
-            values |= {f"/terrains_peering_bit/{name}": one for name, one in zip(CORNERS, colours, strict=True)}
+            values |= {f"/terrains_peering_bit/{name}": c for name, c in zip(CORNERS, colours, strict=True)}
             lines += [f"{col}:{row}/0{name} = {value}" for name, value in values.items()]
     lines += ["", "[resource]", f"tile_size = {size}", "terrain_set_0/mode = 1"]
-    for number, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
+    for n, (name, colour) in enumerate(zip(names, COLOURS, strict=False)):
         red, green, blue = (round(part / 255, 3) for part in bytes.fromhex(colour[1:]))
-        lines += [f"terrain_set_0/terrain_{number}/name = {dumps(name, ensure_ascii=False)}"]
-        lines += [f"terrain_set_0/terrain_{number}/color = Color({red}, {green}, {blue}, 1)"]
+        lines += [f"terrain_set_0/terrain_{n}/name = {dumps(name, ensure_ascii=False)}"]
+        lines += [f"terrain_set_0/terrain_{n}/color = Color({red}, {green}, {blue}, 1)"]
     return "\n".join([*lines, 'sources/0 = SubResource("1")', ""])
 
 

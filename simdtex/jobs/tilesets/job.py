@@ -189,10 +189,10 @@ class Tileset:
         finished = [(Canvas(*made), about) for made, about in saved]
         jobs = {"borders from left to right": cycle, "borders from top to bottom": cycle.T, "tiles": packed}
         begin, every = 0, sum(grid.size for grid in jobs.values())
-        for number, (job, grid) in enumerate(jobs.items()):
-            if number >= len(finished):
+        for n, (job, grid) in enumerate(jobs.items()):
+            if n >= len(finished):
                 canvas = self.blank((grid.shape[0] * rows, grid.shape[1] * cols))
-                if number == 2:
+                if n == 2:
                     self.draw_borders(canvas, cycle[0].tolist(), *(made for made, _ in finished))
                 for (row, col), colour in np.ndenumerate(grid):
                     canvas.paste(row * rows - self.wide, col * cols - self.wide, pieces[colour])
@@ -202,7 +202,7 @@ class Tileset:
                 made, output = drive(plan, machine, seed, seen, now, account)
                 finished.append((Canvas(made, np.asarray(output.source)), output.statistics | {"job": job}))
                 inside = None
-                if number < 2:
+                if n < 2:
                     checkpointing.offer(None, lambda: (finished, None))
             begin += grid.size
         runs = [about for _, about in finished]
@@ -240,33 +240,33 @@ class Tileset:
         phase: Any = None
         taken = np.zeros(masks[0].shape, bool)
         for colour in range(self.colours):
-            number = colour if several else 0
-            usable = ndimage.minimum_filter(masks[number], 2 * reach, mode="constant", cval=0)  # of -reach..reach - 1
+            sample = colour if several else 0
+            usable = ndimage.minimum_filter(masks[sample], 2 * reach, mode="constant", cval=0)  # of -reach..reach - 1
             if phase is not None and lattices:
-                apart = np.moveaxis(lattices[number].phases(*np.indices(usable.shape)), 0, -1) - phase
-                away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[number].basis, -1, 0))
+                apart = np.moveaxis(lattices[sample].phases(*np.indices(usable.shape)), 0, -1) - phase
+                away = np.hypot(*np.moveaxis((apart - np.rint(apart)) @ lattices[sample].basis, -1, 0))
                 usable &= away <= max(NEAR, away.min(initial=np.inf, where=usable))
             elif not several and (usable & ~taken).any():
                 usable &= ~taken
             if not usable.any():
                 size, remedy = f"{2 * reach}x{2 * reach}", "give smaller tiles or a larger sample"
                 raise ValueError(f"a corner needs {size} known pixels, which the sample has nowhere; {remedy}")
-            squares = (planes[number] - round(planes[number].mean())) ** 2
+            squares = (planes[sample] - round(planes[sample].mean())) ** 2
             off = np.abs(sums_around(squares, reach) - round(squares.mean() * (2 * reach + 1) ** 2))
             places = np.argwhere(usable)[np.argsort(off[usable], kind="stable")[: -(-usable.sum() // USUAL)]]
             bits = random.draw4(seed, 0, 0, np.array([colour]), random.START)
             row, col = places[int(random.below(bits[0], bits[1], len(places))[0])].tolist()
             taken[max(0, row - 2 * reach) : row + 2 * reach, max(0, col - 2 * reach) : col + 2 * reach] = True
-            phase = lattices[number].phases(row, col) if lattices and phase is None else phase
+            phase = lattices[sample].phases(row, col) if lattices and phase is None else phase
             at = np.mgrid[row - reach : row + reach, col - reach : col + reach]
-            place = np.stack([*at, np.full_like(at[0], number)], -1)[..., : 3 if several else 2]
-            pieces.append(Canvas(self.pictures.pixels[number][tuple(at)], place.astype(np.int32)))
+            place = np.stack([*at, np.full_like(at[0], sample)], -1)[..., : 3 if several else 2]
+            pieces.append(Canvas(self.pictures.pixels[sample][tuple(at)], place.astype(np.int32)))
         return pieces
 
     def draw_borders(self, canvas: Canvas, cycle: list[int], across: Canvas, down: Canvas) -> None:
         """Set the borders of all tiles from those between the colours of a cycle."""
         (rows, cols), half = self.tile, self.narrow
-        pairs = {pair: number for number, pair in enumerate(zip(cycle, [*cycle[1:], cycle[0]], strict=True))}
+        pairs = {pair: n for n, pair in enumerate(zip(cycle, [*cycle[1:], cycle[0]], strict=True))}
         for row, col in np.ndindex(self.colours**2, self.colours**2):
             here, right, below, _ = corners_of(torus(self.colours))[row, col].tolist()
             strip = across.cut(-half, pairs[here, right] * cols, 2 * half, cols)
@@ -280,7 +280,7 @@ class Tileset:
         given = Given(canvas.values, np.repeat(known[..., None], canvas.values.shape[-1], -1), canvas.place)
         shape, guide = known.shape, None
         if len(self.pictures.pixels) > 1:
-            samples = tuple(np.full((*one.shape[:2], 1), n) for n, one in enumerate(self.pictures.pixels))
+            samples = tuple(np.full((*pixels.shape[:2], 1), n) for n, pixels in enumerate(self.pictures.pixels))
             guide = samples, self.labels(grid)[..., None]
         return mrf.plan(self.pictures, shape, self.options, given, guide, period=self.tile).keyed(begin, shape[1])
 
