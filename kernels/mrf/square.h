@@ -185,8 +185,8 @@ static inline int2 gather_rows(const Level g, const int j, const __private int *
                 float16 uc = c < MADE ? certain : c < C - KNOWN ? guide : data;
                 if (OWN)
                     uc = select(uc, (float16)0.0f, x == (float)UNKNOWN);
-                *(SHARED float16 *)(u + U_AT(cell, c)) = uc;
-                *(SHARED float16 *)(xu + X_AT(cell, c)) = x * uc;
+                vstore16(uc, 0, u + U_AT(cell, c));
+                vstore16(x * uc, 0, xu + X_AT(cell, c));
             }
             heat += t * in;
             inside += in;
@@ -251,7 +251,6 @@ static inline float lane_of_distance(__global const float *y, const SHARED float
 #endif
 typedef JOIN(float, USED) low;
 #define LOW(p) JOIN(vload, USED)(0, p)
-#define CELL(p) (*(const SHARED low *)(p)) // of u and xu, which are aligned
 
 // No partial sum exceeds the whole one, so that a candidate beyond the bound is left out half-way: infinity.
 #define BEYOND(d) (PRODUCT(d, factor) - most > best)
@@ -264,11 +263,9 @@ static inline bool empty_row(const int a)
     return AXES > 2 && layers * layers + down * down > ORDER;
 }
 
-// It is called, since its long sum would take the registers of the loop over all candidates in relax_exact.cl.
-static __attribute__((noinline)) float distance_in_vectors(__global const float *y, const SHARED float *u,
-                                                           const SHARED float *xu, const int plane, const int row_stride,
-                                                           const int layer_stride, const float factor,
-                                                           const float most, const float best)
+static inline float distance_in_vectors(__global const float *y, const SHARED float *u, const SHARED float *xu,
+                                        const int plane, const int row_stride, const int layer_stride,
+                                        const float factor, const float most, const float best)
 {
     low d = 0.0f;
 #pragma unroll
@@ -279,13 +276,13 @@ static __attribute__((noinline)) float distance_in_vectors(__global const float 
             return INFINITY;
         __global const float *row = y + row_at(cell / CHUNKS, row_stride, layer_stride) + cell % CHUNKS * 16;
         if (HOT) { // x and y differ in two channels of the categories, whose terms are equal, or in none
-            const low height = CELL(xu + X_AT(cell, 0)), channel = CELL(xu + X_AT(cell, 1));
+            const low height = LOW(xu + X_AT(cell, 0)), channel = LOW(xu + X_AT(cell, 1));
             const low e = select(height, (low)0.0f, LOW(row + C * plane) == channel);
             d = fma(e, e, fma(e, e, d));
         }
 #pragma unroll
         for (int c = HOT; c < C; ++c) {
-            const low gap = GAP(LOW(row + c * plane), CELL(u + U_AT(cell, c)), CELL(xu + X_AT(cell, c)));
+            const low gap = GAP(LOW(row + c * plane), LOW(u + U_AT(cell, c)), LOW(xu + X_AT(cell, c)));
             d = fma(gap, gap, d);
         }
     }
