@@ -7,7 +7,7 @@ import re
 import time
 import weakref
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from math import prod
 from pathlib import Path
@@ -111,8 +111,11 @@ class Pool:
         if self._largest > 0:
             size = min(size, self._largest)
         free = self._free.setdefault(size, [])
-        with suppress(IndexError):
+        try:
             before = free.pop()
+        except IndexError:  # another thread may have taken the last one
+            pass
+        else:
             self._used.discard(before)
             return self._use(before.buffer, free)
         try:
