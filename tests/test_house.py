@@ -14,7 +14,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # A room imports from itself and from rooms above it. The number is its budget of lines; a larger one is a commit of its
 # own, with a reason. Tiles stand above synthesis, since they are a way to run `synthesize`.
 ROOMS = {
-    ("random", "options", "machine"): 1796,
+    ("random", "options", "machine"): 1799,
     ("io",): 3636,
     ("model",): 3600,
     ("run", "checkpoint", "driver"): 752,
@@ -38,7 +38,7 @@ ROOMS = {
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35046, 20772
+LINES, CODE = 35049, 20775
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}
