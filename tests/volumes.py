@@ -10,6 +10,13 @@ import numpy as np
 import tifffile
 
 
+def saved(tmp_path, content, name="a.gslib"):
+    """A file with a content, a text or bytes."""
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
 def noise(shape, dtype="uint8", seed=0):
     """Random values over the whole range of a type."""
     rng = np.random.default_rng(seed)

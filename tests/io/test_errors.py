@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+from volumes import saved
 
 from simdtex.io.grids import read_grid
 from simdtex.io.hard_data import read_hard_data
@@ -129,8 +130,7 @@ TABLE = [
 
 @pytest.mark.parametrize(("name", "reader", "content", "words"), TABLE, ids=range(len(TABLE)))
 def test_a_wrong_file_gets_one_sentence(tmp_path, name, reader, content, words):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    path = saved(tmp_path, content, name)
     with pytest.raises(ValueError, match=words) as said:
         reader(path)
     assert str(path) in str(said.value) and "\n" not in str(said.value) and len(str(said.value)) < 400

@@ -9,6 +9,7 @@ import pandas
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from volumes import saved
 
 from simdtex.io import hard_data
 from simdtex.io.grids import MISSING
@@ -19,9 +20,7 @@ NAN = float("nan")
 
 
 def table(tmp_path, text, name="wells.csv"):
-    path = tmp_path / name
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return path
+    return saved(tmp_path, text, name)
 
 
 SAME = [
