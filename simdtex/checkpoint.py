@@ -49,7 +49,7 @@ class Checkpointing:
     """The state from which a run continues, and the function that receives every later state."""
 
     found: Any = None  # None for a new run
-    offer: Callable[..., Any] = lambda info, tree, *, now=False: None  # is told each step; `tree()` returns the state
+    offer: Callable[..., Any] = lambda info, tree, *, now=False: None  # called after a step; `tree()` returns its state
     stopping: Callable[[], bool] = lambda: False  # whether the run is to stop
 
 

@@ -57,7 +57,7 @@ def test_any_number_of_threads_has_the_references_bits(reference, threads, drive
 
 
 def vendors(folder, *patterns):
-    """A folder that shows the loader one runtime alone; None where it is not here."""
+    """Write the .icd file of one runtime into a folder, and return the folder; None if it is not installed."""
     found = [path for pattern in patterns for path in sorted(Path("/usr/lib").glob(pattern))]
     (folder / "only.icd").write_text("".join(f"{path}\n" for path in found[:1]))
     return str(folder) if found else None

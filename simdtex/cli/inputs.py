@@ -218,7 +218,7 @@ def check_each(option: str, paths: Sequence[Path], samples: Material) -> None:
 def check_output(
     path: Path, pixels: NDArray[Any], metadata: Metadata | None, categorical: Any = False, kept: bool = False
 ) -> None:
-    """Raise unless a picture can be written like ``pixels``; say so if its format loses what is to be ``kept``."""
+    """Raise unless such pixels can be written; if pixels are to be ``kept``, say what the format loses of them."""
     from simdtex.io import image
     from simdtex.model.pictures import few
 

@@ -38,7 +38,7 @@ def here(store: Store, device: str | Machine | None) -> Execute:
 
 
 def across(client: Client, store: Store, device: str | Machine | None, note: Callable[[str], None]) -> Execute:
-    """Return a function that executes tasks on workers, again if one is lost; ``note`` is told if there are none."""
+    """Return a function that executes tasks on workers, repeats those of a lost one, and notes if none is left."""
     what = store.where, store.about["name"], None if device is None else str(device)
 
     def execute(turn: Turn, tasks: int) -> Iterator[int]:

@@ -165,7 +165,7 @@ def test_what_is_measured_is_what_it_says():
     longer = ising(REFERENCE, (3, 5), [2.5], "luby", seeds=4, sweeps=3, burn_in=2)
     assert_same_bits(longer.energy[..., 1:].copy(), run.energy)  # burn-in is but not looking
     beside = ising(REFERENCE, (3, 5), [1.0, 2.5], "luby", seeds=4, sweeps=2, burn_in=3)
-    assert_same_bits(beside.energy[1:].copy(), run.energy)  # a temperature knows nothing of the others
+    assert_same_bits(beside.energy[1:].copy(), run.energy)  # temperatures are independent of one another
 
 
 class Turns(Watched):

@@ -118,7 +118,7 @@ def test_progress_tells_every_tile_of_the_one_process_that_leads(tmp_path, monke
     store, seen = TileStore(tmp_path / "out.zarr", 8), []
 
     def callback(progress):
-        if not seen and sys.platform != "win32":  # which keeps nobody off a folder
+        if not seen and sys.platform != "win32":  # Windows has no lock on a folder
             with pytest.raises(ValueError, match=r"another run is at work in .*out.zarr now; wait for it, or stop it"):
                 store.resume(REFERENCE)
         seen.append((progress.fraction, progress.doing, progress.image()))
