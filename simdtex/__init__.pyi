@@ -73,6 +73,7 @@ class MrfOptions(TypedDict, total=False):
     weights: tuple[float, ...] | list[float] | None
     shares: tuple[float, ...] | list[float] | None
     proportions: tuple[float, ...] | list[float] | None
+    share_spread: float
     data_weight: float
     soft_weight: float
     guide_weight: float

@@ -23,8 +23,9 @@ from simdtex.driver import Device, Kept, Seed, drive, run
 from simdtex.inputs import check_inputs, check_known
 from simdtex.io.hard_data import HardData
 from simdtex.io.places import Location
-from simdtex.jobs.simulation import maps
+from simdtex.jobs.simulation import maps, shares
 from simdtex.jobs.simulation.maps import Cells, digests, georeferenced, grid_axes, plan_cells
+from simdtex.jobs.simulation.shares import Spread
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import given_data
@@ -210,17 +211,18 @@ def plan_simulation(
     categories = kinds.categories(0)
     probabilities = maps.of_categories(arrays["probabilities"], categories, size, cells.put)
     soft = Soft(probabilities, copies.probability if copies else None)
-    told = chosen.proportions or guide or probabilities is not None
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
-    if categories is not None and alone and not told:
-        images = replace(kinds, shares=soft.shares) if copies else kinds
-        chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
+    spread: Spread | None = None
+    if categories is not None and alone and not (chosen.proportions or guide):
+        own = (replace(kinds, shares=soft.shares) if copies else kinds).proportions()
+        p = probabilities if chosen.soft_weight else None
+        spread = shares.spread(chosen.of(pictures), own / own.sum(), p, size, inputs.given, chosen.share_spread)
     shas = digests(pictures, inputs.given)
     if inputs.guide:
         shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if pictures.usable:
         shas["mask"] = digest(*pictures.usable)
-    parts = (training, inputs.given, guide, soft, copies, source, chosen)
+    parts = (training, inputs.given, guide, soft, copies, source, chosen, spread)
     axis = None if cells.channel_axis is None else -1
     of_maps = maps.digests_of_maps(arrays)
     return Simulation(of_maps, n, first, size, *parts, cells._replace(given={}), shas, missing, jobs, axis)
@@ -241,6 +243,7 @@ class Simulation:
     copies: Turned | None
     source: bool
     options: mrf.Options
+    spread: Spread | None = field(compare=False)
     cells: Cells = field(compare=False)
     digests: dict[str, str] = field(compare=False)
     missing: Any = field(compare=False)
@@ -282,22 +285,24 @@ class Simulation:
         except BaseException:
             checkpointing.offer(None, batch.state, now=True)  # those that wait for their turn
             raise
-        statistics = {"seed": seed, "device": machine.name, "shares": self.shares(batch)}
+        statistics = {"seed": seed, "device": machine.name, "shares": self.shares(batch), "aims": batch.aims}
         return batch.values, Output(batch.sources, statistics=statistics)
 
     def shares(self, batch: Batch) -> dict[str, str]:
         """Return the shares of categories that were asked and those that were reached, as attributes."""
         kinds, categories = batch.plan.kinds, self.options.of(self.training).categories(0)
-        if categories is None or not kinds or kinds.categories is None:
+        if categories is None or not (self.spread or (kinds and kinds.categories is not None)):
             return {}
-        p = np.broadcast_to(kinds.categories, (len(categories), *self.shape))
+        p = np.ones((len(categories), *self.shape))
+        if kinds and kinds.categories is not None:
+            p *= kinds.categories
         there = ~np.isnan(p[0])
         if self.outside is not None:
             there &= ~self.outside
         made = batch.values[:, there, 0]
         if not made.size:
             return {}
-        asked = np.array(self.options.proportions or p[:, there].sum(1))
+        asked = np.array(self.options.proportions or p[:, there].sum(1)) if batch.aims is None else batch.aims.sum(0)
         reached = np.array([(made == category).sum() for category in categories])
         both = {"shares_asked": asked, "shares_reached": reached}
         return {name: " ".join(f"{share:.3f}" for share in those / those.sum()) for name, those in both.items()}
@@ -312,6 +317,10 @@ class Simulation:
         seed, device, shares = (output.statistics[name] for name in ("seed", "device", "shares"))
         seeds = np.array([realisation_seed(seed, n) for n in numbers], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
+        if self.spread:
+            names: Any = self.options.of(self.training).categories(0)
+            aims = zip(names, output.statistics["aims"].T, strict=True)
+            coordinates |= {f"share_{name}": ("realisation", column) for name, column in aims}
         attributes = {"seed": seed, "version": version("simdtex"), "device": device}
         attributes["options"] = json.dumps(
             vars(self.options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
@@ -334,7 +343,7 @@ class Batch:
     """The realisations of a run; threads make one each at a time on the ``free`` machines."""
 
     def __init__(self, job: Simulation, seed: int, callback: Callback | None, checkpointing: Checkpointing) -> None:
-        self.job, self.seed, self.callback, self.checkpointing = job, seed, callback, checkpointing
+        self.job, self.callback, self.checkpointing = job, callback, checkpointing
         self.plan, self.free = job.plan(), SimpleQueue[Machine]()
         pixels, columns = job.training.pixels[0], len(job.sources)
         values = prod(job.shape) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)
@@ -342,12 +351,14 @@ class Batch:
         self.values = np.empty((job.n, *job.shape, pixels.shape[-1]), pixels.dtype)
         self.sources = np.empty((job.n, *job.shape, columns), np.int32)
         self.finished: list[int] = []
-        self.shares, self.lock = np.zeros(job.n), Lock()
+        self.fractions, self.lock = np.zeros(job.n), Lock()
+        self.seeds = [realisation_seed(seed, job.first + number) for number in range(job.n)]
+        self.aims = np.array([job.spread.draw(each) for each in self.seeds]) if job.spread else None
         if checkpointing.found is not None:
             self.finished += checkpointing.found["numbers"]
             self.values[self.finished] = checkpointing.found["pictures"]
             self.sources[self.finished] = checkpointing.found["sources"]
-            self.shares[self.finished] = 1
+            self.fractions[self.finished] = 1
 
     def state(self) -> dict[str, Any]:
         """Return the finished realisations, as plain arrays."""
@@ -357,9 +368,11 @@ class Batch:
     def make(self, number: int) -> None:
         """Make a realisation on a free machine."""
         job, nested, machine = self.job, Checkpointing(None, self._offer), self.free.get()
-        told, seed = self.callback and partial(self._tell, number), realisation_seed(self.seed, job.first + number)
+        told, plan = self.callback and partial(self._tell, number), self.plan
+        if job.spread and self.aims is not None:
+            plan = job.spread.on(plan, self.aims[number])
         try:
-            picture, output = drive(self.plan, machine, seed, told, nested)
+            picture, output = drive(plan, machine, self.seeds[number], told, nested)
         finally:
             self.free.put(machine)
         if job.outside is not None:
@@ -384,12 +397,12 @@ class Batch:
     def _tell(self, number: int, progress: Progress, stage: str | None = None) -> None:
         """Call back with the progress of all realisations; ``stage`` is the name of one that is complete."""
         assert self.callback
-        self.shares[number] = progress.fraction
+        self.fractions[number] = progress.fraction
         n = self.job.n
         with self.lock:
             finished = len(self.finished)
             about = {"realisation": self.job.first + number, "finished": finished, "realisations": n}
-            doing, fraction = f"{finished} of {n} realisations finished", self.shares.sum() / n
+            doing, fraction = f"{finished} of {n} realisations finished", self.fractions.sum() / n
             more: Any = {"stage": stage, "source": None, "explain": None, "details": about}
             self.callback(replace(progress, fraction=fraction, doing=doing, **more))
 

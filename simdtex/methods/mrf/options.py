@@ -356,7 +356,15 @@ class Options:
         None,
         Numbers(2.0**53),
         "Give the categories, in ascending order, these shares of the output",
-        none="the mean of the probabilities; of one variable without these and a guide the training image's shares",
+        none="shares drawn for each realisation of one variable without a guide, see share_spread",
+        shown=("simulate",),
+    )
+    share_spread: float = data(
+        1.0,
+        Number(0, 100),
+        "Vary the shares of categories between realisations by this factor of their deviation in nature",
+        more="In nature, shares deviate as in windows of the training image; data narrow the deviation. With 0, all "
+        "realisations have the shares of the training image, or of the probabilities, given the data.",
         shown=("simulate",),
     )
     data_weight: float = data(

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The shares of categories that a realisation aims at: drawn, since windows of nature differ in their shares.
+
+The variance of a category's share p in a block of v pixels is p (1 - p) A / v, where A is the integral range
+(Lantuejoul, "Ergodicity and integral range", Journal of Microscopy 161, 1991), once v is much larger than A. A training
+image of V pixels is a block itself, so its own share has the variance p (1 - p) A / V. A is measured in windows of the
+image (`integral_range`). The covariance of two pixels at a distance h is taken for p (1 - p) exp(-h / a), whose
+integral is p (1 - p) A; with it, simple block kriging turns data into the mean and the variance of the share
+(`spread`), so that data close together count as few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from simdtex.methods.mrf.plan import MrfPlan
+    from simdtex.model.given import Given
+    from simdtex.model.pictures import Pictures
+
+Floats = NDArray[np.float64]
+
+PARTS = 1 / 4, 3 / 8, 1 / 2
+"""Sides of the windows, in sides of the training image."""
+
+MOST_DATA, MOST_CELLS = 1000, 4096
+"""The most data, and cells of the output, whose covariances are computed: evenly spaced ones of more."""
+
+WIDEST = 0.5
+"""The most variance of a share, in units of p (1 - p)."""
+
+LEAST = 1e-9
+"""The least divisor."""
+
+DIGITS = 6
+"""Decimals of a drawn share, so that the last bit of a platform's functions does not matter."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A Dirichlet distribution of the shares of categories.
+
+    ``mean`` (categories,); ``ratio``, the variance of a share p in units of p (1 - p); and ``data`` (categories,), the
+    share of all cells that are data of each category.
+    """
+
+    mean: Floats
+    ratio: float
+    data: Floats
+
+    def draw(self, seed: int) -> Floats:
+        """Return the shares of the realisation with a seed, (categories,)."""
+        from scipy.special import gammaincinv  # loads slowly
+
+        shares, there = self.mean.copy(), self.mean > 0
+        if self.ratio:
+            words = np.random.SeedSequence(seed, spawn_key=(len(there),)).generate_state(int(there.sum()))
+            shares[there] = gammaincinv(self.mean[there] * (1 / self.ratio - 1), (words + 0.5) / 2**32)
+        shares = np.maximum(shares / shares.sum(), self.data)
+        return np.round(shares / shares.sum(), DIGITS)
+
+    def on(self, plan: MrfPlan, shares: Floats) -> MrfPlan:
+        """Return the plan with these shares as the aim, of the cells without data."""
+        free = np.maximum(shares - self.data, 0)
+        free = free / max(free.sum(), LEAST)
+        if plan.soft is None or plan.soft.categories is None:
+            return replace(plan, options=replace(plan.options, proportions=tuple(free.tolist())))
+        p = plan.soft.categories.copy()
+        there = ~np.isnan(p[0])
+        p[:, there] = with_shares(p[:, there], free)
+        return replace(plan, soft=replace(plan.soft, categories=p))
+
+
+def integral_range(of: Sequence[NDArray[np.intp]], shares: Floats) -> float:
+    """Return the integral range of categories in pixels, 1 or more: the greatest by windows of three sizes.
+
+    ``of`` are the numbers of the categories in each training image, -1 where unknown; ``shares`` are those of all.
+    """
+    pixels, variance, found = sum(int((image >= 0).sum()) for image in of), (shares * (1 - shares)).sum(), [1.0]
+    for part in PARTS:
+        squares = windows = area = 0.0
+        for image in of:
+            sides = [max(1, round(part * n)) for n in image.shape]
+            total = _sums(image >= 0, sides)
+            full = total >= max(1, total.max() / 2)
+            for k, share in enumerate(shares):
+                squares += ((_sums(image == k, sides)[full] / total[full] - share) ** 2).sum()
+            windows, area = windows + full.sum(), area + total[full].sum()
+        if variance and area < pixels * windows:
+            found.append(squares / variance / (windows**2 / area - windows / pixels))
+    return max(found)
+
+
+def _sums(mask: NDArray[np.bool_], sides: Sequence[int]) -> NDArray[np.int64]:
+    """Return the number of True in every window of these sides."""
+    total: Any = mask.astype(np.int64)
+    for axis, side in enumerate(sides):
+        running = np.insert(total.cumsum(axis), 0, 0, axis)
+        n = running.shape[axis]
+        total = running.take(range(side, n), axis) - running.take(range(n - side), axis)
+    return np.asarray(total)
+
+
+def spread(
+    pictures: Pictures, shares: Floats, soft: Floats | None, shape: tuple[int, ...], given: Given | None, factor: float
+) -> Spread:
+    """Return the distribution of the shares of categories in an output, given data.
+
+    ``shares`` are the training images' own, ``soft`` (categories, *shape) probabilities instead of these, ``given`` the
+    data and the cells that take no part, and ``factor`` that of the deviation of all shares.
+    """
+    from scipy.spatial.distance import cdist
+
+    names: Any = pictures.categories(0)
+    of = [np.searchsorted(names, image[..., 0]) for image in pictures.pixels]
+    if pictures.known:
+        of = [np.where(known, numbers, -1) for known, numbers in zip(pictures.known, of, strict=True)]
+    reach, axes = integral_range(of, shares), len(shape)
+    scale = (reach / (2 * pi if axes == 2 else 8 * pi)) ** (1 / axes)
+    unsure = reach / sum(int((image >= 0).sum()) for image in of)  # of the images' shares
+    expected = np.broadcast_to(shares.reshape(-1, *[1] * axes) if soft is None else soft, (len(shares), *shape))
+    cells = ~np.isnan(expected[0])
+    if given and given.outside is not None:
+        cells &= ~given.outside
+    p, data = expected[:, cells], np.zeros(len(shares))
+    ratio, mean, variance = reach / max(1, p.shape[1]) + unsure, p.mean(1), (p * (1 - p)).mean(1).sum()
+    if given and (told := np.argwhere(given.data & cells)).size:
+        indicators = given.values[tuple(told.T)][:, :1] == names
+        data, few = indicators.sum(0) / p.shape[1], _some(np.arange(len(told)), MOST_DATA)
+        excess, near = (indicators - expected[(slice(None), *told.T)].T)[few], told[few]
+        to_cells = np.exp(-cdist(near, _some(np.argwhere(cells), MOST_CELLS)) / scale).mean(1) + unsure
+        weights = np.linalg.solve(np.exp(-cdist(near, near) / scale) + unsure, to_cells)
+        mean, ratio = np.maximum(mean + weights @ excess, 0), max(0.0, ratio - float(weights @ to_cells))
+    mean = np.round(mean / mean.sum(), DIGITS)
+    ratio *= factor**2 * variance / max((mean * (1 - mean)).sum(), LEAST)
+    return Spread(mean, round(min(ratio, WIDEST), 2 * DIGITS), data)
+
+
+def _some(rows: NDArray[Any], most: int) -> NDArray[Any]:
+    """Return evenly spaced rows, ``most`` of more."""
+    return rows[np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(np.intp)]
+
+
+def with_shares(p: Floats, shares: Floats) -> Floats:
+    """Return probabilities (categories, n) whose odds are multiplied so that their means are ``shares``."""
+    factors, some = np.ones((len(p), 1)), _some(p.T, MOST_CELLS).T
+    for _ in range(100):
+        mean = (some * factors / (some * factors).sum(0)).mean(1)
+        factors[:, 0] *= shares / np.maximum(mean, LEAST)
+    scaled: Floats = p * factors
+    return scaled / scaled.sum(0)
