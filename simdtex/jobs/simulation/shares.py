@@ -63,7 +63,7 @@ class Spread:
             words = np.random.SeedSequence(seed, spawn_key=(len(there),)).generate_state(int(there.sum()))
             shares[there] = gammaincinv(self.mean[there] * (1 / self.ratio - 1), (words + 0.5) / 2**32)
         shares = np.maximum(shares / shares.sum(), self.data)
-        return np.round(shares / shares.sum(), DIGITS)
+        return np.asarray(np.round(shares / shares.sum(), DIGITS))
 
     def on(self, plan: MrfPlan, shares: Floats) -> MrfPlan:
         """Return the plan with these shares as the aim, of the cells without data."""
@@ -153,5 +153,5 @@ def with_shares(p: Floats, shares: Floats) -> Floats:
     for _ in range(100):
         mean = (some * factors / (some * factors).sum(0)).mean(1)
         factors[:, 0] *= shares / np.maximum(mean, LEAST)
-    scaled: Floats = p * factors
-    return scaled / scaled.sum(0)
+    scaled = p * factors
+    return np.asarray(scaled / scaled.sum(0))
