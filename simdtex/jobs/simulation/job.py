@@ -141,13 +141,14 @@ def simulate(
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
         cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
-        realisation: `simdtex.synthesize` with it and the ``options`` returns the same map, unless `region` or a later
-        parameter is used.
+        realisation: `simdtex.synthesize` with it, the ``options`` and the shares below as ``proportions`` returns the same
+        map, unless there are data, or `region` or a later parameter is used.
         Attributes, texts and numbers that xarray can write: ``seed``, ``options`` (a JSON text), ``version``,
         ``device``; SHA-256 digests of ``training_image``, ``hard_data``, ``guide``, ``mask`` and the maps from `region`
         to `scale`; with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``; ``units`` and ``long_name`` of
-        a training image of xarray. With `probabilities` or ``proportions``, by default those of the training image if
-        there is one variable and no guide, the shares of all realisations are ``shares_asked`` and ``shares_reached``.
+        a training image of xarray. With one variable of categories and no guide, the coordinates ``share_0``, ... named
+        by the categories are the shares that each realisation aims at (``share_spread``), and ``shares_asked`` and
+        ``shares_reached`` are the means of all realisations, also with ``proportions`` or `probabilities`.
         With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``.
         ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
@@ -213,7 +214,8 @@ def plan_simulation(
     soft = Soft(probabilities, copies.probability if copies else None)
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     spread: Spread | None = None
-    if categories is not None and alone and not (chosen.proportions or guide):
+    asked = probabilities is None or not np.isnan(probabilities).all()
+    if categories is not None and alone and asked and not (chosen.proportions or guide):
         own = (replace(kinds, shares=soft.shares) if copies else kinds).proportions()
         p = probabilities if chosen.soft_weight else None
         spread = shares.spread(chosen.of(pictures), own / own.sum(), p, size, inputs.given, chosen.share_spread)

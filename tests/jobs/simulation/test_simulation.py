@@ -159,16 +159,22 @@ def test_data_on_the_ground(tmp_path):
         simulate(known=path)
 
 
-def test_categories_have_the_shares_of_the_training_image_unless_a_map_or_a_guide_tells_others():
+def test_shares_are_drawn_for_each_realisation_unless_proportions_a_guide_or_variables_tell_others():
     training = np.random.default_rng(1).choice(3, (16, 20), p=(0.6, 0.3, 0.1)).astype(np.uint8)
-    shares = np.bincount(training.ravel())
-    usual, told = (simulate(training, categorical=True, **how) for how in ({}, {"proportions": shares.tolist()}))
-    assert np.array_equal(usual, told) and usual.attrs == told.attrs
-    for how in ({"probabilities": np.full((3, *SHAPE), 1 / 3)}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
-        found = simulate(training, n=1, categorical=True, **how)
-        assert json.loads(found.attrs["options"])["proportions"] is None
+    shares = np.bincount(training.ravel()) / training.size
+    drawn = simulate(training, categorical=True)
+    aims = np.stack([drawn.coords[f"share_{category}"] for category in range(3)], -1)
+    assert np.ptp(aims, 0).min() > 0.005 and aims.sum(-1) == pytest.approx(1)
+    second = simulate(training, n=1, first=1, categorical=True)
+    told = simulate(training, n=1, first=1, categorical=True, proportions=aims[1].tolist())
+    assert (second.values == drawn.values[1]).all() and (told.values == second.values).all()
+    same = simulate(training, categorical=True, share_spread=0)
+    assert same.attrs["shares_asked"] == " ".join(f"{share:.3f}" for share in shares)
+    assert np.ptp(same.share_0) == 0 and np.ptp(same.values, 0).any()
+    for how in ({"proportions": shares}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
+        assert "share_0" not in simulate(training, n=1, categorical=True, **how).coords
     several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
-    assert json.loads(several.attrs["options"])["proportions"] is None
+    assert "share_0" not in several.coords
 
 
 DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")

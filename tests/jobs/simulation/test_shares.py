@@ -1,0 +1,83 @@
+"""Shares of categories that realisations aim at: the integral range, data, the draws, and maps of probabilities."""
+
+import numpy as np
+import pytest
+
+import simdtex
+from simdtex.jobs.simulation.shares import integral_range, spread, with_shares
+from simdtex.model.given import Given
+from simdtex.model.pictures import Pictures
+
+BLOCK = 6
+
+
+def blocks(shape=(240, 240), seed=1):
+    """Return squares of 6 pixels, of category 1 with probability 0.3: their integral range is 36 pixels."""
+    draw = np.random.default_rng(seed).random(tuple(-(-n // BLOCK) for n in shape)) < 0.3
+    return np.kron(draw, np.ones((BLOCK,) * len(shape), bool)).astype(np.uint8)
+
+
+def of_data(data, shape=(96, 96), soft=None, factor=1.0, image=None):
+    """Return the spread of an image of blocks, given data {place: category}."""
+    image = blocks() if image is None else image
+    values, known = np.zeros((*shape, 1), np.uint8), np.zeros((*shape, 1), bool)
+    for place, category in data.items():
+        values[place], known[place] = category, True
+    pictures = Pictures((image[..., None],), categorical=(True,))
+    shares = np.bincount(image.ravel()) / image.size
+    return spread(pictures, shares, soft, shape, Given(values, known) if data else None, factor)
+
+
+def test_integral_range_of_squares_is_their_area():
+    ranges = [integral_range([blocks(seed=seed).astype(np.intp)], np.array([0.7, 0.3])) for seed in range(4)]
+    assert 0.8 * BLOCK**2 < np.mean(ranges) < 1.7 * BLOCK**2  # the greatest of three estimates
+    image = blocks().astype(np.intp)
+    unknown = np.where(np.indices(image.shape)[0] < 60, -1, image)
+    assert integral_range([unknown], np.array([0.7, 0.3])) == pytest.approx(np.mean(ranges), rel=0.5)
+    assert integral_range([np.zeros((1, 1), np.intp)], np.array([1.0])) == 1
+
+
+def test_data_move_the_mean_and_narrow_the_spread_and_close_ones_count_as_few():
+    free = of_data({})
+    expected = (1 / 96**2 + 1 / 240**2) * integral_range([blocks().astype(np.intp)], free.mean)
+    assert free.mean == pytest.approx(np.bincount(blocks().ravel()) / 240**2, abs=1e-6)
+    assert free.ratio == pytest.approx(expected, rel=1e-3)
+    close = of_data({(40 + i, 40 + j): 1 for i in range(3) for j in range(3)})
+    apart = of_data({(16 + 32 * i, 16 + 32 * j): 1 for i in range(3) for j in range(3)})
+    assert free.mean[1] + 0.002 < close.mean[1] < apart.mean[1] - 0.01
+    assert apart.ratio < close.ratio < free.ratio
+    truth = blocks((96, 96), seed=5)
+    known = of_data({tuple(at): truth[tuple(at)] for at in np.argwhere(truth >= 0)[::4]})
+    assert known.mean[1] == pytest.approx(truth.mean(), abs=0.02) and known.ratio < 0.3 * free.ratio
+    assert (known.draw(3) >= known.data).all()
+    assert of_data({}, factor=0.5).ratio == pytest.approx(free.ratio / 4, rel=1e-6)
+
+
+def test_draws_have_the_mean_and_the_deviation_and_depend_on_the_seed_alone():
+    found = of_data({})
+    draws = np.stack([found.draw(seed) for seed in range(2000)])
+    assert draws.mean(0) == pytest.approx(found.mean, abs=0.003)
+    assert draws.std(0) == pytest.approx(np.sqrt(found.ratio * found.mean * (1 - found.mean)), rel=0.06)
+    assert found.draw(7).tolist() == [0.687376, 0.312624]
+
+
+def test_a_map_of_probabilities_keeps_its_pattern_with_other_shares():
+    p = np.random.default_rng(1).dirichlet((2, 1, 1), 500).T
+    p[:, 0], p[:, 1] = (1, 0, 0), (0, 0.5, 0.5)
+    scaled = with_shares(p, np.array([0.3, 0.3, 0.4]))
+    assert scaled.mean(1) == pytest.approx([0.3, 0.3, 0.4], abs=1e-6) and scaled.sum(0) == pytest.approx(1)
+    assert scaled[:, 0].tolist() == [1, 0, 0] and scaled[0, 1] == 0
+    odds = (scaled[1, 2:] / scaled[2, 2:]) / (p[1, 2:] / p[2, 2:])
+    assert np.ptp(odds) < 1e-9 * odds.mean()
+
+
+def test_realisations_reach_the_shares_that_they_aim_at():
+    training, wells = blocks((96, 96)), np.ma.masked_all((64, 64), np.uint8)
+    wells[4::12, 4::12] = 1  # where the image has 0.3
+    made = simdtex.simulate(training, 6, shape=(64, 64), categorical=True, rng=1)
+    told = simdtex.simulate(training, 6, shape=(64, 64), known=wells, categorical=True, rng=1)
+    soft = np.stack([np.full((64, 64), 0.4), np.full((64, 64), 0.6)])
+    mapped = simdtex.simulate(training, 6, shape=(64, 64), probabilities=soft, categorical=True, rng=1)
+    for found, least, most in ((made, 0.2, 0.4), (told, 0.4, 0.7), (mapped, 0.5, 0.7)):
+        assert least < found.share_1.mean() < most
+        assert found.mean(("y", "x")).values == pytest.approx(found.share_1.values, abs=0.04)
