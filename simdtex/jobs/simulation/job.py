@@ -141,8 +141,8 @@ def simulate(
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
         cells; for a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each
-        realisation: `simdtex.synthesize` with it, the ``options`` and the shares below as ``proportions`` returns the same
-        map, unless there are data, or `region` or a later parameter is used.
+        realisation: `simdtex.synthesize` with it, the ``options`` and the shares below as ``proportions`` returns the
+        same map, unless there are data, or `region` or a later parameter is used.
         Attributes, texts and numbers that xarray can write: ``seed``, ``options`` (a JSON text), ``version``,
         ``device``; SHA-256 digests of ``training_image``, ``hard_data``, ``guide``, ``mask`` and the maps from `region`
         to `scale`; with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``; ``units`` and ``long_name`` of
