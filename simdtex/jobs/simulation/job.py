@@ -212,7 +212,7 @@ def plan_simulation(
     soft = Soft(probabilities, copies.probability if copies else None)
     told = chosen.proportions or guide or probabilities is not None
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
-    if categories is not None and alone and not told:
+    if (categories is not None or chosen.scores) and alone and not told:
         images = replace(kinds, shares=soft.shares) if copies else kinds
         chosen = replace(chosen, proportions=tuple(images.proportions().tolist()))
     shas = digests(pictures, inputs.given)
