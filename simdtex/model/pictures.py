@@ -19,6 +19,12 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 
+PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
+"""The quantiles that end the classes of values that are no categories; large values, which decide a mean, have more."""
+
+SPIKE = 0.05
+"""The least share of a value that is a class of its own."""
+
 CATEGORIES = 16
 """Different pixels up to which a sample is taken for a map of categories."""
 
@@ -37,6 +43,7 @@ class Pictures:
     categorical: tuple[bool, ...] | None = None  # whether the numbers of a variable name categories; None: none do
     weights: tuple[float, ...] | None = None  # of variables, scaled to one spread; None: on one scale, as colours
     shares: tuple[float, ...] | None = None  # of the output, for each picture; None: all pixels have equal weights
+    scores: bool = False  # whether values that are no categories are compared by their normal scores
     known: tuple[Mask, ...] | None = field(init=False)
 
     def __post_init__(self) -> None:
@@ -69,11 +76,25 @@ class Pictures:
             return None
         return np.unique(np.concatenate([self.values(variable, picture) for picture in range(len(self.pixels))]))
 
+    def classes(self) -> NDArray[Any]:
+        """Return the greatest value of each class of the first variable, in ascending order.
+
+        A class is a category; of other values, a part (`PARTS`) of all. A value of a large share (`SPIKE`) is alone.
+        """
+        names = self.categories(0)
+        if names is not None:
+            return names
+        every = np.concatenate([self.values(0, picture) for picture in range(len(self.pixels))])
+        values, counts = np.unique(every, return_counts=True)
+        ends = np.searchsorted(counts.cumsum(), every.size * np.array(PARTS))
+        alone = np.flatnonzero(counts >= SPIKE * every.size)
+        return np.asarray(values[np.unique(np.concatenate([ends, alone, alone[alone > 0] - 1]))])
+
     def proportions(self) -> NDArray[np.number[Any]]:
-        """Return the proportions of the categories of the first variable, by the shares of the pictures."""
-        names, numbers = self.categories(0), range(len(self.pixels))
-        assert names is not None
-        counts = np.array([[np.count_nonzero(self.values(0, n) == name) for name in names] for n in numbers])
+        """Return the proportions of the classes of the first variable, by the shares of the pictures."""
+        classes, numbers = self.classes(), range(len(self.pixels))
+        of = [np.searchsorted(classes, self.values(0, n)) for n in numbers]
+        counts = np.array([np.bincount(each, minlength=len(classes)) for each in of])
         each = counts / counts.sum(1, keepdims=True)
         return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
 

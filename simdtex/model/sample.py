@@ -333,6 +333,18 @@ class Sample:
         categories = self.pictures.categories(0)
         return len(categories) if categories is not None and len(categories) > 2 else 0
 
+    def change(self, spacing: int) -> float:
+        """Return the mean squared difference of pixels so far apart, in units of the pixels' variance, at most 1."""
+        squares = pairs = 0
+        for levels in self.levels:
+            made = levels[: self.shown].astype(np.int64)
+            for axis in range(1, made.ndim):
+                along = made.swapaxes(0, axis)
+                apart = along[spacing:] - along[:-spacing]
+                squares, pairs = squares + int((apart * apart).sum()), pairs + apart.size
+        spread = variance(*(levels[: self.shown] for levels in self.levels))
+        return min(1.0, squares / max(1, pairs) / spread) if squares else 1.0
+
     def planes(self, machine: Any) -> Any:
         """Return the working levels on a machine, (C, rows * cols) float32."""
         return machine.put(self.working.astype(np.float32))
@@ -404,11 +416,14 @@ class Sample:
         pixels: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return pixels
 
+    @cached_property
+    def classes(self) -> NDArray[Any]:
+        """The greatest value of each class of the first variable (`simdtex.model.pictures.Pictures.classes`)."""
+        return self.pictures.classes()
+
     def category(self, source: NDArray[Any]) -> NDArray[np.intp]:
-        """Return the number of the category of the first variable of pixels (n,), in ascending order."""
-        categories = self.pictures.categories(0)
-        assert categories is not None
-        return np.searchsorted(categories, self.own(source)[:, 0])
+        """Return the number of the class of the first variable of pixels (n,), for example its category."""
+        return np.searchsorted(self.classes, self.own(source)[:, 0])
 
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""

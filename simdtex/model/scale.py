@@ -26,6 +26,9 @@ from simdtex.model.pictures import Pictures
 EXACT = 12
 """The most bits of a working level."""
 
+SCORES = 1024
+"""Steps of a normal score in a standard deviation."""
+
 
 class Scale:
     """The map from the pixels of a sample to working levels, for neighbourhoods of so many ``values``.
@@ -37,7 +40,7 @@ class Scale:
     def __init__(self, pictures: Pictures, values: int) -> None:
         pixels, self.unit = pictures.pixels, 1.0
         self._channels = variables = pixels[0].shape[-1]
-        self.direct = not (pictures.weights or (pictures.categorical and any(pictures.categorical)))
+        self.direct = not (pictures.weights or pictures.scores or (pictures.categorical and any(pictures.categorical)))
         eight = all(picture.dtype in (np.bool_, np.uint8) for picture in pixels)
         self.top = 255 if eight and self.direct else highest(values)
         self._variables: list[_Stretched | _Categories] = []
@@ -46,7 +49,8 @@ class Scale:
             for variable in range(variables):
                 categories = pictures.categories(variable)
                 here = np.concatenate([pictures.values(variable, picture) for picture in range(len(pixels))])
-                self._variables.append(_Stretched(here, self.top) if categories is None else _Categories(here))
+                continuous = _Scores if pictures.scores else _Stretched
+                self._variables.append(continuous(here, self.top) if categories is None else _Categories(here))
             weights = pictures.weights or (1.0,) * variables
             most = max(w * kind.steepness for w, kind in zip(weights, self._variables, strict=True))
             for weight, kind in zip(weights, self._variables, strict=True):
@@ -116,6 +120,27 @@ class _Stretched:
             return np.zeros((1, *plane.shape), np.int64)
         levels: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
         return levels
+
+
+class _Scores(_Stretched):
+    """A variable by its normal scores: normal quantiles of its ranks. Equal values have their mean rank."""
+
+    def __init__(self, values: NDArray[Any], top: int) -> None:
+        from scipy.special import ndtri  # only for a simulation, since it loads slowly
+
+        known, counts = np.unique(values, return_counts=True)
+        self._known = known.astype(np.float64)
+        below = (counts.cumsum() - counts / 2) / values.size
+        self._scores = np.rint(ndtri(below) * SCORES)  # rounded, so that the last bit of a logarithm does not matter
+        super().__init__(self.scores(values), top)
+
+    def scores(self, pixels: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the scores of values; between two known values they are interpolated."""
+        return np.interp(pixels.astype(np.float64), self._known, self._scores)
+
+    def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
+        """Return the one channel of the variable."""
+        return super().levels(self.scores(plane))
 
 
 class _Categories:

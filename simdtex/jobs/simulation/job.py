@@ -146,9 +146,10 @@ def simulate(
         Attributes, texts and numbers that xarray can write: ``seed``, ``options`` (a JSON text), ``version``,
         ``device``; SHA-256 digests of ``training_image``, ``hard_data``, ``guide``, ``mask`` and the maps from `region`
         to `scale`; with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``; ``units`` and ``long_name`` of
-        a training image of xarray. With one variable of categories and no guide, the coordinates ``share_0``, ... named
-        by the categories are the shares that each realisation aims at (``share_spread``), and ``shares_asked`` and
-        ``shares_reached`` are the means of all realisations, also with ``proportions`` or `probabilities`.
+        a training image of xarray. With one variable and no guide, the coordinates ``share_0``, ... named by the
+        categories, or by the greatest values of classes of values, are the shares that each realisation aims at
+        (``share_spread``). ``shares_asked`` and ``shares_reached`` are the means of all realisations, also with
+        ``proportions`` or `probabilities`.
         With `region` there is a coordinate ``region`` (y, x) and, unless values are floats, the attribute ``missing``.
         ``plot(number=8)`` draws the first realisations.
     xarray.Dataset
@@ -215,7 +216,7 @@ def plan_simulation(
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     spread: Spread | None = None
     asked = probabilities is None or not np.isnan(probabilities).all()
-    if categories is not None and alone and asked and not (chosen.proportions or guide):
+    if (categories is not None or chosen.scores) and alone and asked and not (chosen.proportions or guide):
         own = (replace(kinds, shares=soft.shares) if copies else kinds).proportions()
         p = probabilities if chosen.soft_weight else None
         spread = shares.spread(chosen.of(pictures), own / own.sum(), p, size, inputs.given, chosen.share_spread)
@@ -291,11 +292,12 @@ class Simulation:
         return batch.values, Output(batch.sources, statistics=statistics)
 
     def shares(self, batch: Batch) -> dict[str, str]:
-        """Return the shares of categories that were asked and those that were reached, as attributes."""
-        kinds, categories = batch.plan.kinds, self.options.of(self.training).categories(0)
-        if categories is None or not (self.spread or (kinds and kinds.categories is not None)):
+        """Return the shares of categories, or of classes of values, that were asked and reached, as attributes."""
+        kinds = batch.plan.kinds
+        if not (self.spread or (kinds and kinds.categories is not None)):
             return {}
-        p = np.ones((len(categories), *self.shape))
+        classes = self.options.of(self.training).classes()
+        p = np.ones((len(classes), *self.shape))
         if kinds and kinds.categories is not None:
             p *= kinds.categories
         there = ~np.isnan(p[0])
@@ -305,7 +307,7 @@ class Simulation:
         if not made.size:
             return {}
         asked = np.array(self.options.proportions or p[:, there].sum(1)) if batch.aims is None else batch.aims.sum(0)
-        reached = np.array([(made == category).sum() for category in categories])
+        reached = np.bincount(np.searchsorted(classes, made).ravel(), minlength=len(classes))[: len(classes)]
         both = {"shares_asked": asked, "shares_reached": reached}
         return {name: " ".join(f"{share:.3f}" for share in those / those.sum()) for name, those in both.items()}
 
@@ -320,9 +322,8 @@ class Simulation:
         seeds = np.array([realisation_seed(seed, n) for n in numbers], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
         if self.spread:
-            names: Any = self.options.of(self.training).categories(0)
-            aims = zip(names, output.statistics["aims"].T, strict=True)
-            coordinates |= {f"share_{name}": ("realisation", column) for name, column in aims}
+            aims = zip(self.options.of(self.training).classes(), output.statistics["aims"].T, strict=True)
+            coordinates |= {f"share_{name:g}": ("realisation", column) for name, column in aims}
         attributes = {"seed": seed, "version": version("simdtex"), "device": device}
         attributes["options"] = json.dumps(
             vars(self.options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)

@@ -44,24 +44,30 @@ DIGITS = 6
 
 @dataclass(frozen=True)
 class Spread:
-    """A Dirichlet distribution of the shares of categories.
+    """The distribution of the shares of classes: Dirichlet of categories, of values that of a mean normal score.
 
-    ``mean`` (categories,); ``ratio``, the variance of a share p in units of p (1 - p); and ``data`` (categories,), the
-    share of all cells that are data of each category.
+    ``mean`` are the mean shares of categories (classes,), or the mean score (1,); ``ratio`` is the variance of a share p
+    in units of p (1 - p), or that of the mean score; ``data`` (classes,) is the share of all cells that are data of
+    each class; and ``bounds`` (classes - 1,), of values alone, are the scores between classes. The unit of scores is
+    their deviation within an output.
     """
 
     mean: Floats
     ratio: float
     data: Floats
+    bounds: Floats | None
 
     def draw(self, seed: int) -> Floats:
-        """Return the shares of the realisation with a seed, (categories,)."""
-        from scipy.special import gammaincinv  # loads slowly
+        """Return the shares of the realisation with a seed, (classes,)."""
+        from scipy.special import gammaincinv, ndtr, ndtri  # loads slowly
 
-        shares, there = self.mean.copy(), self.mean > 0
-        if self.ratio:
-            words = np.random.SeedSequence(seed, spawn_key=(len(there),)).generate_state(int(there.sum()))
-            shares[there] = gammaincinv(self.mean[there] * (1 / self.ratio - 1), (words + 0.5) / 2**32)
+        words = np.random.SeedSequence(seed, spawn_key=(len(self.data),)).generate_state(len(self.mean))
+        shares, there, uniform = self.mean.copy(), self.mean > 0, (words + 0.5) / 2**32
+        if self.bounds is not None:
+            middle = self.mean + np.sqrt(self.ratio) * ndtri(uniform)
+            shares = np.diff(ndtr(self.bounds - middle), prepend=0, append=1)
+        elif self.ratio:
+            shares[there] = gammaincinv(self.mean[there] * (1 / self.ratio - 1), uniform[there])
         shares = np.maximum(shares / shares.sum(), self.data)
         return np.asarray(np.round(shares / shares.sum(), DIGITS))
 
@@ -77,29 +83,31 @@ class Spread:
         return replace(plan, soft=replace(plan.soft, categories=p))
 
 
-def integral_range(of: Sequence[NDArray[np.intp]], shares: Floats) -> float:
-    """Return the integral range of categories in pixels, 1 or more: the greatest by windows of three sizes.
+def integral_range(of: Sequence[NDArray[np.intp]], shares: Floats, codes: Floats) -> float:
+    """Return the integral range of classes in pixels, 1 or more: the greatest by windows of three sizes.
 
-    ``of`` are the numbers of the categories in each training image, -1 where unknown; ``shares`` are those of all.
+    ``of`` are the numbers of the classes in each training image, -1 where unknown; ``shares`` are those of all; and
+    ``codes`` (classes, n) are the numbers that stand for a class: its indicators, or its score.
     """
-    pixels, variance, found = sum(int((image >= 0).sum()) for image in of), (shares * (1 - shares)).sum(), [1.0]
+    pixels, mean, found = sum(int((image >= 0).sum()) for image in of), shares @ codes, [1.0]
+    variance = (shares @ codes**2 - mean**2).sum()
     for part in PARTS:
         squares = windows = area = 0.0
         for image in of:
             sides = [max(1, round(part * n)) for n in image.shape]
             total = _sums(image >= 0, sides)
             full = total >= max(1, total.max() / 2)
-            for k, share in enumerate(shares):
-                squares += ((_sums(image == k, sides)[full] / total[full] - share) ** 2).sum()
+            for code, middle in zip(codes.T, mean, strict=True):
+                squares += ((_sums(np.append(code, 0)[image], sides)[full] / total[full] - middle) ** 2).sum()
             windows, area = windows + full.sum(), area + total[full].sum()
         if variance and area < pixels * windows:
             found.append(squares / variance / (windows**2 / area - windows / pixels))
     return max(found)
 
 
-def _sums(mask: NDArray[np.bool_], sides: Sequence[int]) -> NDArray[np.int64]:
-    """Return the number of True in every window of these sides."""
-    total: Any = mask.astype(np.int64)
+def _sums(array: NDArray[Any], sides: Sequence[int]) -> Floats:
+    """Return the sum of every window of these sides."""
+    total: Any = array.astype(np.float64)
     for axis, side in enumerate(sides):
         running = np.insert(total.cumsum(axis), 0, 0, axis)
         n = running.shape[axis]
@@ -110,18 +118,20 @@ def _sums(mask: NDArray[np.bool_], sides: Sequence[int]) -> NDArray[np.int64]:
 def spread(
     pictures: Pictures, shares: Floats, soft: Floats | None, shape: tuple[int, ...], given: Given | None, factor: float
 ) -> Spread:
-    """Return the distribution of the shares of categories in an output, given data.
+    """Return the distribution of the shares of classes in an output, given data.
 
     ``shares`` are the training images' own, ``soft`` (categories, *shape) probabilities instead of these, ``given`` the
     data and the cells that take no part, and ``factor`` that of the deviation of all shares.
     """
     from scipy.spatial.distance import cdist
+    from scipy.special import ndtri
 
-    names: Any = pictures.categories(0)
-    of = [np.searchsorted(names, image[..., 0]) for image in pictures.pixels]
+    classes, named, below = pictures.classes(), pictures.categories(0) is not None, shares.cumsum()
+    codes = np.eye(len(classes)) if named else ndtri(below - shares / 2)[:, None]
+    of = [np.searchsorted(classes, image[..., 0]) for image in pictures.pixels]
     if pictures.known:
         of = [np.where(known, numbers, -1) for known, numbers in zip(pictures.known, of, strict=True)]
-    reach, axes = integral_range(of, shares), len(shape)
+    reach, axes = integral_range(of, shares, codes), len(shape)
     scale = (reach / (2 * pi if axes == 2 else 8 * pi)) ** (1 / axes)
     unsure = reach / sum(int((image >= 0).sum()) for image in of)  # of the images' shares
     expected = np.broadcast_to(shares.reshape(-1, *[1] * axes) if soft is None else soft, (len(shares), *shape))
@@ -129,17 +139,22 @@ def spread(
     if given and given.outside is not None:
         cells &= ~given.outside
     p, data = expected[:, cells], np.zeros(len(shares))
-    ratio, mean, variance = reach / max(1, p.shape[1]) + unsure, p.mean(1), (p * (1 - p)).mean(1).sum()
+    ratio, mean = reach / max(1, p.shape[1]) + unsure, codes.T @ p.mean(1)
+    within = 1 - min(factor**2 * ratio, WIDEST)
     if given and (told := np.argwhere(given.data & cells)).size:
-        indicators = given.values[tuple(told.T)][:, :1] == names
-        data, few = indicators.sum(0) / p.shape[1], _some(np.arange(len(told)), MOST_DATA)
-        excess, near = (indicators - expected[(slice(None), *told.T)].T)[few], told[few]
+        its = np.minimum(np.searchsorted(classes, given.values[tuple(told.T)][:, 0]), len(classes) - 1)
+        data, few = np.bincount(its, minlength=len(classes)) / p.shape[1], _some(np.arange(len(told)), MOST_DATA)
+        excess, near = (codes[its] - expected[(slice(None), *told.T)].T @ codes)[few], told[few]
         to_cells = np.exp(-cdist(near, _some(np.argwhere(cells), MOST_CELLS)) / scale).mean(1) + unsure
         weights = np.linalg.solve(np.exp(-cdist(near, near) / scale) + unsure, to_cells)
-        mean, ratio = np.maximum(mean + weights @ excess, 0), max(0.0, ratio - float(weights @ to_cells))
-    mean = np.round(mean / mean.sum(), DIGITS)
-    ratio *= factor**2 * variance / max((mean * (1 - mean)).sum(), LEAST)
-    return Spread(mean, round(min(ratio, WIDEST), 2 * DIGITS), data)
+        mean, ratio = mean + weights @ excess, max(0.0, ratio - float(weights @ to_cells))
+    if named:
+        mean = np.maximum(mean, 0) / np.maximum(mean, 0).sum()
+        ratio *= (p * (1 - p)).mean(1).sum() / max((mean * (1 - mean)).sum(), LEAST)
+    ratio = min(factor**2 * ratio, WIDEST)
+    if named:
+        return Spread(np.round(mean, DIGITS), round(ratio, 2 * DIGITS), data, None)
+    return Spread(mean / np.sqrt(within), ratio / within, data, ndtri(below[:-1]) / np.sqrt(within))
 
 
 def _some(rows: NDArray[Any], most: int) -> NDArray[Any]:

@@ -49,8 +49,9 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN = STEPS // 4
-"""The most steps by which the penalty of a category changes after a sweep of the coarsest level; twice that below."""
+GAIN, GAIN_OF_VALUES = STEPS // 4, STEPS // 20
+"""The most steps by which the penalty of a category, or of a class of values, changes after a sweep of the coarsest
+level; twice that below."""
 
 ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
@@ -205,7 +206,9 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, level)
-        return Level(setting, self.plan.schedule, relaxation, self.rate, self.fair_use(level), self.regions)
+        rate, unit = self.rate * self.change(level), np.float32(self.typical_distance * self.change(level) / STEPS)
+        regions = self.regions and replace(self.regions, unit=unit)
+        return Level(setting, self.plan.schedule, relaxation, rate, self.fair_use(level), regions)
 
     def choice(self, level: int) -> SiteChoice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
@@ -319,6 +322,10 @@ class Lattices:
         """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
         return 0.0 if self.coarser else self.options.balance * self.typical_distance
 
+    def change(self, level: int) -> float:
+        """Return the factor of penalties: with scores less at fine levels, where neighbours differ less, else 1."""
+        return self.sample.change(self.spacing(level)) if self.sample.pictures.scores else 1.0
+
     def free_sweeps(self, level: int) -> int:
         """Return the number of free sweeps of a level."""
         kept = self.options.free_sites == "kept"
@@ -340,7 +347,8 @@ class Lattices:
         places = self.places(level)
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(level)
-        gain = GAIN if level == self.levels - 1 else 2 * GAIN
+        gain = GAIN if self.sample.pictures.categories(0) is not None else GAIN_OF_VALUES
+        gain = gain if level == self.levels - 1 else 2 * gain
         asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(level)), "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 

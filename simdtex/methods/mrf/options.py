@@ -345,6 +345,15 @@ class Options:
         none="channels that are not categories keep one scale, as colours do",
         shown=("fill", "extend", "simulate"),
     )
+    scores: bool = data(
+        False,
+        Switch(),
+        "Compare values that are no categories by their normal scores, the quantiles of a normal distribution that "
+        "have their ranks",
+        jobs={"simulate": True},
+        paper=False,
+        shown=(),
+    )
     shares: tuple[float, ...] | None = data(
         None,
         Numbers(2.0**53),
@@ -432,7 +441,8 @@ class Options:
             raise ValueError(f"there are {len(self.weights)} weights and {variables} variables; give one for each")
         if self.shares and len(self.shares) != count:
             raise ValueError(f"there are {len(self.shares)} shares and {count} samples; give one for each")
-        return replace(pictures, categorical=kinds, weights=self.weights, shares=self.shares)
+        scores = self.scores and not all(kinds or (False,))
+        return replace(pictures, categorical=kinds, weights=self.weights, shares=self.shares, scores=scores)
 
     def resolved(self, pictures: Pictures) -> Options:
         """Return the options as they are executed: what ``auto`` and None mean for a sample.

@@ -245,13 +245,14 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
     if proportions:
-        categories = pictures.categories(0)
-        if categories is None or pictures.pixels[0].shape[-1] > 1:
-            raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
-        if len(categories) != len(proportions):
+        classes = pictures.classes()
+        if pictures.pixels[0].shape[-1] > 1:
+            raise ValueError("proportions are of one variable; leave them out")
+        if len(classes) != len(proportions):
+            names = "categories," if pictures.categories(0) is not None else "classes of values up to"
             raise ValueError(
-                f"there are {len(proportions)} proportions and {len(categories)} categories, {_listed(categories)}; "
-                "give one for each"
+                f"there are {len(proportions)} proportions and {len(classes)} {names} {_listed(classes)}; give one for "
+                "each"
             )
 
 

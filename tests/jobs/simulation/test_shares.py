@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
 import simdtex
 from simdtex.jobs.simulation.shares import integral_range, spread, with_shares
@@ -9,6 +10,7 @@ from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 
 BLOCK = 6
+OF_BLOCKS = np.array([0.7, 0.3]), np.eye(2)
 
 
 def blocks(shape=(240, 240), seed=1):
@@ -29,17 +31,17 @@ def of_data(data, shape=(96, 96), soft=None, factor=1.0, image=None):
 
 
 def test_integral_range_of_squares_is_their_area():
-    ranges = [integral_range([blocks(seed=seed).astype(np.intp)], np.array([0.7, 0.3])) for seed in range(4)]
+    ranges = [integral_range([blocks(seed=seed).astype(np.intp)], *OF_BLOCKS) for seed in range(4)]
     assert 0.8 * BLOCK**2 < np.mean(ranges) < 1.7 * BLOCK**2  # the greatest of three estimates
     image = blocks().astype(np.intp)
     unknown = np.where(np.indices(image.shape)[0] < 60, -1, image)
-    assert integral_range([unknown], np.array([0.7, 0.3])) == pytest.approx(np.mean(ranges), rel=0.5)
-    assert integral_range([np.zeros((1, 1), np.intp)], np.array([1.0])) == 1
+    assert integral_range([unknown], *OF_BLOCKS) == pytest.approx(np.mean(ranges), rel=0.5)
+    assert integral_range([np.zeros((1, 1), np.intp)], np.ones(1), np.eye(1)) == 1
 
 
 def test_data_move_the_mean_and_narrow_the_spread_and_close_ones_count_as_few():
     free = of_data({})
-    expected = (1 / 96**2 + 1 / 240**2) * integral_range([blocks().astype(np.intp)], free.mean)
+    expected = (1 / 96**2 + 1 / 240**2) * integral_range([blocks().astype(np.intp)], free.mean, np.eye(2))
     assert free.mean == pytest.approx(np.bincount(blocks().ravel()) / 240**2, abs=1e-6)
     assert free.ratio == pytest.approx(expected, rel=1e-3)
     close = of_data({(40 + i, 40 + j): 1 for i in range(3) for j in range(3)})
@@ -59,6 +61,18 @@ def test_draws_have_the_mean_and_the_deviation_and_depend_on_the_seed_alone():
     assert draws.mean(0) == pytest.approx(found.mean, abs=0.003)
     assert draws.std(0) == pytest.approx(np.sqrt(found.ratio * found.mean * (1 - found.mean)), rel=0.06)
     assert found.draw(7).tolist() == [0.687376, 0.312624]
+
+
+def test_values_draw_a_mean_score_and_keep_the_histogram_of_the_image():
+    field = np.kron(np.random.default_rng(1).gamma(1, 1, (40, 40)), np.ones((BLOCK, BLOCK)))
+    pictures = Pictures((field[..., None],), scores=True)
+    shares = pictures.proportions() / field.size
+    found = spread(pictures, shares, None, (96, 96), None, 1.0)
+    draws = np.stack([found.draw(seed) for seed in range(1000)])
+    assert draws.mean(0) == pytest.approx(shares, abs=0.003)
+    score = draws @ ndtri(shares.cumsum() - shares / 2)  # of squares of 6 pixels
+    assert score.std() == pytest.approx(np.sqrt(BLOCK**2 * (1 / 96**2 + 1 / 240**2)), rel=0.3)
+    assert np.corrcoef(draws[:, 0], draws[:, 1])[0, 1] > 0.8 and np.corrcoef(draws[:, 0], draws[:, -1])[0, 1] < -0.8
 
 
 def test_a_map_of_probabilities_keeps_its_pattern_with_other_shares():

@@ -171,7 +171,7 @@ def test_shares_are_drawn_for_each_realisation_unless_proportions_a_guide_or_var
     same = simulate(training, categorical=True, share_spread=0)
     assert same.attrs["shares_asked"] == " ".join(f"{share:.3f}" for share in shares)
     assert np.ptp(same.share_0.values) == 0 and np.ptp(same.values, 0).any()
-    for how in ({"proportions": shares}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
+    for how in ({"proportions": shares.tolist()}, {"guide": (training, np.zeros(SHAPE, np.uint8))}):
         assert "share_0" not in simulate(training, n=1, categorical=True, **how).coords
     several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
     assert "share_0" not in several.coords
