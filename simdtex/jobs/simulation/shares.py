@@ -44,10 +44,10 @@ DIGITS = 6
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of the shares of classes: Dirichlet of categories, of values that of a mean normal score.
+    """The distribution of the shares of classes: Dirichlet for categories, for values that of their mean normal score.
 
-    ``mean`` are the mean shares of categories (classes,), or the mean score (1,); ``ratio`` is the variance of a share p
-    in units of p (1 - p), or that of the mean score; ``data`` (classes,) is the share of all cells that are data of
+    ``mean`` are the mean shares of categories (classes,), or the mean score (1,); ``ratio`` is the variance of a share
+    p in units of p (1 - p), or that of the mean score; ``data`` (classes,) is the share of all cells that are data of
     each class; and ``bounds`` (classes - 1,), of values alone, are the scores between classes. The unit of scores is
     their deviation within an output.
     """
