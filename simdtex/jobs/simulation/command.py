@@ -242,11 +242,13 @@ def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: An
 
 def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict[str, Any]:
     """Return the mask, the data and the place of an output, whose options are taken out."""
+    from simdtex.io.hard_data import read_hard_data
+
     mask, path, like = (options.pop(name) for name in ("sample_mask", "known", "like"))
-    at, of_points = options["at"], how._replace(columns={**(how.columns or {}), "value": []})
     data = {"mask": read_masks(mask, material, how), "like": None}
     data["known"], _ = read_known(path, material, how, options["origin"], like)
-    data["at"] = read_table(at[0][0], material, of_points, options["origin"], like) if at else []
+    columns: Any = {**(how.columns or {}), "value": []}
+    data["at"] = read_hard_data(options["at"][0][0], columns=columns) if options["at"] else []
     if like:
         pixels, _, grid = read_pixels(like, how._replace(variables=()))
         if grid is None or not grid.frame.told:
@@ -303,9 +305,11 @@ def check_cells(
         if isinstance(table, HardData) and table.from_top:
             cells.given[name] = table.upside_down(cells.size[-2], frame)
     if at:
-        (path, *more), out = at
-        if more or (points := cells.given["at"]) is None or out.suffix.lower() != ".csv":
-            raise ValueError(f"--at {path}={out} is not one table of x and y and the name of a new one; end it in .csv")
+        points, (paths, out) = cells.given["at"], at
+        if len(paths) > 1 or out.suffix.lower() != ".csv":
+            raise ValueError(
+                f"--at writes {out}, from {len(paths)} tables; give one table, and a name that ends in .csv"
+            )
         check_target(out)
         sites, inside = sites_of(points, cells.size, lies.get("outside") == "skip", *(frame or ()))
         cells.given["at"] = [lambda made, _: write_at(out, made, points.points[inside], sites)]

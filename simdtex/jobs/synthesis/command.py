@@ -76,8 +76,8 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     """Synthesise a picture of any size with the texture of SAMPLE.
 
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
-    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`. With --known and --categorical the
-    defaults are those of `simdtex simulate`, and the output does not tile unless --boundary is torus.
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`. Categories with --known have the
+    defaults of `simdtex simulate`: the output tiles with --boundary torus alone.
     """
     from simdtex.io.decode import NOTHING
     from simdtex.io.hard_data import HardData

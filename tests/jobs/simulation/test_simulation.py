@@ -53,6 +53,11 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
         own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, order=2, device="reference", **OWN)
         assert_same_bits(values, own)
         assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
+    how = {"known": np.where(np.isnan(data), np.nan, CATEGORIES[:12, :14]), "categorical": True} | QUICK
+    found = simdtex.simulate(CATEGORIES, 1, **how)
+    del how["jobs"]
+    own = simdtex.synthesize(CATEGORIES, SHAPE, **how | {"rng": int(found.seed[0])})
+    assert_same_bits(found.values[0], own)  # which has the defaults of a simulation then
 
 
 def test_seeds_are_apart_and_stay_what_they_are():
