@@ -498,16 +498,14 @@ def sites_of(
     elif not inside.all():
         row = int(inside.argmin())
         there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
-        least, most = np.fmin.reduce(data.points), np.fmax.reduce(data.points)
-        cover, reach = (
-            ", ".join(f"{axis} {a:.12g} to {b:.12g}" for axis, a, b in zip("xyz", *ends, strict=False))
-            for ends in ((at - size / 2, at + (np.array(sides) - 0.5) * size), (least, most))
-        )
+        ends = at - size / 2, at + (np.array(sides) - 0.5) * size
+        reach = np.fmin.reduce(data.points), np.fmax.reduce(data.points)
+        ranges = map("{} {:.12g} to {:.12g} (all points {:.12g} to {:.12g})".format, "xyz", *ends, *reach)
         raise ValueError(
             f"{data.where(row)} of {data.name} is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
-            f"pixels (width x height{' x depth' * (len(sides) > 2)}) from {cover}; all points are from {reach}: give "
-            "origin=(x, y) (--origin X,Y), the centre of the first cell, and cell=(dx, dy) (--cell DX,DY), its size, "
-            'in these units, or leave such points out with outside="skip" (--outside skip)'
+            f"pixels (width x height{' x depth' * (len(sides) > 2)}), {', '.join(ranges)}: give origin=(x, y) "
+            "(--origin X,Y), the centre of the first cell, and cell=(dx, dy) (--cell DX,DY), its size, in these units, "
+            'or leave such points out with outside="skip" (--outside skip)'
         )
     return np.ravel_multi_index(tuple(nearest[inside].T.astype(np.intp)), sides, order="F"), inside
 

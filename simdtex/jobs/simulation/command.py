@@ -99,8 +99,7 @@ CELL_OPTIONS = together(
         group=OUTPUTS,
         type=WRITE_PAIR,
         metavar="POINTS=TABLE",
-        help="Write the values at the points of this table of x and y into TABLE, a .csv with a column for each "
-        "realisation or map.",
+        help="Write the values at the points of this table of x and y into TABLE, a .csv with a column for each map.",
     ),
 )
 """The data, and where the cells of an output lie."""
@@ -289,7 +288,6 @@ def check_cells(
     from simdtex.io.volume import check_realisations_path, write_at
     from simdtex.jobs.simulation.maps import plan_cells
 
-    at = options.pop("at")
     shape = None if size is None else output_shape(size, material.pixels[0], axes=2 + material.deep)
     lies = given({name: options.pop(name) for name in ("origin", "cell", "several", "outside")})
     training = material.array
@@ -304,12 +302,10 @@ def check_cells(
     for name, table in cells.given.items():
         if isinstance(table, HardData) and table.from_top:
             cells.given[name] = table.upside_down(cells.size[-2], frame)
-    if at:
+    if at := options.pop("at"):
         points, (paths, out) = cells.given["at"], at
         if len(paths) > 1 or out.suffix.lower() != ".csv":
-            raise ValueError(
-                f"--at writes {out}, from {len(paths)} tables; give one table, and a name that ends in .csv"
-            )
+            raise ValueError(f"--at reads {len(paths)} tables and writes {out}; give one of each, the new one a .csv")
         check_target(out)
         sites, inside = sites_of(points, cells.size, lies.get("outside") == "skip", *(frame or ()))
         cells.given["at"] = [lambda made, _: write_at(out, made, points.points[inside], sites)]

@@ -207,11 +207,10 @@ def plan_synthesis(
             f"the method {method} takes one sample that is known everywhere, no mask, no known values and no "
             'guide; give method="mrf"'
         )
-    simulated = known is not None and options.get("categorical", False)
-    job = "simulate" if simulated else "synth"
+    job = "simulate" if known is not None and options.get("categorical", False) else "synth"
     chosen: Any = resolve(METHODS[method], job, with_channels_last(options, channel_axis), synthesize)
     lit, about = in_light(pictures, light, vars(chosen).get("categorical", False))
-    if simulated and not (chosen.proportions or guide) and lit.pixels[0].shape[-1] == 1:
+    if job == "simulate" and not (chosen.proportions or guide) and lit.pixels[0].shape[-1] == 1:
         chosen = replace(chosen, proportions=tuple(chosen.of(lit).proportions().tolist()))
     return Synthesis(lit, size, method, chosen, inputs.given, inputs.guide, about, channel_axis, TILED)
 

@@ -179,8 +179,14 @@ BAD = {
     "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
     "points outside": ([*GREY, "--at", "wells.csv=at.csv", "--origin", "5,0"], "line 2 of wells.csv is at x 3.0"),
     "points in a picture": ([*GREY, "--at", "grey.png=at.csv"], "grey.png: the table is no text"),
-    "points in two tables": ([*GREY, "--at", "wells.csv,wells.eas=at.csv"], "2 tables; give one table"),
-    "values that are no .csv": ([*GREY, "--at", "wells.csv=at.gslib"], "a name that ends in .csv"),
+    "points in two tables": (
+        [*GREY, "--at", "wells.csv,wells.eas=at.csv"],
+        "2 tables and writes at.csv; give one of each",
+    ),
+    "values that are no .csv": (
+        [*GREY, "--at", "wells.csv=at.gslib"],
+        "writes at.gslib; give one of each, the new one a .csv",
+    ),
     "values in no folder": ([*GREY, "--at", "wells.csv=no/at.csv"], "the folder no does not exist"),
     "points of a volume": (["ti.npy", "-o", "out.npz", "--at", "wells.csv=at.csv"], "wells.csv with a column z"),
     "coordinates on the ground": ([*FACIES, "--known", "wells.eas"], "(--origin X,Y), the centre of the first cell"),
