@@ -484,7 +484,7 @@ def sites_of(
     """Return the index, row by row, of the site of each datum inside of the grid, and which data are inside."""
     lies, axes = frame(origin, cell), data.points.shape[1]
     if len(shape) > axes:
-        raise ValueError(f"shape is {shape!r}: give (rows, cols), or {data.name} with a column z after x and y")
+        raise ValueError(f"shape is {shape!r}: give (rows, cols), or {data.name} with a column z (--columns z=NAME)")
     at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
     sides = (1, *shape)[: -axes - 1 : -1]  # along x, y and, of such data, z
     with np.errstate(invalid="ignore", over="ignore"):  # infinity is outside
@@ -503,9 +503,9 @@ def sites_of(
         ranges = map("{} {:.12g} to {:.12g} (all points {:.12g} to {:.12g})".format, "xyz", *ends, *reach)
         raise ValueError(
             f"{data.where(row)} of {data.name} is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
-            f"pixels (width x height{' x depth' * (len(sides) > 2)}), {', '.join(ranges)}: give origin=(x, y) "
-            "(--origin X,Y), the centre of the first cell, and cell=(dx, dy) (--cell DX,DY), its size, in these units, "
-            'or leave such points out with outside="skip" (--outside skip)'
+            f"pixels (width x height{' x depth' * (len(sides) > 2)}), {', '.join(ranges)}: give `simulate` the centre "
+            "of the first cell, origin=(x, y) (--origin X,Y), and the size of a cell, cell=(dx, dy) (--cell DX,DY), in "
+            'the units of the table, or leave such points out with outside="skip" (--outside skip)'
         )
     return np.ravel_multi_index(tuple(nearest[inside].T.astype(np.intp)), sides, order="F"), inside
 

@@ -244,10 +244,14 @@ def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict
     from simdtex.io.hard_data import read_hard_data
 
     mask, path, like = (options.pop(name) for name in ("sample_mask", "known", "like"))
-    data = {"mask": read_masks(mask, material, how), "like": None}
+    data = {"mask": read_masks(mask, material, how), "like": None, "at": []}
     data["known"], _ = read_known(path, material, how, options["origin"], like)
-    columns: Any = {**(how.columns or {}), "value": []}
-    data["at"] = read_hard_data(options["at"][0][0], columns=columns) if options["at"] else []
+    if options["at"]:
+        points = partial(read_hard_data, options["at"][0][0])
+        try:
+            data["at"] = points(columns={**(how.columns or {}), "value": []})
+        except ValueError:  # without these columns
+            data["at"] = points(columns={"value": []})
     if like:
         pixels, _, grid = read_pixels(like, how._replace(variables=()))
         if grid is None or not grid.frame.told:

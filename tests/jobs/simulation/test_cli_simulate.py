@@ -189,7 +189,10 @@ BAD = {
     ),
     "values in no folder": ([*GREY, "--at", "wells.csv=no/at.csv"], "the folder no does not exist"),
     "points of a volume": (["ti.npy", "-o", "out.npz", "--at", "wells.csv=at.csv"], "wells.csv with a column z"),
-    "coordinates on the ground": ([*FACIES, "--known", "wells.eas"], "(--origin X,Y), the centre of the first cell"),
+    "coordinates on the ground": (
+        [*FACIES, "--known", "wells.eas"],
+        "the centre of the first cell, origin=(x, y) (--origin X,Y)",
+    ),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
@@ -307,16 +310,18 @@ def test_an_estimate_is_that_of_the_function(folder):
 
 
 def test_an_estimate_at_points_with_names_that_have_commas(folder):
+    (folder / "at.txt").write_text("id y x\nA 7 10\n")  # without the columns of the data
     (folder / "a.dat").write_text("mGstat\n3\ncol1, unknown\ncol2, unknown\ncol3, unknown\n3 4 0\n10 7 3\n")
-    columns = "x=col1, unknown, y=col2, unknown"
-    result = estimate(
-        "facies.png", "--categorical", "--known", "a.dat", "--columns", columns, "--at", "a.dat=at.csv", "-o", "o.npz"
-    )
-    assert result.exit_code == 0, result.output
+    words = ["facies.png", "--categorical", "--known", "a.dat", "--columns", "x=col1, unknown, y=col2, unknown"]
+    for points in ("a.dat", "at.txt"):
+        assert (result := estimate(*words, "--at", f"{points}={points}.csv", "-o", "o.npz")).exit_code == 0, (
+            result.output
+        )
     with np.load("o.npz") as found:
-        names = "x,y,entropy,probability_0,probability_3"
         assert set(found["entropy"][[4, 7], [3, 10]]) == {0}
-    assert (folder / "at.csv").read_text().splitlines() == [names, "3.0,4.0,0.0,1.0,0.0", "10.0,7.0,0.0,0.0,1.0"]
+    rows = ["x,y,entropy,probability_0,probability_3", "3.0,4.0,0.0,1.0,0.0", "10.0,7.0,0.0,0.0,1.0"]
+    assert (folder / "a.dat.csv").read_text().splitlines() == rows
+    assert (folder / "at.txt.csv").read_text().splitlines() == [rows[0], rows[2]]
 
 
 def test_an_estimate_of_nothing_is_refused(folder):

@@ -161,7 +161,7 @@ def test_data_on_the_ground(tmp_path):
     found = simulate(**how, several="most")
     assert_same_bits(found.values, simulate(known=place_hard_data([(3, 4, 20), (7, 2, 31)], SHAPE, np.uint8)).values)
     with pytest.raises(
-        ValueError, match=r"line 2 of .*wells.csv .* x -0.5 to 13.5 .all points 1035 to 1074., y .*: give origin="
+        ValueError, match=r"line 2 of .*wells.csv .* x -0.5 to 13.5 .all points 1035 to 1074., .*: give"
     ):
         simulate(known=path)
 
