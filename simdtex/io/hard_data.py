@@ -436,7 +436,7 @@ def place_hard_data(
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():
-        raise ValueError("the hard data has no known value: give a number for one datum at least")
+        raise ValueError(f"{data.name} has no known value in the picture: give a number for one datum at least")
     variables = data.values.shape[1]
     placed = np.zeros((prod(sides), variables), dtype=kind)
     mask = np.ones((prod(sides), variables), dtype=bool)
@@ -454,8 +454,8 @@ def place_hard_data(
             raise ValueError(
                 f"{data.where(first)} and {data.where(other)} of {data.name} are both at "
                 f"{''.join(f'layer {z}, ' for z in layer)}row {i}, column {j} of the picture and have "
-                f"{values[first, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or let `several` "
-                "say that their mean or the most frequent counts"
+                f"{values[first, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or take their "
+                'mean or the most frequent, several="mean" or "most" (--several)'
             )
     form = sides if variables == 1 else (*sides, variables)
     unknown = np.nan if kind.kind == "f" else 0
@@ -522,6 +522,6 @@ def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
         remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers below 2**53"
         raise ValueError(
             f"{data.where(row)} of {data.name} has {values[row, variable]} for {data.names[variable]}, which {kind} "
-            f"cannot hold: give {remedy} within its range, or a dtype that holds it"
+            f"cannot hold: give {remedy} within its range, or a dtype (of the training image) that holds it"
         )
     return kept
