@@ -80,7 +80,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     defaults of `simdtex simulate`: the output tiles with --boundary torus alone.
     """
     from simdtex.io.decode import NOTHING
-    from simdtex.io.hard_data import HardData
+    from simdtex.io.hard_data import HardData, sites_of
     from simdtex.jobs.synthesis.job import plan_synthesis, synthesize
     from simdtex.jobs.tiles.job import TileStore
 
@@ -97,6 +97,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     guide, options["labels"] = read_guides(options.pop("guide"), material, how, options["labels"])
     rows, cols = output_shape(size, pixels, known, guide and guide[1])
     if isinstance(known, HardData) and not known.from_top:
+        sites_of(known, (rows, cols), skip=False)  # raises before y counts from the top
         known = known.upside_down(rows)
     report = context.params["report"]
     if report and (material.several or known is not None or not material.known):
