@@ -309,9 +309,9 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
     chosen: dict[str, list[int]] = {} if named else {"x": [0], "y": [1]}
     for role, wanted in columns.items():
         chosen[role] = []
-        for name in [wanted] if isinstance(wanted, str) else wanted:
+        for name in [wanted] if isinstance(wanted, (str, int)) else wanted:
             if role not in ROLES or name not in listed:
-                remedy = f"name x, y, z, value of {shown}, or count them from 1"
+                remedy = f"name x, y, z, value of {shown}, or count them from '1' on"
                 raise ValueError(f"there is no column {name!r} for {role!r}: {remedy}")
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]

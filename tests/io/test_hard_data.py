@@ -91,6 +91,7 @@ def test_columns_are_chosen_by_name(tmp_path):
     for columns, categories, words in (
         ({"x": "X"}, {"sand": 1}, "no column 'X' for 'x': name x, y, z, value of 'depth', 'por'"),
         ({"w": "por"}, {"sand": 1}, "for 'w'"),
+        ({"x": 1}, {"sand": 1}, "no column 1 for 'x': .*'facies', or count them from '1' on"),
         (chosen, None, r"line 2 has 'sand' in column 4, .*--categories"),
     ):
         with pytest.raises(ValueError, match=words):
