@@ -318,7 +318,7 @@ def read_table(
     if table.from_top:
         note(f"{path}: rows count from the top of the output, from 0 on")
     elif samples.grid is None:
-        bottom = f"as in {like}" if like else f"and y = {origin[1] if origin else 0:g} is the bottom row of the output"
+        bottom = f"as in {like}" if like else f"and y = {(origin or (0, 0))[1]:.12g} is the bottom row of the output"
         note(f"{path}: y points north, {bottom}")
     return table
 

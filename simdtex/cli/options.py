@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -73,16 +74,17 @@ class Parsed(click.types.StringParamType):
             raise ValueError(f"{name} {value} must be {self.form}") from None
 
 
-def pairs(text: str) -> list[tuple[str, str]]:
-    """Return the pairs of ``A=B,C=D``."""
-    parts = [(left.strip(), right.strip()) for left, right in (part.split("=") for part in text.split(",") if part)]
+def pairs(text: str, apart: str = ",") -> list[tuple[str, str]]:
+    """Return the pairs of ``A=B,C=D``; ``apart`` is the pattern of what separates them."""
+    cut = (part.partition("=") for part in re.split(apart, text) if part)
+    parts = [(left.strip(), right.strip()) for left, _, right in cut]
     if not all(map(all, parts)):
         raise ValueError(text)
     return parts
 
 
 NUMBERS = Parsed(lambda text: tuple(map(float, text.split(","))), "numbers separated by commas, such as 0.1,0.2")
-COLUMNS = Parsed(pairs, "AXIS=NAME,...")
+COLUMNS = Parsed(functools.partial(pairs, apart=r",(?=\s*(?:x|y|z|value)\s*=)"), "AXIS=NAME,...")
 CATEGORIES = Parsed(lambda text: {name: float(value) for name, value in pairs(text)}, "NAME=NUMBER,...")
 DIRECTIONS = {"both": True, "x": "x", "y": "y"}
 DIRECTION = Parsed(DIRECTIONS.__getitem__, "x, y or both")
@@ -215,9 +217,9 @@ KNOWN_OPTIONS = together(
         "--columns",
         type=COLUMNS,
         metavar="x=NAME,...",
-        help="Take these columns of the table of --known as x, y, z and value, by name or, without a header, by "
-        "number; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others are "
-        "values]",
+        help="Take these columns of tables as x, y, z and value, by name, which may have commas, or by number, as "
+        "x=1,value=4; the variable of a grid is value.  [columns with names of axes, as X, Northing, lon; all others "
+        "are values]",
     ),
     data_option(
         "--categories",

@@ -72,6 +72,8 @@ class HardData(Brief):
         The line of each datum in the text, in the sheet or in the CSV of a DataFrame, counted from 1; None of an array.
     from_top : bool
         Whether y is the number of a row, from a column called row, which in a picture counts from the top.
+    name : str
+        What messages call the table: its file, if it has one.
     """
 
     points: Floats
@@ -79,6 +81,7 @@ class HardData(Brief):
     names: tuple[str, ...]
     lines: tuple[int, ...] | None = None
     from_top: bool = False
+    name: str = "the hard data"
 
     def __len__(self) -> int:
         return len(self.points)
@@ -120,10 +123,10 @@ def read_hard_data(
         Or a point set of Geo-EAS: a title, the number of columns, their names, each in a line, and a datum in each
         line. Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     columns : mapping, optional
-        The names of the columns ``"x"``, ``"y"``, ``"z"`` and ``"value"``, which may be a list for several variables.
-        Columns without a header are called 1, 2 and so on, and x and y are the first two. By default names that mean an
+        The names of the columns ``"x"``, ``"y"``, ``"z"`` and ``"value"``, which may be a list for several variables,
+        or empty. A text that is no name is the number of a column: ``"1"`` is the first. By default names that mean an
         axis are that axis, in any order, as Xcoord, Easting, lon or column; z only if another column is left for the
-        value. All other columns are values.
+        value. Without a header x and y are the first two columns. All other columns are values.
     categories : mapping of str to float, optional
         The number of each category that the table gives as a text, for example ``{"sand": 1, "shale": 0}``.
     missing : iterable of float
@@ -158,10 +161,10 @@ def read_hard_data(
             else:
                 data = _parsed(*_text(file, suffix, most), columns, categories)
     else:
-        name, data = "the table", _parsed(*_text_of(table), columns, categories)
+        name, data = HardData.name, _parsed(*_text_of(table), columns, categories)
     for variable, values in zip(data.names, data.values.T, strict=True):
         values[:] = known_numbers(f"{name}, column {variable}", values, missing, valid)
-    return data
+    return replace(data, name=name)
 
 
 def _text(file: BufferedReader, suffix: str, most: int) -> tuple[str, bool]:
@@ -219,7 +222,7 @@ def _parsed(text: str, header: bool, columns: Any, categories: Any) -> HardData:
     delimiter = said[1] if said else next((sign for sign in ";\t," if sign in line.partition(" #")[0]), None)
     count = width or len(_cells(line, first, delimiter))
     rows = {at: _cells(line, at, delimiter, count) for at, line in kept.items()}
-    if (cells := len(rows[first])) < 3:
+    if (cells := len(rows[first])) < 3 and not (cells == 2 and columns and columns.get("value") == []):
         raise ValueError(
             f"line {first} has {cells} cell{'s' * (cells != 1)}: give x, y and one value or more, "
             "with commas, semicolons, tabs or blanks between them"
@@ -301,13 +304,14 @@ def _plain(count: int) -> tuple[str, ...]:
 
 def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tuple[list[int], list[int]]:
     """Return the columns of coordinates, and those of values; without a header ``names`` are numbers."""
-    listed = {name: k for k, name in names.items()}
+    listed = {str(k + 1): k for k in names} | {name: k for k, name in names.items()}
+    shown = ", ".join(map(repr, names.values()))
     chosen: dict[str, list[int]] = {} if named else {"x": [0], "y": [1]}
     for role, wanted in columns.items():
         chosen[role] = []
-        for name in [wanted] if isinstance(wanted, str) else wanted:
+        for name in [wanted] if isinstance(wanted, (str, int)) else wanted:
             if role not in ROLES or name not in listed:
-                remedy = f"name x, y, z, value of {', '.join(listed)}"
+                remedy = f"name x, y, z, value of {shown}, or count them from '1' on"
                 raise ValueError(f"there is no column {name!r} for {role!r}: {remedy}")
             chosen[role].append(listed[name])
     taken = [k for some in chosen.values() for k in some]
@@ -317,24 +321,24 @@ def _roles(names: dict[int, str], named: bool, columns: Mapping[str, Any]) -> tu
         if axis in chosen or not of_axis or last:
             continue
         if len(of_axis) > 1:
-            both = " and ".join(names[k] for k in of_axis)
-            raise ValueError(f"the columns {both} both mean {axis}: choose one by its name, {_example(listed, axis)}")
+            several = " and ".join(repr(names[k]) for k in of_axis)
+            raise ValueError(f"the columns {several} mean {axis}: choose one, {_example(axis, of_axis[0])}")
         chosen[axis] = of_axis
         taken += of_axis
     if lacking := [axis for axis in "xy" if axis not in chosen]:
-        what = f"no column of {', '.join(listed)} is called {lacking[0]}, or a word for it"
-        raise ValueError(f"{what}: name the columns, {_example(listed, 'x')}")
+        what = f"no column of {shown} is called {lacking[0]}, or a word for it"
+        raise ValueError(f"{what}: choose columns by name or number, {_example(lacking[0], next(iter(names)))}")
     values = chosen.get("value", [k for k in names if k not in taken])
-    if not values:
+    if not values and "value" not in chosen:
         raise ValueError("the table has coordinates and no values: give x, y and one value or more")
     if twice := [names[k] for k in (*taken, *values) if list(names.values()).count(names[k]) > 1 and names[k]]:
         raise ValueError(f"two columns are called {twice[0]}: rename one")
     return [chosen[axis][0] for axis in "xyz" if axis in chosen], values
 
 
-def _example(listed: Mapping[str, int], axis: str) -> str:
-    name = next(iter(listed))
-    return f"as {{{axis!r}: {name!r}, ...}} in Python or --columns {axis}={name},... on the command line"
+def _example(role: str, column: int) -> str:
+    number = column + 1
+    return f"as {{{role!r}: '{number}', ...}} in Python or --columns {role}={number},... on the command line"
 
 
 def _table(array: Any) -> HardData:
@@ -425,16 +429,14 @@ def place_hard_data(
     one_of("outside", outside, OUTSIDE)
     if not len(data):
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
-    if len(sides) > data.points.shape[1]:
-        raise ValueError(f"shape is {shape!r}: give (rows, cols), or hard data with a column z after x and y")
-    sites, inside = _sites(data, sides, frame(origin, cell), outside == "skip")
+    sites, inside = sites_of(data, sides, outside == "skip", origin, cell)
     if not inside.all():
         lines = data.lines and tuple(np.array(data.lines)[inside].tolist())
         data = replace(data, points=data.points[inside], values=data.values[inside], lines=lines)
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():
-        raise ValueError("the hard data has no known value: give a number for one datum at least")
+        raise ValueError(f"{data.name} has no known value in the picture: give a number for one datum at least")
     variables = data.values.shape[1]
     placed = np.zeros((prod(sides), variables), dtype=kind)
     mask = np.ones((prod(sides), variables), dtype=bool)
@@ -450,10 +452,10 @@ def place_hard_data(
             other = int(rows[(here == sites[first]) & (counted != values[first, k])][0])
             *layer, i, j = np.unravel_index(sites[first], sides)
             raise ValueError(
-                f"{data.where(first)} and {data.where(other)} of the hard data are both at "
+                f"{data.where(first)} and {data.where(other)} of {data.name} are both at "
                 f"{''.join(f'layer {z}, ' for z in layer)}row {i}, column {j} of the picture and have "
-                f"{values[first, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or let `several` "
-                "say that their mean or the most frequent counts"
+                f"{values[first, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or take their "
+                'mean or the most frequent, several="mean" or "most" (--several)'
             )
     form = sides if variables == 1 else (*sides, variables)
     unknown = np.nan if kind.kind == "f" else 0
@@ -476,11 +478,13 @@ def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.int
     return each, values[first[order][chosen]]
 
 
-def _sites(
-    data: HardData, shape: tuple[int, ...], lies: CellFrame, skip: bool
+def sites_of(
+    data: HardData, shape: tuple[int, ...], skip: bool, origin: Any = None, cell: Any = None
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return the index, row by row, of the site of each datum inside of the grid, and which data are inside."""
-    axes = data.points.shape[1]
+    lies, axes = frame(origin, cell), data.points.shape[1]
+    if len(shape) > axes:
+        raise ValueError(f"shape is {shape!r}: give (rows, cols), or {data.name} with a column z (--columns z=NAME)")
     at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
     sides = (1, *shape)[: -axes - 1 : -1]  # along x, y and, of such data, z
     with np.errstate(invalid="ignore", over="ignore"):  # infinity is outside
@@ -494,12 +498,14 @@ def _sites(
     elif not inside.all():
         row = int(inside.argmin())
         there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
-        bounds = zip("xyz", at - size / 2, at + (np.array(sides) - 0.5) * size, strict=False)
-        ranges = ", ".join(f"{axis} from {first} to below {last}" for axis, first, last in bounds)
+        ends = at - size / 2, at + (np.array(sides) - 0.5) * size
+        reach = np.fmin.reduce(data.points), np.fmax.reduce(data.points)
+        ranges = map("{} {:.12g} to {:.12g} (all points {:.12g} to {:.12g})".format, "xyz", *ends, *reach)
         raise ValueError(
-            f"{data.where(row)} of the hard data is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
-            f"pixels (width x height{' x depth' * (len(sides) > 2)}): give {ranges}, tell `simulate` the origin and "
-            'the size of its cells, or leave such data out with outside="skip" (--outside skip)'
+            f"{data.where(row)} of {data.name} is at {there}, outside of a picture of {' x '.join(map(str, sides))} "
+            f"pixels (width x height{' x depth' * (len(sides) > 2)}), {', '.join(ranges)}: give `simulate` the centre "
+            "of the first cell, origin=(x, y) (--origin X,Y), and the size of a cell, cell=(dx, dy) (--cell DX,DY), in "
+            'the units of the table, or leave such points out with outside="skip" (--outside skip)'
         )
     return np.ravel_multi_index(tuple(nearest[inside].T.astype(np.intp)), sides, order="F"), inside
 
@@ -515,7 +521,7 @@ def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
         row, variable = (int(k) for k in np.argwhere(wrong)[0])
         remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers below 2**53"
         raise ValueError(
-            f"{data.where(row)} of the hard data has {values[row, variable]} for {data.names[variable]}, which {kind} "
-            f"cannot hold: give {remedy} within its range, or a dtype that holds it"
+            f"{data.where(row)} of {data.name} has {values[row, variable]} for {data.names[variable]}, which {kind} "
+            f"cannot hold: give {remedy} within its range, or a dtype (of the training image) that holds it"
         )
     return kept

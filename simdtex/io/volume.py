@@ -8,6 +8,7 @@ picture. Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns; 
 from __future__ import annotations
 
 import bz2
+import csv
 import io
 import json
 import os
@@ -457,9 +458,7 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     suffix = check_realisations_path(path, source="source_row" in several)
     if suffix in SUFFIXES:
         origin, cell = zip(*(axis_place(array, axis) for axis in "xyz"), strict=True)
-        arrays = sorted(several.values(), key=lambda variable: variable.ndim) or [array]
-        layers = dict(pair for variable in arrays for pair in _variables(variable))
-        write_grid(path, layers, origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
+        write_grid(path, dict(_variables(array)), origin=origin, cell=cell, crs=str(array.attrs.get("crs", "")))
         return
     if suffix == ".npz":
         members: Any = {**array.coords, **(several or {"values": array})}
@@ -480,8 +479,21 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         whole.to_zarr(store, mode="w-", zarr_format=3)
 
 
+def write_at(path: PathLike, array: DataArray | Dataset, points: NDArray[Any], sites: NDArray[Any]) -> None:
+    """Write coordinates (n, axes) and the values of realisations there as CSV; ``sites`` (n,) are the cells."""
+    columns = dict(zip("xyz", points.T, strict=False))
+    for name, values in _variables(array):
+        columns[name] = np.ma.filled(np.ma.ravel(values)[sites].astype(str), "")
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows([[*columns], *zip(*columns.values(), strict=True)])
+
+
 def _variables(array: Any) -> Iterator[tuple[str, Any]]:
     """Yield the name and the values, (z, y, x) or (y, x), of every variable of every realisation."""
+    if several := getattr(array, "data_vars", None):
+        for variable in sorted(several.values(), key=lambda variable: variable.ndim):
+            yield from _variables(variable)
+        return
     dims = [str(dim) for dim in array.dims]
     wanted: list[str] = [dim for dim in ("realisation", "variable", "category", "z", "y", "x") if dim in dims]
     if sorted(dims) != sorted(wanted) or wanted[-2:] != ["y", "x"]:

@@ -101,9 +101,9 @@ TABLES = [
     ("1,2,3\n1,,3\n", "line 2 has '' in column 2, which is no number: write numbers with a decimal point$"),
     ("1,5;2,5;3.5\n", "the comma of '1,5' may be one of thousands: write .* decimal point$"),
     ('x,y,v\n"1,500","2,500",3\n', "the comma of '1,500' may be one of thousands"),
-    ("# northing foo v\n1 2 3\n", "no column of northing, foo, v is called x"),
-    ("depth,por,facies\n1,2,3\n", "no column of depth, por, facies is called x, .* --columns x=depth"),
-    ("x,lon,y,v\n1,2,3,4\n", "the columns x and lon both mean x: choose one by its name, as .* --columns"),
+    ("# northing foo v\n1 2 3\n", "no column of 'northing', 'foo', 'v' is called x"),
+    ("depth,por,facies\n1,2,3\n", "no column of 'depth', 'por', 'facies' is called x, .* --columns x=1"),
+    ("x,lon,y,v\n1,2,3,4\n", "the columns 'x' and 'lon' mean x: choose one, as .* --columns x=1"),
     ("x,y,v,v\n1,2,3,4\n", "two columns are called v: rename one"),
     ('x,y,value\n1,2,"3\n', "cannot be split into cells .* quotation marks"),
     ("1,2,3\n4,5,6,7\n", "line 2 has 4 cells and those before it 3"),
@@ -114,7 +114,7 @@ TABLES = [
 POINTS = [
     ("a\n2\nX\nY\n1 2\n", "line 5 has 2 cells: give x, y and one value"),
     ("a\n3\nX\nY\n", ".* no line after the names of 3 columns"),
-    ("a\n3\nwell\nX\nv\n1 2 3\n", "no column of well, X, v is called y"),
+    ("a\n3\nwell\nX\nv\n1 2 3\n", "no column of 'well', 'X', 'v' is called y, .* y=1"),
     ("a\n3\nX\nY\nv\n1 2 3\n1 2\n", "line 7 has 2 cells and those before it 3"),
     ("a\n3\nX\nY\nv\n1 2 3\n1 2 sand\n", "line 7 has 'sand' in column 3, which is no number"),
 ]

@@ -89,12 +89,21 @@ def test_columns_are_chosen_by_name(tmp_path):
     data = read_hard_data(plain, columns={"x": "2", "y": "3", "value": "4"})
     assert data.points.tolist() == [[1, 2], [4, 5]] and data.values.tolist() == [[3], [6]]
     for columns, categories, words in (
-        ({"x": "X"}, {"sand": 1}, "no column 'X' for 'x': name x, y, z, value of depth, por"),
+        ({"x": "X"}, {"sand": 1}, "no column 'X' for 'x': name x, y, z, value of 'depth', 'por'"),
         ({"w": "por"}, {"sand": 1}, "for 'w'"),
+        ({"x": 1}, {"sand": 1}, "no column 1 for 'x': .*'facies', or count them from '1' on"),
         (chosen, None, r"line 2 has 'sand' in column 4, .*--categories"),
     ):
         with pytest.raises(ValueError, match=words):
             read_hard_data(path, columns=columns, categories=categories)
+    eas = "Data written by mGstat\n4\n" + "".join(f"col{n}, unknown\n" for n in (1, 2, 3, 4)) + "22 19 0 1\n51 9 0 1\n"
+    names = {"x": "col1, unknown", "y": "col2, unknown", "value": "col4, unknown"}
+    for columns in (names, {"x": "1", "y": "2", "z": "3", "value": "4"}):
+        data = read_hard_data(table(tmp_path, eas, "eas.dat"), columns=columns)
+        assert data.points[:, :2].tolist() == [[22, 19], [51, 9]] and data.names == ("col4, unknown",)
+        assert data.points.shape[1] == (3 if "z" in columns else 2)
+    points = read_hard_data(table(tmp_path, "x;y\n1;2\n"), columns={"value": []})
+    assert points.points.tolist() == [[1, 2]] and points.names == ()
     with pytest.warns(DataWarning, match="left out, because they hold text: the columns well, rig"):
         data = read_hard_data(table(tmp_path, "well,x,y,por,rig\nA,1,2,.5,b\nB,3,4,,NA\n"))
     assert data.names == ("por",)
@@ -218,7 +227,7 @@ def test_coordinates_on_the_ground():
     for x, y in ((999.9, 2000), (1040, 2000), (1000, 1999.9), (1000, 2015)):
         with pytest.raises(ValueError, match=rf"row 0 .* at x {x}.*, y {y}.*, outside .* of 4 x 3 pixels") as caught:
             place_hard_data([[x, y, 7]], (3, 4), "uint8", **ground)
-        assert "give x from 1000.0 to below 1040.0, y from 2000.0 to below 2015.0, tell" in str(caught.value)
+        assert f", x 1000 to 1040 (all points {x} to {x}), y 2000 to 2015 (all points" in str(caught.value)
     assert place_hard_data([[12, 3, 7]], (3, 4), "uint8", cell=(10, 5))[1, 1] == 7
     with pytest.warns(DataWarning, match="1 of 2 data are outside of the grid and are left out"):
         assert place_hard_data([[12, 3, 7], [1, 1, 5]], (3, 4), outside="skip").compressed().tolist() == [5]
@@ -231,12 +240,12 @@ def test_data_in_layers():
     placed = place_hard_data(wells, (2, 3, 4), origin=(-9, -8, 0.2), cell=(10, 10, 1.2))
     assert placed[0, 1, 1] == 7 and placed[1, 1, 1] == 8
     assert place_hard_data(wells, (3, 4), origin=(0, 0, 1), cell=(1, 1, 2)).shape == (3, 4)
-    deep = r"z 1.4, outside of a picture of 4 x 3 x 1 pixels \(width x height x depth\): .*z from -0.5 to below 0.5"
+    deep = r"z 1.4, outside of a picture of 4 x 3 x 1 pixels \(width x height x depth\), .*z -0.5 to 0.5 \("
     twice = HardData(np.array([[0, 2, 1.0]] * 2), np.array([[7.0], [8.0]]), ("v",))
     for data, shape, words in (
         (wells, (3, 4), deep),
         (twice, (2, 3, 4), r"row 0 and row 1 .* at layer 1, row 2, column 0 of"),
-        ([[0, 0, 1]], (2, 3, 4), r"shape is \(2, 3, 4\): give \(rows, cols\), or hard data with a column z"),
+        ([[0, 0, 1]], (2, 3, 4), r"shape is \(2, 3, 4\): give \(rows, cols\), or the hard data with a column z"),
     ):
         with pytest.raises(ValueError, match=words):
             place_hard_data(data, shape)
@@ -263,10 +272,10 @@ def test_of_equally_frequent_values_the_first_counts():
 
 def test_data_that_are_wrong(tmp_path):
     for row, words in (
-        ("nan,0,1", "line 3 of the hard data is at x nan, y 0.0, outside of a picture"),
-        ("0,-inf,1", "line 3 of the hard data is at x 0.0, y -inf, outside"),
-        ("-0.6,0,1", r"line 3 .* at x -0\.6, y 0\.0, outside of a picture of 4 x 3 .*give x from -0.5 to below 3.5"),
-        ("0,0,0.5", "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers below 2"),
+        ("nan,0,1", "line 3 of .*wells.csv is at x nan, y 0.0, outside of a picture"),
+        ("0,-inf,1", "line 3 of .*wells.csv is at x 0.0, y -inf, outside"),
+        ("-0.6,0,1", r"line 3 .* at x -0\.6, y 0\.0, outside of a picture of 4 x 3 .*, x -0.5 to 3.5 "),
+        ("0,0,0.5", "line 3 of .*wells.csv has 0.5 for facies, which uint8 cannot hold: give integers below 2"),
         ("0,0,256", "has 256.0 for facies, which uint8 cannot hold"),
         ("0,0,inf", "has inf for facies, which uint8 cannot hold"),
         (

@@ -184,7 +184,7 @@ def test_like_gives_place_and_size():
     other = "--like lies at 300000, 5000000, 0 with cells of 8, 4, 1, and that of"
     for words, sentence in [
         (["--like", "like.png"], "does not say where its cells lie"),
-        (["--like", "like.tif", "--size", "4x4"], "leave shape out"),
+        (["--like", "like.tif", "--size", "4x4"], "leave shape (--size) out"),
         (["--like", "like.tif", "--origin", "5,5"], other),
         (["--like", "like.tif", "--region", "far.gslib"], "--region lies at 0, 5000000, 0"),
     ]:

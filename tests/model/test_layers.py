@@ -367,7 +367,7 @@ def test_what_solid_writes_is_a_training_image(tmp_path, monkeypatch):
     result = CliRunner().invoke(main, ["simulate", *words])
     assert result.exit_code == 0 and np.load("out.npz")["values"].shape == (1, 7, 8, 15), result.output
     Path("wells.csv").write_text("x,y,facies\n1,2,1\n")
-    for more, words in (([], "or hard data with a column z"), (["--channels"], "has several channels")):
+    for more, words in (([], "or wells.csv with a column z"), (["--channels"], "has several channels")):
         result = CliRunner().invoke(main, ["estimate", "ti.npy", "-o", "out.npz", "--known", "wells.csv", *more])
         assert result.exit_code == 2 and words in result.output
 

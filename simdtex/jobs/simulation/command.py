@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, ENTER, OUTPUTS, READ
+from simdtex.cli.command import DATA, DEVICE_GROUP, ENTER, OUTPUTS, READ, WRITE_PAIR
 from simdtex.cli.inputs import (
     Material,
     Reading,
@@ -93,6 +93,13 @@ CELL_OPTIONS = together(
         multiple=True,
         metavar="NAME",
         help="Take this variable of a grid TRAINING_IMAGE; may be repeated.  [all]",
+    ),
+    option(
+        "--at",
+        group=OUTPUTS,
+        type=WRITE_PAIR,
+        metavar="POINTS=TABLE",
+        help="Write the values at the points of this table of x and y into TABLE, a .csv with a column for each map.",
     ),
 )
 """The data, and where the cells of an output lie."""
@@ -178,7 +185,7 @@ def simulate(
         partial(make, "simulate", plan),
         f"{number} realisation{'s' * (number != 1)} of {size_of(cells)}",
         str(output),
-        [lambda made, run: write_realisations(output, made)],
+        [lambda made, run: write_realisations(output, made), *cells.given["at"]],
         more=_say_shares,
         report=lambda folder, made, run: _report(folder, material, made, cells),
     )
@@ -219,7 +226,7 @@ def estimate(training_image: tuple[Path, ...], output: Path, size: str | None, *
     cells = check_cells(material, output, size, data, options)
     plan = plan_estimation(cells, **given(options))
 
-    writers: list[Any] = [lambda made, _: write_realisations(output, made)]
+    writers: list[Any] = [lambda made, _: write_realisations(output, made), *cells.given["at"]]
     return Task(partial(make, "estimate", plan), f"maps of {size_of(cells)}", str(output), writers)
 
 
@@ -234,9 +241,17 @@ def make(name: str, plan: Simulation | Estimation, full_output: bool, **call: An
 
 def read_data(material: Material, how: Reading, options: dict[str, Any]) -> dict[str, Any]:
     """Return the mask, the data and the place of an output, whose options are taken out."""
+    from simdtex.io.hard_data import read_hard_data
+
     mask, path, like = (options.pop(name) for name in ("sample_mask", "known", "like"))
-    data = {"mask": read_masks(mask, material, how), "like": None}
+    data = {"mask": read_masks(mask, material, how), "like": None, "at": []}
     data["known"], _ = read_known(path, material, how, options["origin"], like)
+    if options["at"]:
+        points = partial(read_hard_data, options["at"][0][0])
+        try:
+            data["at"] = points(columns={**(how.columns or {}), "value": []})
+        except ValueError:  # without these columns
+            data["at"] = points(columns={"value": []})
     if like:
         pixels, _, grid = read_pixels(like, how._replace(variables=()))
         if grid is None or not grid.frame.told:
@@ -270,10 +285,11 @@ def read_map(
 def check_cells(
     material: Material, output: Path, size: str | None, data: dict[str, Any], options: Any, source: bool = False
 ) -> Cells:
-    """Return the cells of an output, whose options are taken out; rows of tables become coordinates."""
+    """Return the cells of an output, whose options are taken out; ``"at"`` is what writes the values at points."""
+    from simdtex.io.files import check_target
     from simdtex.io.grids import SUFFIXES, check_grid
-    from simdtex.io.hard_data import HardData
-    from simdtex.io.volume import check_realisations_path
+    from simdtex.io.hard_data import HardData, sites_of
+    from simdtex.io.volume import check_realisations_path, write_at
     from simdtex.jobs.simulation.maps import plan_cells
 
     shape = None if size is None else output_shape(size, material.pixels[0], axes=2 + material.deep)
@@ -290,6 +306,13 @@ def check_cells(
     for name, table in cells.given.items():
         if isinstance(table, HardData) and table.from_top:
             cells.given[name] = table.upside_down(cells.size[-2], frame)
+    if at := options.pop("at"):
+        points, (paths, out) = cells.given["at"], at
+        if len(paths) > 1 or out.suffix.lower() != ".csv":
+            raise ValueError(f"--at reads {len(paths)} tables and writes {out}; give one of each, the new one a .csv")
+        check_target(out)
+        sites, inside = sites_of(points, cells.size, lies.get("outside") == "skip", *(frame or ()))
+        cells.given["at"] = [lambda made, _: write_at(out, made, points.points[inside], sites)]
     return cells
 
 

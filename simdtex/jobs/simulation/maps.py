@@ -85,7 +85,7 @@ def of_categories(
     if soft is None:
         return None
     if categories is None:
-        raise ValueError("probabilities are of categories; give categorical=True, or leave them out")
+        raise ValueError("probabilities are of categories; give categorical=True (--categorical), or leave them out")
     names = ", ".join(map(str, categories[:10]))
     if isinstance(soft, HardData):
         if len(soft.names) != len(categories):
@@ -223,7 +223,7 @@ def _size(shape: Any, given: dict[str, Any], place: Location | None, axes: int, 
             raise ValueError(f"like has no coordinates x and y; {remedy}")
         size = tuple(like.sizes.get(axis, 1) for axis in "zyx"[-axes:])
         if shape is not None and tuple(shape) != size:
-            raise ValueError(f"shape is {shape} and like has {size}; leave shape out")
+            raise ValueError(f"shape is {shape} and like has {size}; leave shape (--size) out")
         return size
     if shape is not None:
         return shape

@@ -76,10 +76,11 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     """Synthesise a picture of any size with the texture of SAMPLE.
 
     The method mrf takes several samples of one type, and maps of them by --also MAP0,MAP1=OUT; unknown pixels may be
-    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`.
+    NaN. SAMPLE may be a folder with the maps of a material, as in `simdtex tile`. Categories with --known have the
+    defaults of `simdtex simulate`: the output tiles with --boundary torus alone.
     """
     from simdtex.io.decode import NOTHING
-    from simdtex.io.hard_data import HardData
+    from simdtex.io.hard_data import HardData, sites_of
     from simdtex.jobs.synthesis.job import plan_synthesis, synthesize
     from simdtex.jobs.tiles.job import TileStore
 
@@ -96,6 +97,7 @@ def synth(samples: tuple[Path, ...], output: Path, size: str | None, method: str
     guide, options["labels"] = read_guides(options.pop("guide"), material, how, options["labels"])
     rows, cols = output_shape(size, pixels, known, guide and guide[1])
     if isinstance(known, HardData) and not known.from_top:
+        sites_of(known, (rows, cols), skip=False)  # raises before y counts from the top
         known = known.upside_down(rows)
     report = context.params["report"]
     if report and (material.several or known is not None or not material.known):

@@ -71,7 +71,8 @@ def synthesize(
     known : array of `shape` (and the channel axis), HardData, pandas.DataFrame or path, optional
         ``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN
         for unknown values, a table of x, y and value (`simdtex.read_hard_data`), its file or a DataFrame. Some
-        variables (channels) of a pixel may be known and others not.
+        variables (channels) of a pixel may be known and others not. With `categorical` too, all defaults are those of
+        `simdtex.simulate`: the output is open (``boundary``), and has the sample's shares.
     known_source : (rows, cols, 2) int array, optional
         ``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 for
         pixels from elsewhere. Known pixels with a position suggest candidates that continue it.
@@ -206,8 +207,11 @@ def plan_synthesis(
             f"the method {method} takes one sample that is known everywhere, no mask, no known values and no "
             'guide; give method="mrf"'
         )
-    chosen: Any = resolve(METHODS[method], "synth", with_channels_last(options, channel_axis), synthesize)
+    job = "simulate" if known is not None and options.get("categorical", False) else "synth"
+    chosen: Any = resolve(METHODS[method], job, with_channels_last(options, channel_axis), synthesize)
     lit, about = in_light(pictures, light, vars(chosen).get("categorical", False))
+    if job == "simulate" and not (chosen.proportions or guide) and lit.pixels[0].shape[-1] == 1:
+        chosen = replace(chosen, proportions=tuple(chosen.of(lit).proportions().tolist()))
     return Synthesis(lit, size, method, chosen, inputs.given, inputs.guide, about, channel_axis, TILED)
 
 

@@ -42,6 +42,7 @@ def folder(tmp_path, monkeypatch):
     tables = {"wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n"}
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
+    np.save(tmp_path / "ti.npy", np.zeros((2, 8, 9), np.uint8))
     for suffix in (".gslib", ".sgems"):
         write_grid(tmp_path / f"ti{suffix}", {"facies": facies[::-1]}, **lies)
     write_grid(tmp_path / "two.gslib", {"por": grey[::-1] / 8, "facies": facies[::-1]}, **lies)
@@ -84,6 +85,24 @@ def test_realisations_are_those_of_the_function_and_honour_a_table(folder):
         assert found.identical(own) and found.dtype == own.dtype
     assert simulate("grey.png", "--size", "9x8", "-o", "out.npz", "-q").output == ""
     assert "1 realisation of 20x16" in simulate("grey.png", "-o", "out.npz").output
+
+
+def test_values_at_points(folder):
+    """In the order of the table, with its coordinates, of all realisations; empty outside of the region."""
+    (folder / "points.csv").write_text("\ufeffname;row;column\nb;1;3,5\na;15;0\nb;1;3,5\n")
+    (folder / "ground.csv").write_text("X,Y\n1044.5,2070.2\n1005,2002.5\n1044.5,2070.2\n")
+    found = made("grey.png", "-n", 2, "--at", "points.csv=values.csv").values
+    rows = [
+        ",".join(map(str, (x, y, *found[:, int(y), int(x + 0.5)]))) for x, y in ((3.5, 14.0), (0.0, 0.0), (3.5, 14.0))
+    ]
+    assert (folder / "values.csv").read_text().splitlines() == ["x,y,simulation__real0,simulation__real1", *rows]
+    inside = (np.indices((16, 20))[1] > 0).astype(np.uint8)
+    write_grid(folder / "region.gslib", {"in": inside}, origin=(1005, 2002.5, 3), cell=(10, 5, 2))
+    args = ("two.gslib", "--region", "region.gslib", "--first", 3, "--at", "ground.csv=values.csv")
+    por = made(*args).values[0, 14, 4]
+    names, first, second, _ = (folder / "values.csv").read_text().splitlines()
+    assert names == "x,y,simulation_0__real3,simulation_1__real3" and second == "1005.0,2002.5,,"
+    assert first == f"1044.5,2070.2,{por[0]},{por[1]}"
 
 
 def test_from_a_grid_to_a_grid(folder):
@@ -158,6 +177,22 @@ FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
     "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
     "a column without a name": ([*GREY, "--columns", "x="], "--columns x= must be AXIS=NAME,..."),
+    "points outside": ([*GREY, "--at", "wells.csv=at.csv", "--origin", "5,0"], "line 2 of wells.csv is at x 3.0"),
+    "points in a picture": ([*GREY, "--at", "grey.png=at.csv"], "grey.png: the table is no text"),
+    "points in two tables": (
+        [*GREY, "--at", "wells.csv,wells.eas=at.csv"],
+        "2 tables and writes at.csv; give one of each",
+    ),
+    "values that are no .csv": (
+        [*GREY, "--at", "wells.csv=at.gslib"],
+        "writes at.gslib; give one of each, the new one a .csv",
+    ),
+    "values in no folder": ([*GREY, "--at", "wells.csv=no/at.csv"], "the folder no does not exist"),
+    "points of a volume": (["ti.npy", "-o", "out.npz", "--at", "wells.csv=at.csv"], "wells.csv with a column z"),
+    "coordinates on the ground": (
+        [*FACIES, "--known", "wells.eas"],
+        "the centre of the first cell, origin=(x, y) (--origin X,Y)",
+    ),
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
@@ -272,6 +307,21 @@ def test_an_estimate_is_that_of_the_function(folder):
     assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
     assert np.array_equal(grid.values["probability_3"][0], expected.probability.sel(category=3))
     assert np.array_equal(grid.values["entropy"][0], expected.entropy)
+
+
+def test_an_estimate_at_points_with_names_that_have_commas(folder):
+    (folder / "at.txt").write_text("id y x\nA 7 10\n")  # without the columns of the data
+    (folder / "a.dat").write_text("mGstat\n3\ncol1, unknown\ncol2, unknown\ncol3, unknown\n3 4 0\n10 7 3\n")
+    words = ["facies.png", "--categorical", "--known", "a.dat", "--columns", "x=col1, unknown, y=col2, unknown"]
+    for points in ("a.dat", "at.txt"):
+        assert (result := estimate(*words, "--at", f"{points}={points}.csv", "-o", "o.npz")).exit_code == 0, (
+            result.output
+        )
+    with np.load("o.npz") as found:
+        assert set(found["entropy"][[4, 7], [3, 10]]) == {0}
+    rows = ["x,y,entropy,probability_0,probability_3", "3.0,4.0,0.0,1.0,0.0", "10.0,7.0,0.0,0.0,1.0"]
+    assert (folder / "a.dat.csv").read_text().splitlines() == rows
+    assert (folder / "at.txt.csv").read_text().splitlines() == [rows[0], rows[2]]
 
 
 def test_an_estimate_of_nothing_is_refused(folder):

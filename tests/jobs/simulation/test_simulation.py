@@ -53,6 +53,11 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
         own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, order=2, device="reference", **OWN)
         assert_same_bits(values, own)
         assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
+    how = {"known": np.where(np.isnan(data), np.nan, CATEGORIES[:12, :14]), "categorical": True} | QUICK
+    found = simdtex.simulate(CATEGORIES, 1, **how)
+    del how["jobs"]
+    own = simdtex.synthesize(CATEGORIES, SHAPE, **how | {"rng": int(found.seed[0])})
+    assert_same_bits(found.values[0], own)  # which has the defaults of a simulation then
 
 
 def test_seeds_are_apart_and_stay_what_they_are():
@@ -155,7 +160,9 @@ def test_data_on_the_ground(tmp_path):
     how = {"known": path, "origin": (1005, 2010.5), "cell": (10, 21)}
     found = simulate(**how, several="most")
     assert_same_bits(found.values, simulate(known=place_hard_data([(3, 4, 20), (7, 2, 31)], SHAPE, np.uint8)).values)
-    with pytest.raises(ValueError, match=r"line 2 of the hard data is at x 1035\.0, y 2094\.5, outside"):
+    with pytest.raises(
+        ValueError, match=r"line 2 of .*wells.csv .* x -0.5 to 13.5 .all points 1035 to 1074., .*: give"
+    ):
         simulate(known=path)
 
 

@@ -115,6 +115,8 @@ def test_a_table_is_kept(folder):
     known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")[::-1]
     assert np.array_equal(out, simdtex.synthesize(pixels("sample.png"), (14, 20), known=known, **OPTIONS))
     assert (load_source_map(folder / "s.npz")[-1 - 4, 3] == -1).all()
+    (folder / "wells.csv").write_text("x,y,v\n3,40,1\n")
+    assert "wells.csv is at x 3.0, y 40.0, outside" in run("synth", *args, *QUICK).output
 
 
 def indexed(path, indices, colours, **options):
