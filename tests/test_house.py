@@ -34,11 +34,11 @@ ROOMS = {
     ("jobs.mixes",): 365,
     ("jobs.classification",): 1635,
     ("jobs.studies",): 2181,
-    ("jobs.simulation",): 2465,
+    ("jobs.simulation",): 2532,
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35049, 20775
+LINES, CODE = 35120, 20815
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}
