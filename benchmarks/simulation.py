@@ -23,15 +23,15 @@ soft     the shares of channels in 128 x 128 pixels, means of 8 realisations, by
          how much they differ from 0.1, 0.15 ... 0.85; and the dead ends and the js 4x4 of the second map. Weight 0 is a
          run without, and *proportions* are asked instead of the first four maps.
 
-reliability  whether ensembles tell how uncertain they are. Windows of 128 x 128 of images as of *maps*, of a ``volume``
-         and of Walker Lake (its columns X, Y and V from ``--walker``, the upper three tenths of V) are truths, known at
-         random wells; the training image is another part of the image. *share in* and *area in* are how often P10 to
-         P90 of an ensemble has the truth's share of category 1, and the connected area of up to 5 wells, without wells
-         that of the largest body; *exchangeable* is what draws of one law would have. *above .9* and *below .1* are how
-         often the truth has category 1 where so many realisations have it. *within* and *truths* are the deviations of
-         the share in an ensemble, and among the truths. The windows of Walker Lake overlap.
+reliability  whether ensembles tell how uncertain they are. Truths are windows of 128 x 128 of images as of *maps*, of a
+         ``volume``, and of Walker Lake (columns X, Y and V of ``--walker``: the upper three tenths of V), known at
+         random wells. The training image is another part of the image, of which ten are drawn. *share in* and *area in*
+         are how often P10 to P90 of an ensemble has the truth's share of category 1, and the connected area of up to 5
+         wells, without wells that of the largest body; *exchangeable* is what draws of one law would have. *above .9*
+         and *below .1* are how often the truth has category 1 where so many realisations have it. *within* and *truths*
+         are deviations of the share in an ensemble, and among the truths. The windows of Walker Lake overlap.
 likeness windows of the same images beside realisations without data: the variogram at three lags over the training
-         image's, the mean absolute difference of connectivity functions, dead ends, js 4x4, copies, and CPU seconds.
+         image's, the mean difference of connectivity functions, dead ends, js 4x4, copies, and CPU seconds.
 
 With ``--snesim`` both parts have rows of that program too: mps_snesim_tree of MPSlib (PyPI: scikit-mps).
 """
@@ -64,7 +64,7 @@ SHARE = 0.3  # of lenses, and of channels in a volume; half of it of meanders
 FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
 BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
 DISTANCES, EACH = (0, 3, 8, 16, 32, 1000), 16  # from the border, pixels, and realisations
-SIDE, LARGE, DRAWN = 128, 5, 3  # of a truth, pixels; sides of a truth in a drawn image; and drawn images of a kind
+SIDE, LARGE, DRAWN = 128, 5, 10  # of a truth, pixels; sides of a truth in a drawn image; and drawn images of a kind
 LAYERS, SHALLOW = 12, 40  # of a volume, and the side of its truths
 WELLS = 5  # whose connected areas count
 LAGS = (1, 8, 16)
@@ -267,13 +267,17 @@ def _patterns(made, image):
     return f"{found.dead_ends[1][:-1].mean():.2f}", f"{found.anodi.by_level[0, 1]:.3f}"
 
 
+def shared(many, images):
+    """The numbers of truths of so many images, as even as they can be; none is 0."""
+    return [len(part) for part in np.array_split(np.arange(many), images) if len(part)]
+
+
 def drawn(draw, side, many):
     """Yield pairs of a training image and its truths: the first 2 x 2 windows of a drawn image, and others of it."""
-    for seed in range(1, DRAWN + 1):
-        image = draw((LARGE * side, LARGE * side), seed)
-        windows = [(row, col) for row in range(LARGE) for col in range(LARGE) if max(row, col) > 1]
-        of_seed = np.random.default_rng(seed).permutation(windows)[: many * seed // DRAWN - many * (seed - 1) // DRAWN]
-        cut = [image[..., r * side : (r + 1) * side, c * side : (c + 1) * side] for r, c in of_seed]
+    windows = [(row, col) for row in range(LARGE) for col in range(LARGE) if max(row, col) > 1]
+    for seed, here in enumerate(shared(many, DRAWN), 1):
+        image, of_seed = draw((LARGE * side, LARGE * side), seed), np.random.default_rng(seed).permutation(windows)
+        cut = [image[..., r * side : (r + 1) * side, c * side : (c + 1) * side] for r, c in of_seed[:here]]
         yield image[..., : 2 * side, : 2 * side], cut
 
 
@@ -283,8 +287,8 @@ def lake(path, side, many):
     x, y, v = (table[name] for name in "XYV")
     image = np.zeros((int(y.max()), int(x.max())), np.uint8)
     image[y.astype(int) - 1, x.astype(int) - 1] = v > np.quantile(v, 1 - SHARE)
-    for turn in range(4):
-        turned, here = np.rot90(image, turn), many * (turn + 1) // 4 - many * turn // 4
+    for turn, here in enumerate(shared(many, 4)):
+        turned = np.rot90(image, turn)
         at = np.linspace(0, turned.shape[1] - side, here).astype(int)
         back = [np.rot90(turned[:side, col : col + side], -turn) for col in at]
         yield np.rot90(turned[side:], -turn), back
@@ -297,7 +301,7 @@ def cases(images, side, truths, walker):
     if walker:
         known["walker"] = lambda: lake(walker, side or SIDE, truths)
     for name, pairs in common.chosen(known, images).items():
-        yield name, [(np.ascontiguousarray(training), truths) for training, truths in pairs() if truths]
+        yield name, [(np.ascontiguousarray(training), truths) for training, truths in pairs()]
 
 
 def programs(options, snesim):
