@@ -368,14 +368,15 @@ def reliable(images, data, number, side, options, out, truths, snesim, walker):
                     f"{each:.2f}",
                 ]
     if out:
-        diagram(curves).savefig(out / "reliability.png", dpi=100)
+        diagram(curves).savefig(out / "reliability.png", dpi=100, bbox_inches="tight")
 
 
 def diagram(curves):
     """A figure with a panel for each image of reliability diagrams, a colour for each program."""
     names, colours = list(dict.fromkeys(name for name, *_ in curves)), {"simdtex": "#0072B2", "SNESIM": "#D55E00"}
-    down = -(-len(names) // 3)
-    figure, grid = plt.subplots(down, 3, figsize=(10, 3.4 * down), squeeze=False, layout="constrained")
+    across, down = min(3, len(names)), -(-len(names) // 3)
+    size = (3.4 * across, 3.8 * down + 1)
+    figure, grid = plt.subplots(down, across, figsize=size, squeeze=False, layout="constrained")
     for axes, name in zip(grid.ravel(), names, strict=False):
         axes.plot((0, 1), (0, 1), color="grey", linewidth=0.8)
         for (of, count, program), found in curves.items():
@@ -384,7 +385,7 @@ def diagram(curves):
                 axes.plot(found.probability, found.frequency, style, marker=".", color=colours[program])
                 axes.lines[-1].set_label(f"{program}, {count} wells")
         axes.set(title=name, xlabel="probability", ylabel="frequency in the truths", aspect=1)
-    grid[0, 0].legend(fontsize=7, frameon=False)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=across, frameon=False)
     for axes in grid.ravel()[len(names) :]:
         axes.set_axis_off()
     return figure
