@@ -4,6 +4,8 @@
     python benchmarks/simulation.py [--parts maps,border,volumes,soft] [--images channels,network,lenses,meanders]
                                     [--data 0,50,200,500] [--number 50] [--side N] [--options NAME=VALUE,...]
                                     [--out DIR] [--device TEXT]
+    python benchmarks/simulation.py --parts reliability,likeness --data 0,20,60 --number 20 [--truths 30]
+                                    [--walker CSV] [--snesim PROGRAM] ...
 
 ``--options`` are those of `simdtex.simulate` that differ from its defaults, ``--number`` is that of realisations, and
 ``--side`` makes other sizes. ``--out`` takes a table for each part.
@@ -20,13 +22,28 @@ soft     the shares of channels in 128 x 128 pixels, means of 8 realisations, by
          same probability is asked everywhere, in four bands of a gradient from 0 to 1, and in 16 blocks of 32 x 32, by
          how much they differ from 0.1, 0.15 ... 0.85; and the dead ends and the js 4x4 of the second map. Weight 0 is a
          run without, and *proportions* are asked instead of the first four maps.
+
+reliability  whether ensembles tell how uncertain they are. Truths are windows of 128 x 128 of images as of *maps*, of a
+         ``volume``, and of Walker Lake (columns X, Y and V of ``--walker``: the upper three tenths of V), known at
+         random wells. The training image is another part of the image, of which ten are drawn. *share in* and *area in*
+         are how often P10 to P90 of an ensemble has the truth's share of category 1, and the connected area of up to 5
+         wells, without wells that of the largest body; *exchangeable* is what draws of one law would have. *above .9*
+         and *below .1* are how often the truth has category 1 where so many realisations have it. *within* and *truths*
+         are deviations of the share in an ensemble, and among the truths. The windows of Walker Lake overlap.
+likeness windows of the same images beside realisations without data: the variogram at three lags over the training
+         image's, the mean difference of connectivity functions, dead ends, js 4x4, copies, and CPU seconds.
+
+With ``--snesim`` both parts have rows of that program too: mps_snesim_tree of MPSlib (PyPI: scikit-mps).
 """
 
+import os
 from itertools import pairwise
 from pathlib import Path
 
 import common
+import matplotlib.pyplot as plt
 import numpy as np
+import snesim as program_of_mpslib
 from channels import Scene, channels
 from scipy import ndimage
 from scipy.spatial import KDTree
@@ -34,7 +51,7 @@ from scipy.spatial import KDTree
 import simdtex
 from simdtex.io import image as files
 from simdtex.jobs.simulation.ensemble import channels as of_the_pages
-from simdtex.jobs.simulation.ensemble import connectivity, summary, variogram
+from simdtex.jobs.simulation.ensemble import connectivity, reliability, summary, variogram
 from simdtex.random import as_seed
 
 SPECK = 16  # pixels of a body that is one, at most
@@ -47,6 +64,10 @@ SHARE = 0.3  # of lenses, and of channels in a volume; half of it of meanders
 FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
 BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
 DISTANCES, EACH = (0, 3, 8, 16, 32, 1000), 16  # from the border, pixels, and realisations
+SIDE, LARGE, DRAWN = 128, 5, 10  # of a truth, pixels; sides of a truth in a drawn image; and drawn images of a kind
+LAYERS, SHALLOW = 12, 40  # of a volume, and the side of its truths
+WELLS = 5  # whose connected areas count
+LAGS = (1, 8, 16)
 
 
 def network(shape, rng=None):
@@ -246,23 +267,191 @@ def _patterns(made, image):
     return f"{found.dead_ends[1][:-1].mean():.2f}", f"{found.anodi.by_level[0, 1]:.3f}"
 
 
+def shared(many, images):
+    """The numbers of truths of so many images, as even as they can be; none is 0."""
+    return [len(part) for part in np.array_split(np.arange(many), images) if len(part)]
+
+
+def drawn(draw, side, many):
+    """Yield pairs of a training image and its truths: the first 2 x 2 windows of a drawn image, and others of it."""
+    windows = [(row, col) for row in range(LARGE) for col in range(LARGE) if max(row, col) > 1]
+    for seed, here in enumerate(shared(many, DRAWN), 1):
+        image, of_seed = draw((LARGE * side, LARGE * side), seed), np.random.default_rng(seed).permutation(windows)
+        cut = [image[..., r * side : (r + 1) * side, c * side : (c + 1) * side] for r, c in of_seed[:here]]
+        yield image[..., : 2 * side, : 2 * side], cut
+
+
+def lake(path, side, many):
+    """Yield pairs of a training image and its truths: the rest of Walker Lake beyond one of its sides, and windows."""
+    table = np.genfromtxt(path, delimiter=",", names=True, deletechars='"')
+    x, y, v = (table[name] for name in "XYV")
+    image = np.zeros((int(y.max()), int(x.max())), np.uint8)
+    image[y.astype(int) - 1, x.astype(int) - 1] = v > np.quantile(v, 1 - SHARE)
+    for turn, here in enumerate(shared(many, 4)):
+        turned = np.rot90(image, turn)
+        at = np.linspace(0, turned.shape[1] - side, here).astype(int)
+        back = [np.rot90(turned[:side, col : col + side], -turn) for col in at]
+        yield np.rot90(turned[side:], -turn), back
+
+
+def cases(images, side, truths, walker):
+    """Yield the name of an image, and its pairs of a training image and truths."""
+    known = {name: lambda draw=draw: drawn(draw, side or SIDE, truths) for name, draw in IMAGES.items()}
+    known["volume"] = lambda: drawn(lambda shape, seed: model((LAYERS, *shape), seed), SHALLOW, truths)
+    if walker:
+        known["walker"] = lambda: lake(walker, side or SIDE, truths)
+    for name, pairs in common.chosen(known, images).items():
+        yield name, [(np.ascontiguousarray(training), truths) for training, truths in pairs()]
+
+
+def programs(options, snesim):
+    """Functions (training, n, shape, known, seed) that return realisations, by name."""
+
+    def own(training, n, shape, known, seed):
+        return simdtex.simulate(training, n, shape=shape, known=known, **options | {"rng": seed}).values
+
+    found = {"simdtex": own}
+    if snesim:
+        found["SNESIM"] = lambda *given: program_of_mpslib.simulate(snesim, *given)
+    return found
+
+
+def seconds():
+    """CPU seconds of this process and of its children."""
+    return sum(os.times()[:4])
+
+
+def areas(image, known):
+    """The cells of the body of each of the first wells in category 1; without wells those of the largest body."""
+    labels, _ = ndimage.label(image == 1)
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    if known is None:
+        return [sizes.max()]
+    return sizes[labels[np.nonzero(known.filled(0) == 1)]][:WELLS]
+
+
+def within(made, truth):
+    """Whether P10 to P90 of figures (realisations, ...) have the truth's."""
+    low, high = np.quantile(made, (0.1, 0.9), axis=0)
+    return np.ravel((low <= truth) & (truth <= high))
+
+
+def reliable(images, data, number, side, options, out, truths, snesim, walker):
+    """Rows of the coverage of intervals and of the reliability of probabilities."""
+    exchangeable = 0.8 * (number - 1) / (number + 1)  # P10 lies .1 (n - 1) gaps above the least of n draws
+    curves = {}
+    for name, pairs in cases(images, side, truths, walker):
+        among = np.std([truth.mean() for _, those in pairs for truth in those], ddof=1)
+        for count in data:
+            for program, make in programs(options, snesim).items():
+                shares, bodies, p, true, spread, means, began = [], [], [], [], [], [], seconds()
+                for training, those in pairs:
+                    for truth in those:
+                        known = hard_data(truth, count, seed := len(shares) + 1)
+                        made = make(training, number, truth.shape, known, seed)
+                        share = made.mean(tuple(range(1, made.ndim)))
+                        shares += [*within(share, truth.mean())]
+                        bodies += [*within([areas(one, known) for one in made], areas(truth, known))]
+                        open_ = known.mask if known is not None else np.ones(truth.shape, bool)
+                        p.append((made == 1).mean(0)[open_])
+                        true.append(truth[open_])
+                        spread.append(share.var(ddof=1))
+                        means.append(share.mean() - truth.mean())
+                each = (seconds() - began) / number / len(shares)
+                p, true = np.concatenate(p), np.concatenate(true)
+                curves[name, count, program] = reliability(p, true)
+                ends = [f"{true[those].mean():.2f}" if those.any() else "" for those in (p > 0.9, p < 0.1)]
+                yield [
+                    *(name, count, program, f"{np.mean(shares):.2f}", f"{np.mean(bodies):.2f}", f"{exchangeable:.2f}"),
+                    *(*ends, f"{np.sqrt(np.mean(spread)):.3f}", f"{among:.3f}", f"{np.mean(means):+.3f}"),
+                    f"{each:.2f}",
+                ]
+    if out:
+        diagram(curves).savefig(out / "reliability.png", dpi=100, bbox_inches="tight")
+
+
+def diagram(curves):
+    """A figure with a panel for each image of reliability diagrams, a colour for each program."""
+    names, colours = list(dict.fromkeys(name for name, *_ in curves)), {"simdtex": "#0072B2", "SNESIM": "#D55E00"}
+    across, down = min(3, len(names)), -(-len(names) // 3)
+    size = (3.4 * across, 3.8 * down + 1)
+    figure, grid = plt.subplots(down, across, figsize=size, squeeze=False, layout="constrained")
+    for axes, name in zip(grid.ravel(), names, strict=False):
+        axes.plot((0, 1), (0, 1), color="grey", linewidth=0.8)
+        for (of, count, program), found in curves.items():
+            if of == name:
+                style = dict(zip(sorted({one for _, one, _ in curves}), (":", "--", "-", "-."), strict=False))[count]
+                axes.plot(found.probability, found.frequency, style, marker=".", color=colours[program])
+                axes.lines[-1].set_label(f"{program}, {count} wells")
+        axes.set(title=name, xlabel="probability", ylabel="frequency in the truths", aspect=1)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=across, frameon=False)
+    for axes in grid.ravel()[len(names) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def likeness(images, _data, number, side, options, _out, truths, snesim, walker):
+    """Rows of the likeness of windows and of realisations without data, of maps."""
+    for name, pairs in cases(images or ",".join([*IMAGES, *(["walker"] if walker else [])]), side, truths, walker):
+        training, those = pairs[0]
+        yield [name, "windows", *_like(np.stack([one for _, some in pairs for one in some]), training), ""]
+        for program, make in programs(options, snesim).items():
+            began = seconds()
+            made = make(training, number, those[0].shape, None, 1)
+            yield [name, program, *_like(made, training), f"{(seconds() - began) / number:.2f}"]
+
+
+def _like(made, training):
+    found = summary(made, training)
+    theirs, own = found.variograms[:, 1, :-1].mean((0, 1)), found.variograms[:, 1, -1].mean(0)
+    joined, of = found.connectivity[:, 1, :-1], found.connectivity[:, 1, -1:]
+    return [
+        *(f"{theirs[lag] / own[lag]:.2f}" for lag in LAGS),
+        *(f"{np.nanmean(joined - of):+.3f}", f"{found.dead_ends[1, :-1].mean():.2f}", f"{found.dead_ends[1, -1]:.2f}"),
+        *(f"{found.anodi.by_level[0, 1]:.3f}", f"{np.nanmean(found.copied):.2f}"),
+    ]
+
+
 OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
+OF_ENSEMBLES = "image|wells|program|share in|area in|exchangeable|above .9|below .1|within|truths|share off|seconds"
+OF_WINDOWS = (
+    "image|program|variogram 1|variogram 8|variogram 16|connectivity|dead ends|in the image|js 4x4|copied|seconds"
+)
 BANDS = [f"band {p}" for p in (0.125, 0.375, 0.625, 0.875)]
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
     "border": (border, ["image", "side", *(f"from {least}" for least in DISTANCES[:-1])]),
     "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
+    "reliability": (reliable, OF_ENSEMBLES.split("|")),
+    "likeness": (likeness, OF_WINDOWS.split("|")),
     "soft": (soft, ["channels", *map(str, FLAT), *BANDS, "blocks off by", "at most", "dead ends", "js 4x4"]),
 }
 
 
 @common.command
-def main(parts="", images="", data=(0, 50, 200, 500), number=50, side=int, options="", out=Path, device=None):
+def main(
+    parts="",
+    images="",
+    data=(0, 50, 200, 500),
+    number=50,
+    side=int,
+    options="",
+    truths=30,
+    snesim=Path,
+    walker=Path,
+    out=Path,
+    device=None,
+):
     given = {"categorical": True, "rng": 1, "device": common.opened(device)} | common.parsed(options)
     if out:
         out.mkdir(parents=True, exist_ok=True)
+    of_truths = {"truths": truths, "snesim": snesim, "walker": walker}
     for part, (rows, header) in common.chosen(PARTS, parts).items():
-        found = list(rows(images, data, number, side, given, out))
+        more, found = of_truths if part in ("reliability", "likeness") else {}, []
+        for row in rows(images, data, number, side, given, out, **more):
+            print(*row, flush=True)  # a part may take hours
+            found.append(row)
         common.table(part, header, found, out and out / f"simulation-{part}.csv")
 
 

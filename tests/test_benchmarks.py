@@ -146,3 +146,33 @@ def test_one_command_gives_the_tables_and_the_sheets(fill, tmp_path, monkeypatch
     with open(tmp_path / "tile.csv", encoding="utf-8", newline="") as file:
         assert [line["filling"] for line in csv.DictReader(file)] == 2 * ["as it is", "band 4", "continued"]
     assert (tmp_path / "fill-red.png").is_file() and (tmp_path / "tile-red.png").is_file()
+
+
+# -- The figures of benchmarks/simulation.py on truths, and the files of SNESIM.
+def test_truths_are_no_part_of_their_training_image_and_as_many_as_asked(script, monkeypatch, tmp_path):
+    simulation = script("simulation")
+    monkeypatch.setattr(simulation, "DRAWN", 2)
+
+    def numbers(shape, seed):
+        return np.arange(np.prod(shape)).reshape(shape) + 1e6 * seed
+
+    (tmp_path / "lake.csv").write_text(
+        '"U","V","X","Y"\n' + "".join(f"0,{x * y},{x},{y}\n" for y in range(1, 9) for x in range(1, 7))
+    )
+    drawn, lake = [*simulation.drawn(numbers, 3, 5)], [*simulation.lake(tmp_path / "lake.csv", 3, 5)]
+    assert [len(truths) for _, truths in drawn] == [3, 2] and [len(truths) for _, truths in lake] == [2, 1, 1, 1]
+    for training, truths in drawn:
+        assert training.shape == (6, 6) and not np.isin(truths, training).any()
+    assert [training.shape for training, _ in lake] == [(5, 6), (8, 3), (5, 6), (8, 3)]
+    assert lake[2][1][0].all() and not lake[0][1][0].all(), "V is largest where x and y are, in the last rows"
+
+
+def test_intervals_of_draws_of_one_law_have_so_many_truths(script):
+    simulation = script("simulation")
+    draws = np.random.default_rng(1).normal(size=(21, 4000))
+    assert simulation.within(draws[:20], draws[20]).mean() == pytest.approx(0.8 * 19 / 21, abs=0.02)
+    image = np.zeros((9, 9), int)
+    image[1:3], image[6, 6] = 1, 1
+    known = np.ma.masked_all((9, 9), int)
+    known[1, 1], known[6, 6], known[4, 4] = 1, 1, 0
+    assert simulation.areas(image, known).tolist() == [18, 1] and simulation.areas(image, None) == [18]

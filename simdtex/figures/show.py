@@ -135,6 +135,11 @@ def draw(made: Any, number: int = 8) -> Figure:
     maps = getattr(made, "data_vars", {})
     if "simulation" in maps:
         return draw(made["simulation"], number)
+    if "frequency" in maps:
+        axes = (figure := new_figure(4, 4, layout="constrained")).subplots()
+        axes.plot((0, 1), (0, 1), "k:", made["probability"], made["frequency"], "o-")
+        axes.set(xlabel="probability", ylabel="frequency", aspect=1)
+        return figure
     if "probability" in maps:
         names, shares = made["category"].values, made["probability"].values.mean((1, 2))
         most = np.sort(np.argsort(-shares, kind="stable")[:number])
@@ -234,7 +239,7 @@ class Realisations(xr.DataArray):  # type: ignore[no-untyped-call]
 
 
 class Results(xr.Dataset):  # type: ignore[no-untyped-call]
-    """A dataset of an estimate, or of realisations and their source maps."""
+    """A dataset of an estimate, of realisations and their source maps, or of reliability."""
 
     __slots__ = ()
     plot = UncachedAccessor(_DatasetPlot)

@@ -7,6 +7,7 @@ import os
 import numpy as np
 import PIL.Image
 import pytest
+import xarray
 from cases import texture
 from click.testing import CliRunner
 from pages import assert_needs_nothing_else, embedded, read_page
@@ -281,7 +282,7 @@ def test_a_report_of_categories(tmp_path):
     training = training[:48, :44]
     data = [(10, 20, images[0, 20, 10]), (43, 39, images[0, 39, 43])]
     write_ensemble(tmp_path / "r", training, images, data=data, command="simdtex simulate <ti>")
-    files = {"error.png", "volumes.png", "copies.png", "connectivity.png"}
+    files = {"error.png", "volumes.png", "copies.png", "connectivity.png", "shares.png"}
     assert set(os.listdir(tmp_path / "r")) == ALWAYS | files
     page = read_page(tmp_path / "r" / "index.html")
     assert_needs_nothing_else(page)
@@ -297,6 +298,19 @@ def test_a_report_of_categories(tmp_path):
     copied = ensemble.copied(ensemble.copies(images, training))
     np.testing.assert_allclose(results["copied"], copied)
     assert f"{number_text(copied.mean(), copied.std(ddof=1))} stand in the training image" in page.text
+
+
+def test_shares_of_all_realisations_beside_those_that_they_aim_at():
+    shares = np.array([[0.6, 0.8, 0.7], [0.4, 0.2, 0.3]])  # of two realisations and the training image
+    numbers = {"realisation": [4, 5], "share_2": ("realisation", [0.45, 0.25])}
+    made = xarray.DataArray(np.zeros((2, 3, 3)), dims=("realisation", "y", "x"), coords=numbers)
+    for asked, drawn in (("", 2), ("0.7 0.3", 3)):
+        figure = report_ensemble._reached(made.assign_attrs(shares_asked=asked), np.array([1, 2]), shares).picture
+        first, second = figure.axes
+        assert len(first.lines) == drawn
+        aimed, reached, own = (line.get_xydata().tolist() for line in second.lines)
+        assert aimed == [[4, 0.45], [5, 0.25]] and reached == [[4, 0.4], [5, 0.2]] and own[0][1] == 0.3
+    assert first.lines[0].get_ydata().tolist() == [0.7, 0.7]
 
 
 def test_the_index_map_shows_each_copied_pixel_where_it_is_from():
@@ -321,7 +335,7 @@ def test_reports_of_continuous_values_and_of_a_single_realisation_of_many_catego
     monkeypatch.setattr(report_ensemble, "MOST_PANELS", 2)
     training = np.arange(144).reshape(12, 12) % 9
     write_ensemble(tmp_path / "s", training, training[np.newaxis, :10, :11])
-    assert set(os.listdir(tmp_path / "s")) == ALWAYS | {"connectivity.png"}
+    assert set(os.listdir(tmp_path / "s")) == ALWAYS | {"connectivity.png", "shares.png"}
     text = read_page(tmp_path / "s" / "index.html").text
     assert "n/a" in text and "9 categories" in text and "There are no hard data." in text
     with pytest.raises(ValueError, match="is at no pixel"):

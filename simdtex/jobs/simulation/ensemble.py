@@ -2,7 +2,7 @@
 """Figures of an ensemble of realisations: its uncertainty, and its likeness to the training image.
 
 `probability`, `e_type`, `quantiles`, `connected_volume`, `vertical_proportions` and `standard_error` take and return an
-`xarray.DataArray`: see `simdtex.jobs.simulation.uncertainty`.
+`xarray.DataArray`: see `simdtex.jobs.simulation.uncertainty`. `reliability` compares probabilities with a truth.
 
 For the other figures an ensemble is an array (realisations, rows, cols). Categorical ones hold the values of
 categories, continuous ones integers or floats. The training image is (rows, cols), of the same kind and of any size.
@@ -31,6 +31,7 @@ from simdtex.jobs.simulation.uncertainty import (  # noqa: F401 - in __all__
     e_type,
     probability,
     quantiles,
+    reliability,
     standard_error,
     vertical_proportions,
 )
@@ -600,8 +601,8 @@ def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
 
 __all__ = [
     *("Anodi", "Connectivity", "Summary", "anodi", "categories_of", "channels", "connected_volume", "connectivity"),
-    *("copied", "copies", "dead_ends", "e_type", "probability", "quantiles", "standard_error", "summary"),
-    "vertical_proportions",
+    *("copied", "copies", "dead_ends", "e_type", "probability", "quantiles", "reliability", "standard_error"),
+    *("summary", "vertical_proportions"),
 ]
 
 

@@ -116,14 +116,14 @@ def _kept(figures: Summary) -> str:
     return f"Of the {data}, {share:.1%} are missed on average, in {bad} of the {realisations} realisations."
 
 
-def _drawn(figures: Summary) -> list[int]:
-    """Return the numbers of the categories that are drawn: all, or those of the largest shares."""
-    return sorted(np.argsort(-figures.shares[:, -1], kind="stable")[:MOST_PANELS].tolist())
+def _drawn(shares: Floats) -> list[int]:
+    """Return the numbers of the categories that are drawn: all, or those with most of the training image."""
+    return sorted(np.argsort(-shares[:, -1], kind="stable")[:MOST_PANELS].tolist())
 
 
 def _mapped(figures: Summary) -> list[int]:
     """Return the categories that have a map; of two, the second is enough."""
-    return [1] if len(figures.categories) == 2 else _drawn(figures)
+    return [1] if len(figures.categories) == 2 else _drawn(figures.shares)
 
 
 def _realisations(images: Array, own: Array, figures: Summary) -> Figure:
@@ -330,7 +330,7 @@ def _lagged(lags: Array, table: Floats, names: Sequence[str], label: str, made: 
 
 
 def _connectivity(made: DataArray, found: Summary) -> list[Part]:
-    shown = _drawn(found)
+    shown = _drawn(found.shares)
     names = [f"category {found.categories[k]}" for k in shown]
     figures = {
         "Share": found.shares,
@@ -349,7 +349,25 @@ def _connectivity(made: DataArray, found: Summary) -> list[Part]:
             "above that they merge. A smaller image cuts bodies apart, so compare images of one size if you can.",
         ),
         _figures(found.categories, figures, note),
+        _reached(made, found.categories, found.shares),
     ]
+
+
+def _reached(made: DataArray, categories: Array, shares: Floats) -> Figure:
+    """Return the shares of categories (K, n + 1) that realisations have and aim at, and the training image has."""
+    shown, numbers = _drawn(shares), made["realisation"].values
+    panels = (figure := new_figure(1 + 2.8 * len(shown), 3)).subplots(1, len(shown), squeeze=False)[0]
+    asked = made.attrs.get("shares_asked", "").split() or [None] * len(categories)
+    for k, axes in zip(shown, panels, strict=True):
+        if (aims := made.coords.get(f"share_{categories[k]}", asked[k])) is not None:
+            aimed = np.full(len(numbers), aims, float)
+            axes.plot(numbers, aimed, "o", color=THEIRS, fillstyle="none", label="aimed at")
+        axes.plot(numbers, shares[k, :-1], ".", color=THEIRS, label="realisations")
+        axes.axhline(shares[k, -1], color=OWN, linestyle="--", label="training image")
+        tidy(axes, f"category {categories[k]}", "realisation", "share" if axes is panels[0] else "")
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    legend(figure, panels[0])
+    return Figure("shares.png", figure, "Shares that realisations have and aim at. Areas vary too little if shares do.")
 
 
 def _figures(categories: Array, figures: dict[str, Floats], note: str) -> Table:
@@ -500,7 +518,8 @@ def write_volumes(
         }
         functions = [body.function for body in bodies[-1]]
         table = _figures(names, figures, " Voxels are connected by their faces.")
-        sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table]))
+        shares = _reached(made, names, figures["Share"])
+        sections.append(Section("Connectivity of the categories", [lagged("connectivity", functions), table, shares]))
         results |= {"connectivity": [functions[-1], *functions[:-1]], "categories": names}
     size = " x ".join(str(side) for side in made.shape[:0:-1])
     lead = f"{len(made)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."

@@ -22,9 +22,10 @@ from simdtex.io.rasters import axis_place
 from simdtex.options import require
 
 if TYPE_CHECKING:
-    from xarray import DataArray
+    from xarray import DataArray, Dataset
 
 Array = NDArray[Any]
+CLASSES = tuple(k / 10 for k in range(11))  # of probabilities
 
 
 def probability(realisations: DataArray, category: float) -> DataArray:
@@ -120,6 +121,51 @@ def standard_error(realisations: DataArray, category: float | None = None) -> Da
     curve = named(errors, "realisations", coords={"realisations": counts})
     unit = None if category is None else ""
     return _described(curve, realisations, "standard_error", "standard error of the map", unit)
+
+
+def reliability(probability: ArrayLike, truth: ArrayLike, bounds: Sequence[float] = CLASSES) -> Dataset:
+    """Return how often what has a probability is true, by classes of the probability: a reliability diagram.
+
+    Parameters
+    ----------
+    probability, truth : array_like
+        Probabilities of any shape, as of one or several maps, and 1 where it is true, 0 elsewhere. NaN is left out.
+    bounds : sequence of float
+        Of classes, ascending from 0 to 1; a class has its lower bound, and the last one has 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each class, (lower,) with the coordinate ``upper``, the mean ``probability``, the ``frequency`` of what is
+        true, both NaN in an empty class, and the ``number`` of cells. ``plot()`` draws them.
+
+    Raises
+    ------
+    ValueError
+        The shapes or places differ, a value is no probability or neither 0 nor 1, or bounds do not ascend from 0 to 1.
+
+    Examples
+    --------
+    >>> from simdtex import ensemble
+    >>> ensemble.reliability([0.1, 0.2, 0.2, 0.9], [0, 0, 1, 1], bounds=[0, 0.5, 1]).frequency.values.round(2).tolist()
+    [0.33, 1.0]
+    """
+    from simdtex.figures.show import Results
+
+    p, true = (np.ma.filled(np.ma.asarray(one, np.float64), np.nan) for one in (probability, truth))
+    both: list[Any] = [one for one in (probability, truth) if hasattr(one, "dims")]
+    places, edges = [[(dim, one[dim].values.tolist()) for dim in one.dims] for one in both], np.asarray(bounds, float)
+    if p.shape != true.shape or places[1:] not in ([], places[:1]):
+        raise ValueError(f"probability {p.shape} and truth {true.shape} are of different cells; give both of the same")
+    if edges.ndim != 1 or len(edges) < 2 or edges[0] != 0 or edges[-1] != 1 or not (np.diff(edges) > 0).all():
+        raise ValueError("the bounds do not ascend from 0 to 1; give some as [0, 0.1, 0.9, 1]")
+    p, true = (one[~np.isnan(p + true)] for one in (p, true))
+    if not (((p >= 0) & (p <= 1)).all() and np.isin(true, (0, 1)).all()):
+        raise ValueError("probabilities are 0 to 1, and the truth is 0 or 1; give maps == category as the truth")
+    number, sums, hits = (np.histogram(p, edges, weights=weights)[0] for weights in (None, p, true))
+    each = np.where(number, number, np.nan)
+    found = {"probability": sums / each, "frequency": hits / each, "number": number, "upper": edges[1:]}
+    return Results({name: ("lower", one) for name, one in found.items()}, {"lower": edges[:-1]}).set_coords("upper")
 
 
 def named(data: Any, *dims: str, **about: Any) -> DataArray:

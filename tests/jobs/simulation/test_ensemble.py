@@ -279,6 +279,29 @@ def test_maps_and_shares_of_a_known_ensemble():
     assert ensemble.standard_error(maps, 3)[0] == pytest.approx(np.sqrt(10 / 60 / 4))  # cells of which one has 3
 
 
+def test_reliability_of_probabilities_that_are_right_and_of_those_that_are_too_sure():
+    """Truths are drawn from probabilities of .05 ... .95; too sure are those that are moved from a half."""
+    rng = np.random.default_rng(1)
+    right = np.repeat(np.arange(0.05, 1, 0.1), 4000).reshape(10, 40, 100)
+    truth = rng.random(right.shape) < right
+    found = ensemble.reliability(right, truth)
+    np.testing.assert_allclose(found.probability, right[:, 0, 0])
+    np.testing.assert_allclose(found.frequency, found.probability, atol=0.03)
+    assert found.number.values.tolist() == [4000] * 10 and found.upper.values[-1] == 1
+    sure = ensemble.reliability(np.clip(2 * right - 0.5, 0, 1), truth)
+    assert sure.frequency.sel(lower=0.9) < 0.9 and sure.frequency[0] > 0.1 and sure.number[0] > 8000
+
+
+def test_reliability_has_bounds_below_no_number_for_empty_classes_and_no_unknown_cells():
+    counts = np.arange(21) / 20  # as of 20 realisations; .3 belongs to the class from .3 on
+    assert ensemble.reliability(counts, counts > 0.5).number.values.tolist() == [2] * 9 + [3]
+    found = ensemble.reliability([0.2, 0.3, np.nan, 0.1], [0, 1, 1, np.nan], [0, 0.5, 1])
+    assert found.number.values.tolist() == [2, 0] and found.frequency[0] == 0.5 and found.probability[0] == 0.25
+    assert np.isnan(found.frequency[1]) and np.isnan(found.probability[1])
+    axes = found.plot().axes[0]
+    assert axes.lines[1].get_xydata()[0].tolist() == [0.25, 0.5] and axes.get_xlabel() == "probability"
+
+
 def test_unknown_cells_count_for_nothing():
     maps = reservoir().assign_coords(region=(("z", "y", "x"), np.arange(60).reshape(3, 4, 5) % 20 < 10))
     maps[:, :, 2:] = 255
@@ -296,6 +319,7 @@ def test_plots_of_xarray_have_names_units_and_north_up():
 
 
 IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
+HALF = xarray.DataArray(np.full((3, 3), 0.5), dims=("y", "x"), coords={"y": range(3), "x": range(3)})
 
 
 @pytest.mark.parametrize(
@@ -321,6 +345,13 @@ IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
         (lambda: ensemble.connected_volume(reservoir(), 3, (90,)), "x, y and perhaps z of the well"),
         (lambda: ensemble.connected_volume(reservoir().isel(x=0), 3, (100, 5)), "one variable with y and x"),
         (lambda: ensemble.vertical_proportions(reservoir()[:, 0]), "with the dimension z"),
+        (lambda: ensemble.reliability([0.5], [0, 1]), "different cells"),
+        (lambda: ensemble.reliability(HALF, HALF.T > 1), "different cells"),
+        (lambda: ensemble.reliability(HALF, (HALF > 1).assign_coords(x=[1, 2, 3])), "different cells"),
+        (lambda: ensemble.reliability([1.5], [1]), "0 to 1, and the truth is 0 or 1"),
+        (lambda: ensemble.reliability([0.5], [3]), "0 to 1, and the truth is 0 or 1"),
+        (lambda: ensemble.reliability([0.5], [1], [0, 0.5]), "do not ascend from 0 to 1"),
+        (lambda: ensemble.reliability([0.5], [1], [0, 0.5, 0.5, 1]), "do not ascend from 0 to 1"),
         (lambda: ensemble.connected_volume(reservoir()[..., ::-1], 3, (100, 5)), "evenly spaced in ascending order"),
     ],
 )
