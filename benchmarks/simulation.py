@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How like the training image realisations are, with and without hard and soft data.
 
-    python benchmarks/simulation.py [--parts maps,border,volumes,soft] [--images channels,network,lenses,meanders]
-                                    [--data 0,50,200,500] [--number 50] [--side N] [--options NAME=VALUE,...]
-                                    [--out DIR] [--device TEXT]
+    python benchmarks/simulation.py [--parts maps,border,places,volumes,soft]
+                                    [--images channels,network,lenses,meanders] [--data 0,50,200,500] [--number 50]
+                                    [--side N] [--options NAME=VALUE,...] [--out DIR] [--device TEXT]
     python benchmarks/simulation.py --parts reliability,likeness --data 0,20,60 --number 20 [--truths 30]
                                     [--walker CSV] [--snesim PROGRAM] ...
 
@@ -15,6 +15,11 @@ maps     training images of channels, of a network of thin lines without ends, o
          same kind. ``--out`` also takes pictures: the training image, two realisations, and the share of category 1.
 border   the share of category 1 by the distance from the border of the map, in pixels: 16 *others* of each kind of
          *maps*, and 16 realisations, also of a quarter of the side from a quarter of the training image.
+places   the greatest |z| of the shares of category 1 in bands of 8 rows, bands of 8 columns, and the four corners (a
+         quarter of a side), and how much they are off by: means of realisations of 128 x 128 from an image of twice the
+         side, less the share of each realisation. A |z| of 3.0 is the 5 % limit of 16 bands, 2.5 of four corners. Rows
+         are free realisations, those on a torus, and those with soft data of 0.5, and of 0.1 to 0.9 along the columns,
+         where *pixels off by* is the root mean square difference, and *by chance* what independent draws give.
 volumes  channels of elliptic cross section along x in 100 x 100 x 30 voxels, at random depths: the share of channels,
          the data missed, and the mean absolute differences, from the training image, of the indicator variograms and
          of the connectivity functions along z, y and x, lags up to a third of a side; *another* is one more draw.
@@ -63,6 +68,7 @@ SIZES = ((56, 10), (22, 7))  # lengths and heights of lenses, pixels
 SHARE = 0.3  # of lenses, and of channels in a volume; half of it of meanders
 FLAT, WEIGHTS = (0.1, 0.27, 0.5, 0.8), (0, 0.25, 1, 4)  # probabilities, and weights, of soft data
 BLOCK, TOGETHER = 32, 8  # pixels of a side, and realisations
+BAND = 8  # rows or columns
 DISTANCES, EACH = (0, 3, 8, 16, 32, 1000), 16  # from the border, pixels, and realisations
 SIDE, LARGE, DRAWN = 128, 5, 10  # of a truth, pixels; sides of a truth in a drawn image; and drawn images of a kind
 LAYERS, SHALLOW = 12, 40  # of a volume, and the side of its truths
@@ -180,6 +186,41 @@ def _by_distance(made):
     apart = np.minimum(np.minimum(row, rows - 1 - row), np.minimum(col, cols - 1 - col))
     bands = [made[:, (apart >= least) & (apart < most)] for least, most in pairwise(DISTANCES)]
     return [f"{one.mean():.3f}" if one.size else "" for one in bands]
+
+
+def places(images, _data, number, side, options, _out):
+    """Rows of how far the shares of category 1 depend on the place."""
+    side = (side or 128) // BLOCK * BLOCK
+    for name, draw in common.chosen({"pages": lambda *_: of_the_pages()[0]} | IMAGES, images or "pages").items():
+        image = draw((2 * side, 2 * side), 1)
+        slope = np.tile(np.linspace(0.1, 0.9, side), (side, 1))
+        cases = {"free": {}, "torus": {"boundary": "torus"}, "0.5": np.full((side, side), 0.5), "0.1 to 0.9": slope}
+        for case, given in cases.items():
+            p = given if isinstance(given, np.ndarray) else None
+            given = given if p is None else {"probabilities": np.stack([1 - p, p])}
+            made = simdtex.simulate(image, number, shape=(side, side), **given, **options).values == 1
+            mean, least = made.mean(0), number - 1
+            pixels = ("", "") if p is None else (((mean - p) ** 2).mean(), (mean * (1 - mean)).mean() / least)
+            shares = made.mean((1, 2))
+            rest = made - shares[:, None, None] - (0 if p is None else p - p.mean())
+            yield [
+                *(name, case, f"{shares.mean():.3f}", f"{shares.std(ddof=1):.4f}"),
+                *(text for parts in _parts(rest) for text in _greatest(parts)),
+                *(one and f"{np.sqrt(one):.3f}" for one in pixels),
+            ]
+
+
+def _parts(rest):
+    """Means (realisations, parts) over bands of rows, bands of columns, and corners."""
+    n, rows, cols = rest.shape
+    bands = rest.reshape(n, rows // BAND, -1).mean(2), rest.mean(1).reshape(n, -1, BAND).mean(2)
+    corners = rest.reshape(n, 4, rows // 4, 4, cols // 4).mean((2, 4))[:, ::3, ::3]
+    return *bands, corners.reshape(n, 4)
+
+
+def _greatest(parts):
+    mean = abs(parts.mean(0))
+    return f"{(mean / parts.std(0, ddof=1)).max() * np.sqrt(len(parts)):.1f}", f"{mean.max():.3f}"
 
 
 def model(shape, seed):
@@ -419,9 +460,11 @@ OF_WINDOWS = (
     "image|program|variogram 1|variogram 8|variogram 16|connectivity|dead ends|in the image|js 4x4|copied|seconds"
 )
 BANDS = [f"band {p}" for p in (0.125, 0.375, 0.625, 0.875)]
+OF_PLACES = [f"{part} {what}" for part in ("rows", "columns", "corners") for what in ("|z|", "off by")]
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
     "border": (border, ["image", "side", *(f"from {least}" for least in DISTANCES[:-1])]),
+    "places": (places, ["image", "asked", "share", "deviation", *OF_PLACES, "pixels off by", "by chance"]),
     "volumes": (volumes, ["data", "share", "wanted", "misses", "variograms", "connectivity"]),
     "reliability": (reliable, OF_ENSEMBLES.split("|")),
     "likeness": (likeness, OF_WINDOWS.split("|")),

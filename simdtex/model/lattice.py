@@ -167,13 +167,13 @@ class Grid:
         there: tuple[Any, ...] = (..., *np.ix_(*self.lines()))
         return whole[there] if self.origin else whole
 
-    def near_edge(self, radius: int) -> NDArray[np.bool_]:
-        """Return the mask of sites of an open lattice whose neighbourhood of this radius reaches beyond it."""
-        mask = np.zeros(self.shape, bool)
+    def near_edge(self, radius: int) -> NDArray[np.int32]:
+        """Return how far, in sites, the neighbourhood of each site, of this radius, reaches beyond an open lattice."""
+        beyond = np.zeros(self.shape, np.int32)
         if not self.torus:
             for near, n in zip(np.ix_(*self.lines()), self.whole.shape, strict=True):
-                mask |= (near < radius) | (near >= n - radius)
-        return mask
+                beyond = np.maximum(beyond, radius - np.minimum(near, n - 1 - near)).astype(np.int32)
+        return beyond
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices of sites of this grid in the whole output: the keys of random numbers."""

@@ -94,7 +94,8 @@ class Turns:
         after = Turn(following, "sweep", turn.level, cooling, free, active, temperature_sum)
         fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
         if turn.phase != "whole":
-            penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn))
+            temperature = temperature_sum / (1024 * lattices.grid(turn.level).size)
+            penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn), temperature)
             if after.active or after.free < lattices.free_sweeps(turn.level):
                 return store.save(after, penalty)
         if turn.level:

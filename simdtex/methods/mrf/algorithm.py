@@ -130,7 +130,8 @@ def sweep(level: Level, state: MrfState, watch: Watch = ignore) -> tuple[MrfStat
     free = not state.active
     field, memory, chosen = run_steps(level, state, watch)
     count, total = survey(level.machine, level.grid, field.temperature)
-    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, state.penalty)
+    counts, temperature = use_counts(level, field, level.grid), total / (1024 * level.grid.size)
+    penalty = use_penalty(counts, level.fair_use, level.rate, state.penalty, temperature)
     cooling, freed = state.cooling + (not free), state.free + free
     return MrfState(*field, penalty, memory, level.number, cooling, freed, count, total), chosen
 

@@ -49,9 +49,8 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN, GAIN_OF_VALUES = STEPS // 4, STEPS // 20
-"""The most steps by which the penalty of a category, or of a class of values, changes after a sweep of the coarsest
-level; twice that below."""
+GAIN = STEPS // 16
+"""The most steps by which the penalty of a category changes after a sweep of the coarsest level; 8 times that below."""
 
 ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
@@ -347,8 +346,7 @@ class Lattices:
         places = self.places(level)
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(level)
-        gain = GAIN if self.sample.pictures.categories(0) is not None else GAIN_OF_VALUES
-        gain = gain if level == self.levels - 1 else 2 * gain
+        gain = GAIN if level == self.levels - 1 else 8 * GAIN
         asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(level)), "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Launcher, Operation
 from simdtex.methods.mrf.neighbourhood import Field
-from simdtex.model.given import LEAST
 from simdtex.model.lattice import Grid, gathered, sums_around
 from simdtex.model.sample import Candidates
+
+LEAST = 32
+"""The fewest sites without all neighbours, at the finest level, that are regions of their own."""
 
 CAP = 4.0
 """Excess of use over the fair share above which the penalty is constant."""
 
-STEPS = 1024
+STEPS = 2**14
 """Steps of the penalty of a kind in N C sigma^2."""
 
 FEW = 4
@@ -36,7 +38,7 @@ class FairUse:
     of its neighbourhood; ``fair`` (places,) int64, the weight of each, 0 if it is no candidate, or None if all are
     equal; ``listed``, whether numbers count the candidates only, or all places; ``wanted`` (regions, kinds) float64,
     the share that is asked of each kind in each region of the output (`Regions`), if any; ``gain``, the most steps that
-    the penalty of a kind changes by after a sweep.
+    the penalty of a kind changes by after a sweep at the temperature 0.
     """
 
     shape: tuple[int, ...]
@@ -67,7 +69,8 @@ class Regions:
     the finest lattice; ``radius``, that of the neighbourhood; ``unit``, a step of a penalty.
 
     The fewer neighbours a site has, the less it takes to change its kind. So the sites of a region that lack neighbours
-    are a region of their own, unless they are fewer than `LEAST` at the finest level. These follow all others.
+    are regions of their own, one for each distance from the border, unless they are fewer than `LEAST` at the finest
+    level. These follow all others.
     """
 
     p: NDArray[np.float64]
@@ -79,20 +82,21 @@ class Regions:
 
     @cached_property
     def bordered(self) -> NDArray[np.bool_]:
-        """Whether the sites of each region that lack neighbours are a region of their own, (regions,)."""
-        near = self.of[self.grid.near_edge(self.radius) & (self.of >= 0)]
+        """Whether the sites of each region that lack neighbours are regions of their own, (regions,)."""
+        near = self.of[(self.grid.near_edge(self.radius) > 0) & (self.of >= 0)]
         return np.bincount(near, minlength=int(self.of.max()) + 1) >= LEAST
 
     def at(self, grid: Grid) -> NDArray[np.int32]:
         """Return the region of each site of a lattice or a window of it."""
         region: NDArray[np.int32] = grid.cut(grid.decimated(self.of))
-        apart = grid.near_edge(self.radius) & gathered(self.bordered, region, False)
-        return np.where(apart, region + len(self.bordered), region)
+        ring = grid.near_edge(self.radius) * gathered(self.bordered, region, False)
+        apart: NDArray[np.int32] = region + np.int32(len(self.bordered)) * ring
+        return apart
 
     def wanted(self, grid: Grid) -> NDArray[np.float64]:
         """Return the mean of the probabilities at the sites of each region on a lattice, (regions, kinds)."""
         of, p = self.at(grid), grid.decimated(self.p)
-        there, most = of >= 0, 2 * len(self.bordered)
+        there, most = of >= 0, (1 + self.radius) * len(self.bordered)
         sums = [np.bincount(of[there], plane[there], most) for plane in p]
         return np.stack(sums, 1) / np.maximum(np.bincount(of[there], minlength=most), 1)[:, None]
 
@@ -101,7 +105,7 @@ class Regions:
         source, region = grid.latest(field.source), self.at(grid)
         there = (grid.latest(field.temperature) < 1024) & (source >= 0) & (region >= 0)
         cell = region[there] * len(self.p) + self.kinds(source[there])
-        return np.bincount(cell, minlength=2 * len(self.bordered) * len(self.p))
+        return np.bincount(cell, minlength=(1 + self.radius) * len(self.bordered) * len(self.p))
 
     def costs(self, soft: NDArray[np.float32], penalty: NDArray[np.float32], grid: Grid) -> NDArray[np.float32]:
         """Return costs ``soft`` (kinds or more, H, W) plus ``penalty`` (regions x kinds,); the least of a site is 0."""
@@ -133,23 +137,27 @@ def use_penalty(
     fair_use: FairUse,
     rate: float,
     before: NDArray[np.float32] | None = None,
+    temperature: float = 0.0,
 ) -> NDArray[np.float32]:
     """Return penalties during the next sweep, float32: of each candidate, (n,), and of each kind in each region.
 
-    ``counts`` are from `use` and from `Regions`, in this order; ``rate`` is lambda N C sigma^2; and ``before`` are the
-    penalties during the last sweep, at the beginning of a level those of the kinds. The penalty of a candidate is
+    ``counts`` are from `use` and from `Regions`, in this order; ``rate`` is lambda N C sigma^2; ``before`` are the
+    penalties during the last sweep, at the beginning of a level those of the kinds; and ``temperature`` is the mean of
+    t over the lattice. The penalty of a candidate is
     lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the
     mean with that ``before``, so that penalties converge. It is infinite at a place without a candidate.
 
-    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (n - d) / max(n, d, 1) M / (M +
-    `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all sites there.
+    The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (1 - t)^2 (n - d) / max(n, d, 1)
+    M / (M + `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all
+    sites there. Distances, which the penalty is added to, are multiplied by (1 - t)^2 as well. If the gain was not, all
+    sites of a warm lattice would take one kind, and another one in the next sweep.
 
     Giving all sites the nearest candidates, with every candidate used for the same number of sites, is semi-discrete
     optimal transport, whose dual raises the penalty of candidates that are used too often.
     """
     counts, of_kinds = fair_use.split(counts)
     before, kept = fair_use.split(np.zeros(fair_use.wanted.size, np.float32) if before is None else before)
-    kept = kept + _changes(of_kinds, fair_use) if before.size else kept
+    kept = kept + _changes(of_kinds, fair_use, temperature) if before.size else kept
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     price = np.zeros(places, np.float32)
@@ -164,11 +172,11 @@ def use_penalty(
     return np.append((price + before[: price.size]) / np.float32(2) if before.size else price, kept)
 
 
-def _changes(counts: NDArray[np.integer], fair_use: FairUse) -> NDArray[np.float32]:
+def _changes(counts: NDArray[np.integer], fair_use: FairUse, temperature: float) -> NDArray[np.float32]:
     """Return the changes of the penalties of kinds in regions, whole steps, (regions x kinds,)."""
     counts = counts.reshape(fair_use.wanted.shape)
     total = counts.sum(1, keepdims=True)
     due = fair_use.wanted * total
     excess = (counts - due) / np.maximum(np.maximum(counts, due), 1) * total / (total + FEW)
-    changes: NDArray[np.float32] = np.rint(fair_use.gain * excess).astype(np.float32).ravel()
+    changes: NDArray[np.float32] = np.rint(fair_use.gain * (1 - temperature) ** 2 * excess).astype(np.float32).ravel()
     return changes

@@ -13,6 +13,8 @@ from simdtex.checkpoint import read
 from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs.simulation.ensemble import channels
 from simdtex.jobs.simulation.job import realisation_seed
+from simdtex.methods import mrf
+from simdtex.model.pictures import Pictures
 
 xarray = pytest.importorskip("xarray")
 
@@ -182,6 +184,30 @@ def test_shares_are_drawn_for_each_realisation_unless_proportions_a_guide_or_var
         assert "share_0" not in simulate(training, n=1, categorical=True, **how).coords
     several = simulate(np.dstack([training, training]), n=1, categorical=True, channel_axis=-1)
     assert "share_0" not in several.coords
+
+
+def test_shares_do_not_change_to_and_fro_between_sweeps(machine):
+    """The penalty of a category grows in proportion to the distances, which are small while neighbours are warm."""
+    options = mrf.Options(categorical=True, boundary="open", balance=1.0, proportions=(0.7, 0.3))
+    run = mrf.plan(Pictures((channels()[0][:128, :128, None],)), (64, 64), options).on(machine, 1)
+    state, shares, coarsest = run.begin(), [], run.levels - 1
+    while state.level == coarsest and not run.at_equilibrium(state):
+        state, _ = run.step(state)
+        shares.append(run.sample.category(machine.get(state.source).ravel()).mean())
+    assert len(shares) > 20 and abs(np.diff(shares)).mean() < 0.25, shares
+
+
+@pytest.mark.slow
+def test_a_share_depends_on_no_place():
+    """In bands of 8 rows and columns, and corners, means of 80; the image is turned over, since it has trends."""
+    made, training = [], channels()[0]
+    for number, image in enumerate((training, training[::-1], training[:, ::-1], training[::-1, ::-1])):
+        image = np.ascontiguousarray(image)
+        made += [*simdtex.simulate(image, 20, shape=(128, 128), categorical=True, rng=number).values]
+    rest = made - np.mean(made, (1, 2), keepdims=True)
+    corners = rest.reshape(80, 4, 32, 4, 32).mean((2, 4))[:, ::3, ::3].reshape(80, 4)
+    for parts in (rest.reshape(80, 16, -1).mean(2), rest.mean(1).reshape(80, 16, 8).mean(2), corners):
+        assert (abs(parts.mean(0)) < 3 * parts.std(0) / 80**0.5).all(), parts.mean(0)
 
 
 DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")

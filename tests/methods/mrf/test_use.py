@@ -78,6 +78,8 @@ def test_the_penalty_of_a_kind_adds_up_where_it_is_not_as_often_as_asked():
     found = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept))
     assert found[:4].tolist() == [2.5, 2, 0, 3]
     assert found[4:].tolist() == [7 + round(-100 / 3 * 12 / 16), 0, 100 * 12 / 16, 5, 0, 0]
+    warm = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept), 0.5)
+    assert warm[4:].tolist() == [7 + round(-100 / 12 * 12 / 16), 0, 25 * 12 / 16 // 1 + 1, 5, 0, 0], "as distances are"
     begun = use_penalty(np.append(used, kinds), fair_use, 1.0, kept)
     assert begun.tolist() == [3, 0, 0, 0, *kept], "a level begins with those of the level above"
     assert not use_penalty(np.append(used, kinds), fair_use, 1.0)[4:].any(), "the coarsest with none"
@@ -95,18 +97,22 @@ def test_a_kind_is_counted_where_a_region_has_a_relaxed_site_of_it():
     assert found[:, 0].tolist() == [[0, 7, 0, 1], [4, 0, 3, 0], [9] * 4]
 
 
-@pytest.mark.parametrize(("shape", "split"), [((100, 110), 0), ((4, 20, 24), 1)])
-def test_the_sites_of_a_region_that_lack_neighbours_are_another(shape, split):
-    """Of the region in which they are 256 or more, at the finest level of an open lattice."""
-    offsets, p = neighbourhood_offsets(2, len(shape)), np.random.default_rng(1).random((2, *shape))
-    of = np.zeros(shape, np.int32)
-    of[..., :20], of[..., 0] = 1, -1
+@pytest.mark.parametrize(("shape", "split"), [((100, 110), 0), ((4, 20, 23), 1)])
+def test_the_sites_of_a_region_that_lack_neighbours_are_others(shape, split):
+    """By the distance from the border; of the region in which they are 32 or more, on the finest, open lattice."""
+    within, p = (
+        [neighbourhood_offsets(order, len(shape)) for order in (1, 4)],
+        np.random.default_rng(1).random((2, *shape)),
+    )
+    of = np.full(shape, split, np.int32)
+    of[..., :2, 10:13], of[..., 0] = 1 - split, -1
     for torus, step in ((False, 1), (False, 2), (True, 1)):
-        regions = Regions(p, of, lambda source: source, Grid.of(shape, 1, torus), 1, np.float32(1))
+        regions = Regions(p, of, lambda source: source, Grid.of(shape, 1, torus), 2, np.float32(1))
         grid = Grid.of(shape, step, torus)
-        near = (grid.neighbours(np.arange(grid.size, dtype=np.int32), offsets) < 0).any(0).reshape(grid.shape)
+        sites = np.arange(grid.size, dtype=np.int32)
+        rings = sum((grid.neighbours(sites, near) < 0).any(0).astype(int) for near in within).reshape(grid.shape)
         found, plain = regions.at(grid), grid.decimated(of)
-        assert (found == np.where(near & (plain == split), plain + 2, plain)).all()
+        assert (found == np.where((rings > 0) & (plain == split), plain + 2 * rings, plain)).all()
         for number, share in enumerate(regions.wanted(grid)):
             those = grid.decimated(p)[:, found == number]
             assert np.allclose(share, those.mean(1) if those.size else 0)
