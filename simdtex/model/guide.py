@@ -100,6 +100,10 @@ class Guide:
         return GuidePlanes([_scaled(guide, height, most) for guide in unit], _scaled(wanted, height, most))
 
 
+REDUCED = 8
+"""The divisor of the levels of known variables that are scores: their neighbours outweighed the unknown variables'."""
+
+
 @dataclass(frozen=True, eq=False)
 class Colocated:
     """A guide of the known variables at sites whose other variables are unknown."""
@@ -117,12 +121,12 @@ class Colocated:
 
     def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the channels of the known variables."""
-        owner = scale.owners
+        owner, by = scale.owners, REDUCED if self.pictures.scores else 1
         those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
-        output = scale.levels(self.values)[those]
+        output = scale.levels(self.values)[those] // by
         for plane, channel in zip(output, those, strict=True):
             plane[~self.known[..., owner[channel]]] = UNKNOWN
-        return GuidePlanes([scale.levels(sample)[those] for sample in self.pictures.pixels], output)
+        return GuidePlanes([scale.levels(sample)[those] // by for sample in self.pictures.pixels], output)
 
 
 AROUND = 4

@@ -198,7 +198,8 @@ def plan_simulation(
     missing: Any = None
     if arrays["region"] is not None:
         inputs, missing = maps.check_region(arrays["region"], size, inputs), maps.missing_value(pictures.pixels)
-    chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
+    kind = ("simulate" if len(size) == 2 else "simulate 3-D") + " values" * (options.get("categorical") is not True)
+    chosen = resolve(mrf.Options, kind, options, simulate)
     copies, training, guide = maps.copies_of(arrays, pictures, size), pictures, inputs.guide
     if copies:
         if chosen.shares:

@@ -15,7 +15,7 @@ from simdtex.methods.mrf.neighbourhood import Confidences, Field
 from simdtex.methods.mrf.options import Options
 from simdtex.methods.mrf.problem import Input
 from simdtex.model.given import NO_STAND_IN, Stand, between, stand_ins
-from simdtex.model.guide import UNKNOWN
+from simdtex.model.guide import REDUCED, UNKNOWN
 from simdtex.model.lattice import Grid
 
 
@@ -25,7 +25,12 @@ def heaviest(options: Options, neighbours: int) -> float:
 
 
 def centre_known(options: Options, neighbours: int) -> int:
-    """Return the confidence of a known variable at its own site, which counts more than all neighbours together."""
+    """Return the confidence of a known variable at its own site, which counts more than all neighbours together.
+
+    With scores it counts as much as all, and is for levels that are reduced by `simdtex.model.guide.REDUCED`.
+    """
+    if options.scores:
+        return round(REDUCED * sqrt(neighbours))
     return round(4 * sqrt(neighbours * heaviest(options, neighbours)))
 
 

@@ -372,7 +372,7 @@ class Lattices:
         Of a regular sample they are all of a phase at the coarsest level, and a quarter as many at each finer level,
         which has four times as many sites.
         """
-        chance = self.options.chance_at(level)
+        chance = max(self.options.chance_at(level), int(self.conditions.confidences.known > 0))  # one that is alike
         return max(chance, IN_PHASE >> 2 * (self.levels - 1 - level)) if self.phased else chance
 
     def _of_phase(self, candidates: Candidates) -> InPhase | None:

@@ -130,10 +130,14 @@ class Options:
         Number(0),
         "Penalise parts of the sample that are used often: more repeats them less",
         more="A candidate whose surroundings are used more than their fair share costs lambda N C sigma^2 "
-        "min(4, u - 1): lambda is the balance, u the use divided by the fair share.",
+        "min(4, u - 1): lambda is the balance, u the use divided by the fair share. In ``simulate``, values that are "
+        "no categories count by the mean squared difference of neighbours, if that is below sigma^2.",
         label="Repeat less (balance)",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
+        jobs={
+            **{"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
+            **{"simulate values": 0.15, "simulate 3-D values": 0.15},
+        },
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -155,6 +159,7 @@ class Options:
         "of this standard deviation, 0.01 to 16 or 0. A sample of at most 16 different pixels is a map of categories, "
         "which have no mean, and one of at most 64 colours, each of 4 pixels on average, has a palette.",
         none="1.5; 0 for samples of at most 16 different pixels or of a palette, and for pixels of the density",
+        jobs={"simulate": 0.0},
         label="Soften seams (finish)",
         unit="pixels",
         paper=0.0,
@@ -244,7 +249,7 @@ class Options:
         4,
         Whole(0, CHANCE),
         "Evaluate this many random candidates more, in a coherent search",
-        jobs={"fill": 16, "extend": 16},
+        jobs={"fill": 16, "extend": 16, "simulate values": 0, "simulate 3-D values": 0},
         slider=(0, 32, 1),
         shown=(),
     )
@@ -365,6 +370,7 @@ class Options:
         None,
         Numbers(2.0**53),
         "Give the categories, in ascending order, these shares of the output",
+        more="Of values that are no categories they are the shares of `simdtex.model.pictures.Pictures.classes`.",
         none="the mean of the probabilities; of one variable without these and a guide the training image's shares",
         shown=("simulate",),
     )
@@ -407,6 +413,8 @@ class Options:
             raise ValueError('the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
+        if self.scores and self.finish:
+            raise ValueError(f"finish={self.finish:g} takes means, which the training image lacks; leave it out")
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 
@@ -453,7 +461,14 @@ class Options:
         lattice = "none" if plain or named else self.lattice
         least = min(min(picture.shape[:-1]) for picture in pictures.pixels)
         order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
-        return replace(self, order=order, search=search, finish=finish, structure=structure, lattice=lattice)
+        run: dict[str, Any] = {
+            "order": order,
+            "search": search,
+            "finish": finish,
+            "structure": structure,
+            "lattice": lattice,
+        }
+        return replace(self, **run, scores=pictures.scores)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:

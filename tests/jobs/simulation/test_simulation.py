@@ -50,7 +50,9 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
     training, data = texture((16, 20), dtype=np.float32), holed()
     found = simulate(training, known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
-        own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, order=2, device="reference", **OWN)
+        own = simdtex.synthesize(
+            training, SHAPE, rng=int(seed), known=data, device="reference", **json.loads(found.attrs["options"])
+        )
         assert_same_bits(values, own)
         assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
 
