@@ -100,10 +100,6 @@ class Guide:
         return GuidePlanes([_scaled(guide, height, most) for guide in unit], _scaled(wanted, height, most))
 
 
-REDUCED = 8
-"""The divisor of the levels of known variables that are scores: their neighbours outweighed the unknown variables'."""
-
-
 @dataclass(frozen=True, eq=False)
 class Colocated:
     """A guide of the known variables at sites whose other variables are unknown."""
@@ -111,6 +107,7 @@ class Colocated:
     pictures: Pictures  # the sample's
     values: NDArray[Any]  # (H, W, C), of the sample's type
     known: NDArray[np.bool_]  # (H, W, C)
+    reduced: int  # the divisor of levels
 
     @property
     def channels(self) -> int:
@@ -121,7 +118,7 @@ class Colocated:
 
     def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the channels of the known variables."""
-        owner, by = scale.owners, REDUCED if self.pictures.scores else 1
+        owner, by = scale.owners, self.reduced
         those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
         output = scale.levels(self.values)[those] // by
         for plane, channel in zip(output, those, strict=True):

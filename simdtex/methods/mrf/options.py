@@ -461,14 +461,7 @@ class Options:
         lattice = "none" if plain or named else self.lattice
         least = min(min(picture.shape[:-1]) for picture in pictures.pixels)
         order = self.order or min(ORDERS[3 if pictures.deep else 2], max(1, largest_order(least)))
-        run: dict[str, Any] = {
-            "order": order,
-            "search": search,
-            "finish": finish,
-            "structure": structure,
-            "lattice": lattice,
-        }
-        return replace(self, **run, scores=pictures.scores)
+        return replace(self, order=order, search=search, finish=finish, structure=structure, lattice=lattice)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:

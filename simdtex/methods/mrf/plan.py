@@ -110,7 +110,7 @@ def plan(
     heavy = heaviest(options, len(offsets)) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
     if given and given.partly:
-        values += guides[-1].channels * centre_known(options, len(offsets)) ** 2
+        values += guides[-1].channels * centre_known(options, len(offsets), given.reduced(pictures)) ** 2
     scenes = [Scene(pictures, shape, given, guides, regular)]
     count = halvings(scenes[0], options, levels, soft)
     while True:  # with as many halvings as leave known pixels
