@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How like the training image realisations are, with and without hard and soft data.
 
-    python benchmarks/simulation.py [--parts maps,border,volumes,soft,continuous,joint] [--walker FILE] [--images channels,network,lenses,meanders]
+    python benchmarks/simulation.py [--parts maps,border,volumes,soft,continuous,joint]
+                                    [--images channels,network,lenses,meanders] [--walker FILE]
                                     [--data 0,50,200,500] [--number 50] [--side N] [--options NAME=VALUE,...]
                                     [--out DIR] [--device TEXT]
 
@@ -374,7 +375,7 @@ def joint(_images, _data, number, side, options, _out):
 
 OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
 OF_LAGS = [f"lag {lag}" for lag in LAGS]
-OF_PAIRS = "correlation|of the image|ratio|of the image|joint distance"
+OF_PAIRS = "correlation|correlation, image|ratio|ratio, image|joint distance"
 BANDS = [f"band {p}" for p in (0.125, 0.375, 0.625, 0.875)]
 PARTS = {
     "maps": (maps, ["image", "data", *OF_MAPS.split("|")]),
