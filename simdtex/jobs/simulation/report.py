@@ -442,12 +442,12 @@ def _decimal(value: float) -> str:
 def unlike(images: Array, own: Array) -> str:
     """Return in which figures continuous realisations are far from the training image, as a sentence; "" in none."""
     every, values = (np.asarray(one, np.float64) for one in (images, own))
-    lags = [lag for lag in LAGS if lag < min(*values.shape, *every.shape[1:])]
+    lags = [lag for lag in LAGS if lag < min(*values.shape[-2:], *every.shape[-2:])]
 
     def along(field: Array) -> Floats:
-        return np.asarray(np.mean([variogram(field, axis, lags[-1])[lags] for axis in range(field.ndim)], 0))
+        return np.asarray(np.mean([variogram(field, axis, lags[-1])[lags] for axis in (-2, -1)], 0))
 
-    spread, usual = values.std(), along(values)
+    spread, usual = values.std(), along(values) if lags else np.zeros(1)
     if not (spread and usual.all()):
         return ""
     found = [("the mean", 1 + (every.mean() - values.mean()) / max(abs(values.mean()), spread), 0.06)]

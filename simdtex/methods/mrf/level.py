@@ -50,8 +50,8 @@ FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
 GAIN, GAIN_OF_VALUES = STEPS // 4, STEPS // 20
-"""The most steps by which the penalty of a category, or of a class of values, changes after a sweep of the coarsest
-level; twice that below."""
+"""The most steps by which the penalty of a category, or of another class, changes after a sweep of the coarsest level;
+twice that below."""
 
 ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""

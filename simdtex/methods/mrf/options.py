@@ -62,6 +62,7 @@ def check_categorical(value: Any) -> None:
 
 ALL = ("synth", "tileset", "fill", "extend", "simulate", "schedules")
 DATA = ("synth", "tileset", "fill", "extend", "simulate")
+VALUES = ("simulate values", "simulate 3-D values")  # simulations of values that are no categories
 
 appearance = partial(option, group="Appearance", shown=ALL)
 scales = partial(option, group="Scales and edges", shown=ALL)
@@ -134,10 +135,7 @@ class Options:
         "no categories count by the mean squared difference of neighbours, if that is below sigma^2.",
         label="Repeat less (balance)",
         paper=0.0,
-        jobs={
-            **{"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
-            **{"simulate values": 0.15, "simulate 3-D values": 0.15},
-        },
+        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5} | dict.fromkeys(VALUES, 0.15),
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -249,7 +247,7 @@ class Options:
         4,
         Whole(0, CHANCE),
         "Evaluate this many random candidates more, in a coherent search",
-        jobs={"fill": 16, "extend": 16, "simulate values": 0, "simulate 3-D values": 0},
+        jobs={"fill": 16, "extend": 16} | dict.fromkeys(VALUES, 0),
         slider=(0, 32, 1),
         shown=(),
     )

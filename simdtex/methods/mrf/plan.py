@@ -245,7 +245,7 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
     if proportions:
-        classes = pictures.classes()
+        classes = pictures.classes
         if pictures.pixels[0].shape[-1] > 1:
             raise ValueError("proportions are of one variable; leave them out")
         if len(classes) != len(proportions):

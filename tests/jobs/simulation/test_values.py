@@ -60,7 +60,7 @@ def test_scores_keep_ties_and_order_and_lie_between_for_values_between():
 
 def test_a_frequent_value_is_a_class_of_its_own():
     values = np.append(np.zeros(10), np.arange(1, 91))
-    assert Pictures((values.reshape(10, 10, 1),)).classes()[:3].tolist() == [0, 10, 20]
+    assert Pictures((values.reshape(10, 10, 1),)).classes[:3].tolist() == [0, 10, 20]
     values = np.append(np.full(10, 45.5), np.arange(90))
-    classes = Pictures((values.reshape(10, 10, 1),)).classes().tolist()
+    classes = Pictures((values.reshape(10, 10, 1),)).classes.tolist()
     assert classes[classes.index(45.5) - 1] == 45 and len(classes) > 10
