@@ -14,17 +14,17 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # A room imports from itself and from rooms above it. The number is its budget of lines; a larger one is a commit of its
 # own, with a reason. Tiles stand above synthesis, since they are a way to run `synthesize`.
 ROOMS = {
-    ("random", "options", "machine"): 1799,
+    ("random", "options", "machine"): 1801,
     ("io",): 3636,
-    ("model",): 3600,
+    ("model",): 3645,
     ("run", "checkpoint", "driver"): 752,
     ("schedules",): 1009,
-    ("methods.mrf",): 3898,
+    ("methods.mrf",): 3930,
     ("methods.pyramid",): 2053,
     ("methods.multires",): 809,
     ("inputs",): 300,
     ("figures",): 850,
-    ("cli",): 1628,
+    ("cli",): 1630,
     ("maspar",): 1801,
     ("jobs.tiles",): 1560,
     ("jobs.synthesis",): 650,
@@ -34,11 +34,11 @@ ROOMS = {
     ("jobs.mixes",): 365,
     ("jobs.classification",): 1635,
     ("jobs.studies",): 2181,
-    ("jobs.simulation",): 2465,
+    ("jobs.simulation",): 2501,
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35049, 20775
+LINES, CODE = 35187, 20890
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}
