@@ -38,7 +38,7 @@ ROOMS = {
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35187, 20890
+LINES, CODE = 35187, 20870
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}
