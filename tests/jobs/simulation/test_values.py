@@ -64,3 +64,11 @@ def test_a_frequent_value_is_a_class_of_its_own():
     values = np.append(np.full(10, 45.5), np.arange(90))
     classes = Pictures((values.reshape(10, 10, 1),)).classes.tolist()
     assert classes[classes.index(45.5) - 1] == 45 and len(classes) > 10
+
+
+def test_a_smooth_variable_stays_smooth():
+    training = smooth(1, 4.0, (128, 128))
+    found = simdtex.simulate(training, 2, shape=(64, 64), rng=1).values
+    curves = [sum(variogram(field, axis, 4) for axis in (0, 1)) for field in (training, *found)]
+    steep = [curve[1] / curve[4] for curve in curves]
+    assert max(steep[1:]) < 1.5 * steep[0], "twice, where penalties exceed the differences of neighbours"
