@@ -71,6 +71,7 @@ class MrfOptions(TypedDict, total=False):
     array: str | None
     categorical: bool | tuple[int, ...]
     weights: tuple[float, ...] | list[float] | None
+    scores: bool
     shares: tuple[float, ...] | list[float] | None
     proportions: tuple[float, ...] | list[float] | None
     share_spread: float

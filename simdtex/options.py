@@ -168,8 +168,10 @@ class Option:
     hint: str = ""  # the help on the live page, if the page offers less than the command line
 
     def default_of(self, job: str) -> Any:
-        """Return the default value in a job; ``"simulate 3-D"`` falls back on ``"simulate"``."""
-        return self.jobs.get(job, self.jobs.get(job.partition(" ")[0], self.default))
+        """Return the default value in a job; ``"simulate 3-D values"`` falls back on ``"simulate 3-D"``, and so on."""
+        while job not in self.jobs and " " in job:
+            job = job.rpartition(" ")[0]
+        return self.jobs.get(job, self.default)
 
     def check(self, name: str, value: Any) -> None:
         """Raise unless the value is valid; None is valid if it is the default."""

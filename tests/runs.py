@@ -332,7 +332,7 @@ RUNS = {
         )
     },
     # simulations
-    "region": realisations(MORE_EXACT | {"finish": 1.0}, outside=0.3, known=0.2, shape=(6, 7), **F4),
+    "region": realisations(MORE_EXACT | {"finish": 1.0, "scores": False}, outside=0.3, known=0.2, shape=(6, 7), **F4),
     "soft": realisations(
         MORE_EXACT | {"categorical": True, "soft_weight": 0.5}, kinds=3, soft=("categories",), shape=(6, 7)
     ),

@@ -19,7 +19,7 @@ ROOMS = {
     ("model",): 3600,
     ("run", "checkpoint", "driver"): 752,
     ("schedules",): 1009,
-    ("methods.mrf",): 3898,
+    ("methods.mrf",): 3930,
     ("methods.pyramid",): 2053,
     ("methods.multires",): 809,
     ("inputs",): 300,

@@ -26,7 +26,7 @@ STRANGE = [
     *(nan, inf, -inf, 1e308, -1e308, 1e-320, 5e-324, -3e6, np.float32(3e38), np.int64(2**62), 1j),
     *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", object(), np.zeros(0), np.zeros((2, 2))),
 ]
-JOBS = {"synth", "fill", "extend", "simulate", "simulate 3-D", "schedules"}
+JOBS = {"synth", "fill", "extend", "simulate", "simulate 3-D", "simulate values", "simulate 3-D values", "schedules"}
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
 
 

@@ -146,6 +146,8 @@ def _help(job: str, option: Option) -> str:
         shown = ""
     else:
         shown = f"{default:g}" if isinstance(default, float) else str(default)
+    if f"{job} values" in option.jobs:
+        shown += f"; without --categorical {option.jobs[f'{job} values']}"
     return f"{option.help}.  [{shown}]" if shown else f"{option.help}."
 
 

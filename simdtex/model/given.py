@@ -32,6 +32,9 @@ from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures, halved
 from simdtex.model.sample import Sample
 
+REDUCED = 8
+"""The divisor of the levels of a variable known at most sites: else it outweighs the others, which become rough."""
+
 
 @dataclass(frozen=True, eq=False)
 class Given:
@@ -69,7 +72,12 @@ class Given:
 
     def colocated(self, pictures: Pictures) -> Colocated:
         """Return the known variables of sites with unknown ones, as a guide for the unknown ones."""
-        return Colocated(pictures, self.values, self.known & ~self.whole[..., None])
+        return Colocated(pictures, self.values, self.known & ~self.whole[..., None], self.reduced(pictures))
+
+    def reduced(self, pictures: Pictures) -> int:
+        """Return the divisor of the levels of variables that guide others: more than 1 for scores at most sites."""
+        guiding = self.known.any(-1) & ~self.whole
+        return REDUCED if pictures.scores and 2 * np.count_nonzero(guiding) > guiding.size else 1
 
     def halved(self) -> Given:
         """Return the given values of an output of half the size: the means of squares of 2x2 sites, all four given."""

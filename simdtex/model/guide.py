@@ -107,6 +107,7 @@ class Colocated:
     pictures: Pictures  # the sample's
     values: NDArray[Any]  # (H, W, C), of the sample's type
     known: NDArray[np.bool_]  # (H, W, C)
+    reduced: int  # the divisor of levels
 
     @property
     def channels(self) -> int:
@@ -117,12 +118,12 @@ class Colocated:
 
     def planes(self, scale: Scale, spread: float, top: int) -> GuidePlanes:
         """Return the channels of the known variables."""
-        owner = scale.owners
+        owner, by = scale.owners, self.reduced
         those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
-        output = scale.levels(self.values)[those]
+        output = scale.levels(self.values)[those] // by
         for plane, channel in zip(output, those, strict=True):
             plane[~self.known[..., owner[channel]]] = UNKNOWN
-        return GuidePlanes([scale.levels(sample)[those] for sample in self.pictures.pixels], output)
+        return GuidePlanes([scale.levels(sample)[those] // by for sample in self.pictures.pixels], output)
 
 
 AROUND = 4

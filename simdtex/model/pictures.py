@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import ceil, sqrt
 from typing import Any
 
@@ -76,8 +77,9 @@ class Pictures:
             return None
         return np.unique(np.concatenate([self.values(variable, picture) for picture in range(len(self.pixels))]))
 
+    @cached_property
     def classes(self) -> NDArray[Any]:
-        """Return the greatest value of each class of the first variable, in ascending order.
+        """The greatest value of each class of the first variable, in ascending order.
 
         A class is a category; of other values, a part (`PARTS`) of all. A value of a large share (`SPIKE`) is alone.
         """
@@ -92,9 +94,8 @@ class Pictures:
 
     def proportions(self) -> NDArray[np.number[Any]]:
         """Return the proportions of the classes of the first variable, by the shares of the pictures."""
-        classes, numbers = self.classes(), range(len(self.pixels))
-        of = [np.searchsorted(classes, self.values(0, n)) for n in numbers]
-        counts = np.array([np.bincount(each, minlength=len(classes)) for each in of])
+        of = [np.searchsorted(self.classes, self.values(0, n)) for n in range(len(self.pixels))]
+        counts = np.array([np.bincount(each, minlength=len(self.classes)) for each in of])
         each = counts / counts.sum(1, keepdims=True)
         return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
 

@@ -416,14 +416,9 @@ class Sample:
         pixels: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return pixels
 
-    @cached_property
-    def classes(self) -> NDArray[Any]:
-        """The greatest value of each class of the first variable (`simdtex.model.pictures.Pictures.classes`)."""
-        return self.pictures.classes()
-
     def category(self, source: NDArray[Any]) -> NDArray[np.intp]:
         """Return the number of the class of the first variable of pixels (n,), for example its category."""
-        return np.searchsorted(self.classes, self.own(source)[:, 0])
+        return np.searchsorted(self.pictures.classes, self.own(source)[:, 0])
 
     def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
         """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); pixels of the margin are reflections."""

@@ -136,7 +136,7 @@ class _Scores(_Stretched):
 
     def scores(self, pixels: NDArray[Any]) -> NDArray[np.float64]:
         """Return the scores of values; between two known values they are interpolated."""
-        return np.interp(pixels.astype(np.float64), self._known, self._scores)
+        return np.asarray(np.interp(pixels.astype(np.float64), self._known, self._scores))
 
     def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
         """Return the one channel of the variable."""

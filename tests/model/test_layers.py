@@ -206,7 +206,7 @@ def test_a_thin_volume_has_as_many_levels_as_its_rows_and_columns_allow():
         ({"known": np.full((4, 4), np.nan)}, "known is 2-dimensional; give .layers, rows, cols."),
         ({"rotation": np.zeros((20, 22))}, "rotation is 20x22 and has to be 9x20x22, as the output; give one size"),
         ({"lattice": ((8.0, 0.0), (0.0, 8.0))}, "lattice=.* is for pictures; leave it out for a volume"),
-        ({"finish": 2.0, "categorical": False}, "finish=2.0 is for pictures; leave it out for a volume"),
+        ({"finish": 2.0, "categorical": False}, "finish=2 takes means, which the training image lacks"),
         ({"training": facies()[0], "shape": (5, 6, 7)}, "the training image is a picture; give a training volume"),
         ({"training": np.stack([facies(), facies()])}, "the sample is 4-dimensional: give .layers, rows, cols."),
         ({"probabilities": np.full((2, 9, 20, 22), 0.4)}, "the probabilities of layer 0, row 0, column 0 are 0.4, 0.4"),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, ENTER, OUTPUTS, READ, WRITE_PAIR
+from simdtex.cli.command import DATA, DEVICE_GROUP, ENTER, OUTPUTS, READ, WRITE_PAIR, note
 from simdtex.cli.inputs import (
     Material,
     Reading,
@@ -329,7 +329,7 @@ def _say_shares(made: Any, _: Output) -> None:
 
 def _report(folder: Path, material: Material, made: Any, cells: Cells) -> None:
     from simdtex.io.hard_data import HardData
-    from simdtex.jobs.simulation.report import write_ensemble, write_volumes
+    from simdtex.jobs.simulation.report import unlike, write_ensemble, write_volumes
 
     pixels, categorical = material.pixels[0], bool(json.loads(made.attrs["options"])["categorical"])
     data, known = None, cells.given["known"]
@@ -338,6 +338,8 @@ def _report(folder: Path, material: Material, made: Any, cells: Cells) -> None:
         at = np.nonzero(~np.ma.getmaskarray(known))
         data = np.stack([*at[::-1], known.data[at].astype(np.float64)], -1)
     shown: dict[str, Any] = {"data": data, "command": command_line()}
+    if not categorical and (sentence := unlike(made.values, pixels)):
+        note(sentence)
     if material.deep:
         write_volumes(folder, pixels, made, categorical, **shown)
     else:

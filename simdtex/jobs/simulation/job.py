@@ -201,7 +201,8 @@ def plan_simulation(
     missing: Any = None
     if arrays["region"] is not None:
         inputs, missing = maps.check_region(arrays["region"], size, inputs), maps.missing_value(pictures.pixels)
-    chosen = resolve(mrf.Options, "simulate" if len(size) == 2 else "simulate 3-D", options, simulate)
+    kind = ("simulate" if len(size) == 2 else "simulate 3-D") + " values" * (options.get("categorical") is not True)
+    chosen = resolve(mrf.Options, kind, options, simulate)
     copies, training, guide = maps.copies_of(arrays, pictures, size), pictures, inputs.guide
     if copies:
         if chosen.shares:
@@ -217,9 +218,9 @@ def plan_simulation(
     spread: Spread | None = None
     asked = probabilities is None or not np.isnan(probabilities).all()
     if (categories is not None or chosen.scores) and alone and asked and not (chosen.proportions or guide):
-        own = (replace(kinds, shares=soft.shares) if copies else kinds).proportions()
+        images = replace(kinds, shares=soft.shares) if copies else kinds
         p = probabilities if chosen.soft_weight else None
-        spread = shares.spread(chosen.of(pictures), own / own.sum(), p, size, inputs.given, chosen.share_spread)
+        spread = shares.spread(images, pictures, p, size, inputs.given, chosen.share_spread)
     shas = digests(pictures, inputs.given)
     if inputs.guide:
         shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])
@@ -296,7 +297,7 @@ class Simulation:
         kinds = batch.plan.kinds
         if not (self.spread or (kinds and kinds.categories is not None)):
             return {}
-        classes = self.options.of(self.training).classes()
+        classes = self.options.of(self.training).classes
         p = np.ones((len(classes), *self.shape))
         if kinds and kinds.categories is not None:
             p *= kinds.categories
@@ -322,7 +323,7 @@ class Simulation:
         seeds = np.array([realisation_seed(seed, n) for n in numbers], np.uint64)
         coordinates: dict[str, Any] = {"realisation": np.array(numbers), **along, "seed": ("realisation", seeds)}
         if self.spread:
-            aims = zip(self.options.of(self.training).classes(), output.statistics["aims"].T, strict=True)
+            aims = zip(self.options.of(self.training).classes, output.statistics["aims"].T, strict=True)
             coordinates |= {f"share_{name:g}": ("realisation", column) for name, column in aims}
         attributes = {"seed": seed, "version": version("simdtex"), "device": device}
         attributes["options"] = json.dumps(

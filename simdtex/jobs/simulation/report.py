@@ -36,6 +36,7 @@ SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 MAP_INCHES = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
 QUANTILES = 0.1, 0.5, 0.9
+LAGS = 1, 2, 4, 8, 16  # of variograms that are checked, pixels
 AXES = ("z", "y", "x")
 CUTS = "", ", P10", ", P50", ", P90"
 
@@ -82,6 +83,7 @@ def write_ensemble(
         Section("The realisations", [_realisations(*shown, found)]),
         Section("Uncertainty", _uncertainty(made, names, points, found)),
         *_measured(made, names, points),
+        *([] if categorical else [_histograms(images, own)]),
         Section("Variograms", [_variograms(made, found)]),
         *([Section("Connectivity of the categories", _connectivity(made, found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
@@ -455,6 +457,37 @@ def _decimal(value: float) -> str:
     return f"{value:.3f}" if np.isfinite(value) else "n/a"
 
 
+def unlike(images: Array, own: Array) -> str:
+    """Return in which figures continuous realisations are far from the training image, as a sentence; "" in none."""
+    every, values = (np.asarray(one, np.float64) for one in (images, own))
+    lags = [lag for lag in LAGS if lag < min(*values.shape[-2:], *every.shape[-2:])]
+
+    def along(field: Array) -> Floats:
+        return np.asarray(np.mean([variogram(field, axis, lags[-1])[lags] for axis in (-2, -1)], 0))
+
+    spread, usual = values.std(), along(values) if lags else np.zeros(1)
+    if not (spread and usual.all()):
+        return ""
+    found = [("the mean", 1 + (every.mean() - values.mean()) / max(abs(values.mean()), spread), 0.06)]
+    found.append(("the standard deviation", np.mean([field.std() for field in every]) / spread, 0.1))
+    ratios = np.mean([along(field) for field in every], 0) / usual
+    found += [(f"the variogram at lag {lag}", ratio, 0.16) for lag, ratio in zip(lags, ratios, strict=True)]
+    far = [f"{name} is {ratio:.2f} times" for name, ratio, most in found if abs(ratio - 1) > most]
+    return f"Against the training image, {', '.join(far)} as large." if far else ""
+
+
+def _histograms(images: Array, own: Array) -> Section:
+    """Return the histograms of continuous realisations and of the training image, and what is far off."""
+    bins, figure = np.histogram_bin_edges(np.append(images, own), 40).tolist(), new_figure(5.6, 3)
+    axes = figure.subplots()
+    for values, colour, name in ((images, THEIRS, "realisations"), (own, OWN, "training image")):
+        axes.hist(values.ravel(), bins, density=True, histtype="step", color=colour, label=name)
+    tidy(axes, "", "value", "density")
+    axes.legend(frameon=False)
+    caption = f"Histograms of all realisations and of the training image. {unlike(images, own)}".strip()
+    return Section("Histograms", [Figure("histograms.png", figure, caption)])
+
+
 SLICED = 2
 """Realisations whose slices are shown."""
 
@@ -505,7 +538,7 @@ def write_volumes(
         "realisations.",
     )
     sections = [Section("Slices", [slices]), *_measured(made, names[-1:].tolist(), _on_ground(made, data))]
-    sections += [_vertical(made, training, names)] if categorical else []
+    sections.append(_vertical(made, training, names) if categorical else _histograms(made.values, training))
     sections.append(Section("Variograms", [lagged("variograms", variograms)]))
     results: dict[str, Any] = {"shape": made.shape, "training_shape": training.shape}
     results["variograms"] = [variograms[-1], *variograms[:-1]]

@@ -116,17 +116,25 @@ def _sums(array: NDArray[Any], sides: Sequence[int]) -> Floats:
 
 
 def spread(
-    pictures: Pictures, shares: Floats, soft: Floats | None, shape: tuple[int, ...], given: Given | None, factor: float
+    images: Pictures,
+    pictures: Pictures,
+    soft: Floats | None,
+    shape: tuple[int, ...],
+    given: Given | None,
+    factor: float,
 ) -> Spread:
     """Return the distribution of the shares of classes in an output, given data.
 
-    ``shares`` are the training images' own, ``soft`` (categories, *shape) probabilities instead of these, ``given`` the
-    data and the cells that take no part, and ``factor`` that of the deviation of all shares.
+    ``images`` are the candidates' images, whose classes and shares count, and ``pictures`` the training images, of which
+    they may be copies; ``soft`` (categories, *shape) are probabilities instead of the shares, ``given`` the data and the
+    cells that take no part, and ``factor`` is that of the deviation of all shares.
     """
     from scipy.spatial.distance import cdist
     from scipy.special import ndtri
 
-    classes, named, below = pictures.classes(), pictures.categories(0) is not None, shares.cumsum()
+    classes, named, shares = images.classes, images.categories(0) is not None, images.proportions()
+    shares = shares / shares.sum()
+    below = shares.cumsum()
     codes = np.eye(len(classes)) if named else ndtri(below - shares / 2)[:, None]
     of = [np.searchsorted(classes, image[..., 0]) for image in pictures.pixels]
     if pictures.known:

@@ -24,8 +24,13 @@ def heaviest(options: Options, neighbours: int) -> float:
     return max(1.0, options.data_weight, neighbours / 4)
 
 
-def centre_known(options: Options, neighbours: int) -> int:
-    """Return the confidence of a known variable at its own site, which counts more than all neighbours together."""
+def centre_known(options: Options, neighbours: int, reduced: int = 1) -> int:
+    """Return the confidence of a known variable at its own site, which counts more than all neighbours together.
+
+    If the levels are ``reduced``, which it makes up for, it counts as much as all neighbours.
+    """
+    if reduced > 1:
+        return round(reduced * sqrt(neighbours))
     return round(4 * sqrt(neighbours * heaviest(options, neighbours)))
 
 
@@ -98,7 +103,8 @@ class Conditioning(Conditions):
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
         guides, known = len(sample.guides), sample.known_variables
-        here = np.float32(centre_known(plan.options, neighbours))
+        reduced = plan.given.reduced(sample.pictures) if plan.given else 1
+        here = np.float32(centre_known(plan.options, neighbours, reduced))
         standard = Confidences(guides, guides > 0 or hard, centre, weight, known, here)
         super().__init__(confidences or standard)
         self.guides, self.planes = sample.guides, planes

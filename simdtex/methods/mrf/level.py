@@ -49,8 +49,9 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN = STEPS // 16
-"""The most steps by which the penalty of a category changes after a sweep of the coarsest level; 8 times that below."""
+GAIN, FINER, FINER_OF_VALUES = STEPS // 16, 8, 2
+"""The most steps by which the penalty of a category, or of another class, changes after a sweep of the coarsest level;
+and the factors of those at finer levels, of categories and of other classes."""
 
 ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
@@ -346,7 +347,8 @@ class Lattices:
         places = self.places(level)
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(level)
-        gain = GAIN if level == self.levels - 1 else 8 * GAIN
+        finer = FINER if self.sample.pictures.categories(0) is not None else FINER_OF_VALUES
+        gain = GAIN if level == self.levels - 1 else finer * GAIN
         asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(level)), "gain": gain} if self.regions else {}
         return FairUse(places.shape, around, fair, listed, **asked)
 
@@ -370,7 +372,7 @@ class Lattices:
         Of a regular sample they are all of a phase at the coarsest level, and a quarter as many at each finer level,
         which has four times as many sites.
         """
-        chance = self.options.chance_at(level)
+        chance = max(self.options.chance_at(level), int(self.conditions.confidences.known > 0))  # one that is alike
         return max(chance, IN_PHASE >> 2 * (self.levels - 1 - level)) if self.phased else chance
 
     def _of_phase(self, candidates: Candidates) -> InPhase | None:

@@ -62,6 +62,7 @@ def check_categorical(value: Any) -> None:
 
 ALL = ("synth", "tileset", "fill", "extend", "simulate", "schedules")
 DATA = ("synth", "tileset", "fill", "extend", "simulate")
+VALUES = ("simulate values", "simulate 3-D values")  # simulations of values that are no categories
 
 appearance = partial(option, group="Appearance", shown=ALL)
 scales = partial(option, group="Scales and edges", shown=ALL)
@@ -130,10 +131,11 @@ class Options:
         Number(0),
         "Penalise parts of the sample that are used often: more repeats them less",
         more="A candidate whose surroundings are used more than their fair share costs lambda N C sigma^2 "
-        "min(4, u - 1): lambda is the balance, u the use divided by the fair share.",
+        "min(4, u - 1): lambda is the balance, u the use divided by the fair share. In ``simulate``, values that are "
+        "no categories count by the mean squared difference of neighbours, if that is below sigma^2.",
         label="Repeat less (balance)",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
+        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5} | dict.fromkeys(VALUES, 0.15),
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -155,6 +157,7 @@ class Options:
         "of this standard deviation, 0.01 to 16 or 0. A sample of at most 16 different pixels is a map of categories, "
         "which have no mean, and one of at most 64 colours, each of 4 pixels on average, has a palette.",
         none="1.5; 0 for samples of at most 16 different pixels or of a palette, and for pixels of the density",
+        jobs={"simulate": 0.0},
         label="Soften seams (finish)",
         unit="pixels",
         paper=0.0,
@@ -244,7 +247,7 @@ class Options:
         4,
         Whole(0, CHANCE),
         "Evaluate this many random candidates more, in a coherent search",
-        jobs={"fill": 16, "extend": 16},
+        jobs={"fill": 16, "extend": 16} | dict.fromkeys(VALUES, 0),
         slider=(0, 32, 1),
         shown=(),
     )
@@ -365,6 +368,7 @@ class Options:
         None,
         Numbers(2.0**53),
         "Give the categories, in ascending order, these shares of the output",
+        more="Of values that are no categories they are the shares of `simdtex.model.pictures.Pictures.classes`.",
         none="shares drawn for each realisation of one variable without a guide, see share_spread",
         shown=("simulate",),
     )
@@ -415,6 +419,8 @@ class Options:
             raise ValueError('the mode of a density is of all candidates; give search="exact", or relaxation="gibbs"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
+        if self.scores and self.finish:
+            raise ValueError(f"finish={self.finish:g} takes means, which the training image lacks; leave it out")
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 

@@ -110,7 +110,7 @@ def plan(
     heavy = heaviest(options, len(offsets)) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
     if given and given.partly:
-        values += guides[-1].channels * centre_known(options, len(offsets)) ** 2
+        values += guides[-1].channels * centre_known(options, len(offsets), given.reduced(pictures)) ** 2
     scenes = [Scene(pictures, shape, given, guides, regular)]
     count = halvings(scenes[0], options, levels, soft)
     while True:  # with as many halvings as leave known pixels
@@ -245,7 +245,7 @@ def check_categories(pictures: Pictures, given: Given | None, proportions: Seque
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
     if proportions:
-        classes = pictures.classes()
+        classes = pictures.classes
         if pictures.pixels[0].shape[-1] > 1:
             raise ValueError("proportions are of one variable; leave them out")
         if len(classes) != len(proportions):

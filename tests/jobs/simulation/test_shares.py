@@ -26,8 +26,7 @@ def of_data(data, shape=(96, 96), soft=None, factor=1.0, image=None):
     for place, category in data.items():
         values[place], known[place] = category, True
     pictures = Pictures((image[..., None],), categorical=(True,))
-    shares = np.bincount(image.ravel()) / image.size
-    return spread(pictures, shares, soft, shape, Given(values, known) if data else None, factor)
+    return spread(pictures, pictures, soft, shape, Given(values, known) if data else None, factor)
 
 
 def test_integral_range_of_squares_is_their_area():
@@ -67,7 +66,7 @@ def test_values_draw_a_mean_score_and_keep_the_histogram_of_the_image():
     field = np.kron(np.random.default_rng(1).gamma(1, 1, (40, 40)), np.ones((BLOCK, BLOCK)))
     pictures = Pictures((field[..., None],), scores=True)
     shares = pictures.proportions() / field.size
-    found = spread(pictures, shares, None, (96, 96), None, 1.0)
+    found = spread(pictures, pictures, None, (96, 96), None, 1.0)
     draws = np.stack([found.draw(seed) for seed in range(1000)])
     assert draws.mean(0) == pytest.approx(shares, abs=0.003)
     score = draws @ ndtri(shares.cumsum() - shares / 2)  # of squares of 6 pixels

@@ -19,9 +19,6 @@ from simdtex.model.pictures import Pictures
 xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
-OWN = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64, "xi": -8.0}
-OWN |= {"phases": 4, "free_sweeps": 3}
-"""The defaults of a simulation that differ from those of a texture; and few sweeps."""
 QUICK = {"order": 2, "xi": -8.0, "device": "reference", "rng": 5, "jobs": 1}
 TRAINING = texture((16, 20))
 CATEGORIES = (TRAINING > 90).astype(np.uint8) * 3 + (TRAINING > 170) * np.uint8(4)
@@ -29,6 +26,11 @@ CATEGORIES = (TRAINING > 90).astype(np.uint8) * 3 + (TRAINING > 170) * np.uint8(
 
 def simulate(training=TRAINING, n=2, **options):
     return simdtex.simulate(training, n, **({"shape": SHAPE} | QUICK | options))
+
+
+def ran(found):
+    """The options of a simulation."""
+    return json.loads(found.attrs["options"])
 
 
 def holed(dtype=np.float32, shape=SHAPE, channels=None):
@@ -52,7 +54,7 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
     training, data = texture((16, 20), dtype=np.float32), holed()
     found = simulate(training, known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
-        own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, order=2, device="reference", **OWN)
+        own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, device="reference", **ran(found))
         assert_same_bits(values, own)
         assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
     how = {"known": np.where(np.isnan(data), np.nan, CATEGORIES[:12, :14]), "categorical": True} | QUICK
@@ -92,7 +94,7 @@ def test_a_table_of_several_variables_which_are_the_last_dimension(tmp_path):
     known = np.ma.MaskedArray(np.moveaxis(placed, -1, 0))
     assert_same_bits(found.values, simulate(training, n=2, known=known, channel_axis=0, shape=None).values)
     own = simdtex.synthesize(
-        training, SHAPE, channel_axis=0, known=known, rng=int(found.seed[1]), order=2, device="reference", **OWN
+        *(training, SHAPE), channel_axis=0, known=known, rng=int(found.seed[1]), **ran(found), device="reference"
     )
     assert np.array_equal(found.values[1], np.moveaxis(own, 0, -1))
 
@@ -138,7 +140,7 @@ def test_dimensions_coordinates_type_and_attributes_are_written_by_xarray_itself
     assert (found.attrs["seed"], found.attrs["version"]) == (2**64 - 1, simdtex.__version__)
     assert found.attrs["device"].startswith("reference") and len(found.attrs["training_image"]) == 64
     options = json.loads(found.attrs["options"])
-    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 1.0)
+    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 0.15)
     found.to_netcdf(tmp_path / "t.nc")
     found.to_zarr(tmp_path / "t.zarr")
     for name in ("t.nc", "t.zarr"):
