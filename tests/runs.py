@@ -351,6 +351,7 @@ RUNS = {
         **TWO | {"kinds": 3, "soft": ("categories", "images"), "channels": 2, "outside": 0.2, "labels": 2},
         shape=(6, 7),
     ),
+    "shares": realisations(MORE_FEW | {"categorical": True, "share_spread": 0.5}, kinds=3, known=0.1, shape=(8, 9)),
     "volume": volume((6, 12, 13), order=3, levels=2),
     "volume-three": volume((5, 8, 9), training=lambda: facies(kinds=3), proportions=(0.2, 0.3, 0.5), schedule="luby"),
     "volume-grey": volume(

@@ -216,11 +216,10 @@ def plan_simulation(
     soft = Soft(probabilities, copies.probability if copies else None)
     alone = pictures.pixels[0].shape[-1] == 1  # the shares of one of several variables could contradict the others
     spread: Spread | None = None
-    asked = probabilities is None or not np.isnan(probabilities).all()
+    asked = probabilities is None or (chosen.soft_weight and not np.isnan(probabilities).all())
     if (categories is not None or chosen.scores) and alone and asked and not (chosen.proportions or guide):
         images = replace(kinds, shares=soft.shares) if copies else kinds
-        p = probabilities if chosen.soft_weight else None
-        spread = shares.spread(images, pictures, p, size, inputs.given, chosen.share_spread)
+        spread = shares.spread(images, pictures, probabilities, size, inputs.given, chosen.share_spread)
     shas = digests(pictures, inputs.given)
     if inputs.guide:
         shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])

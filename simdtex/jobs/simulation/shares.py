@@ -125,9 +125,9 @@ def spread(
 ) -> Spread:
     """Return the distribution of the shares of classes in an output, given data.
 
-    ``images`` are the candidates' images, whose classes and shares count, and ``pictures`` the training images, of which
-    they may be copies; ``soft`` (categories, *shape) are probabilities instead of the shares, ``given`` the data and the
-    cells that take no part, and ``factor`` is that of the deviation of all shares.
+    ``images`` are those of the candidates, whose classes and shares count, and ``pictures`` the training images, of
+    which they may be copies; ``soft`` (categories, *shape) are probabilities instead of the shares, ``given`` the data
+    and the cells that take no part, and ``factor`` is that of the deviation of all shares.
     """
     from scipy.spatial.distance import cdist
     from scipy.special import ndtri

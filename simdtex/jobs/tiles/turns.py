@@ -95,7 +95,7 @@ class Turns:
         fair_use, penalty = lattices.fair_use(turn.level), counts.astype(np.float32)
         if turn.phase != "whole":
             temperature = temperature_sum / (1024 * lattices.grid(turn.level).size)
-            penalty = use_penalty(counts, fair_use, lattices.rate, store.penalty(turn), temperature)
+            penalty = use_penalty(counts, fair_use, lattices.rate(turn.level), store.penalty(turn), temperature)
             if after.active or after.free < lattices.free_sweeps(turn.level):
                 return store.save(after, penalty)
         if turn.level:

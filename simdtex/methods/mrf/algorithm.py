@@ -115,7 +115,8 @@ def first_state(level: Level, field: Field, penalty: NDArray[np.float32] | None 
     """Return the state of a level before its first sweep; ``penalty`` as in `MrfRun.enter`."""
     count, total = survey(level.machine, level.grid, field.temperature)
     kept = None if penalty is None else level.fair_use.split(penalty)[1]
-    penalty = use_penalty(use_counts(level, field, level.grid), level.fair_use, level.rate, kept)
+    counts, temperature = use_counts(level, field, level.grid), total / (1024 * level.grid.size)
+    penalty = use_penalty(counts, level.fair_use, level.rate, kept, temperature)
     memory = level.schedule.init(level.setting)
     return MrfState(*field, penalty, memory, level.number, active=count, temperature_sum=total)
 

@@ -206,9 +206,9 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, level)
-        rate, unit = self.rate * self.change(level), np.float32(self.typical_distance * self.change(level) / STEPS)
+        unit = np.float32(self.typical_distance * self.change(level) / STEPS)
         regions = self.regions and replace(self.regions, unit=unit)
-        return Level(setting, self.plan.schedule, relaxation, rate, self.fair_use(level), regions)
+        return Level(setting, self.plan.schedule, relaxation, self.rate(level), self.fair_use(level), regions)
 
     def choice(self, level: int) -> SiteChoice:
         """Return the choice among the candidates of a level, with the bandwidth of equation (8)."""
@@ -284,6 +284,8 @@ class Lattices:
             p = np.reshape(wanted, (-1, *[1] * len(grid.shape))) / sum(wanted)
         else:
             of = soft.regions()
+            if (of < 0).all():
+                return None
         p = np.broadcast_to(p, (len(p), *grid.shape))
         return Regions(p, of, self.sample.category, grid, int(self.offsets.max()), unit)
 
@@ -317,14 +319,13 @@ class Lattices:
         """N C sigma^2: half of the mean distance between two neighbourhoods."""
         return len(self.offsets) * self.sample.channels * self.sample.variance
 
-    @property
-    def rate(self) -> float:
-        """Lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
-        return 0.0 if self.coarser else self.options.balance * self.typical_distance
+    def rate(self, level: int) -> float:
+        """Return lambda N C sigma^2, see `Level`; 0 if the levels begin with an arrangement, which decides the use."""
+        return 0.0 if self.coarser else self.options.balance * self.typical_distance * self.change(level)
 
     def change(self, level: int) -> float:
-        """Return the factor of penalties: with scores less at fine levels, where neighbours differ less, else 1."""
-        return self.sample.change(self.spacing(level)) if self.sample.pictures.scores else 1.0
+        """Return the factor of penalties: of a simulation less at fine levels, where neighbours differ less, else 1."""
+        return self.sample.change(self.spacing(level)) if self.regions or self.sample.pictures.scores else 1.0
 
     def free_sweeps(self, level: int) -> int:
         """Return the number of free sweeps of a level."""

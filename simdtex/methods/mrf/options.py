@@ -293,7 +293,7 @@ class Options:
         Whole(0),
         "Sweep this many times over all sites, including those of the coarser level, after the equilibrium of a level",
         paper=1,
-        jobs={"simulate": 3, "simulate 3-D": 2},
+        jobs={"simulate": 1, "simulate values": 3, "simulate 3-D": 2},
         slider=(0, 8, 1),
         shown=("fill", "extend", "simulate", "schedules"),
     )
@@ -384,7 +384,7 @@ class Options:
         16.0,
         Number(0),
         "Count a known pixel that is not from a sample as this many neighbours",
-        jobs={"fill": 4.0, "extend": 4.0},
+        jobs={"fill": 4.0, "extend": 4.0, "simulate": 4.0, "simulate values": 16.0, "simulate 3-D": 16.0},
         shown=("fill", "extend", "simulate"),
     )
     soft_weight: float = data(

@@ -143,9 +143,9 @@ def use_penalty(
 
     ``counts`` are from `use` and from `Regions`, in this order; ``rate`` is lambda N C sigma^2; ``before`` are the
     penalties during the last sweep, at the beginning of a level those of the kinds; and ``temperature`` is the mean of
-    t over the lattice. The penalty of a candidate is
-    lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of the square around it over its fair share, and the
-    mean with that ``before``, so that penalties converge. It is infinite at a place without a candidate.
+    t over the lattice. The penalty of a candidate is lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of
+    the square around it over its fair share, and the mean with that ``before``, so that penalties converge. It is
+    infinite at a place without a candidate. If shares of kinds are asked, it is multiplied by (1 - t)^2.
 
     The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (1 - t)^2 (n - d) / max(n, d, 1)
     M / (M + `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all
@@ -156,6 +156,7 @@ def use_penalty(
     optimal transport, whose dual raises the penalty of candidates that are used too often.
     """
     counts, of_kinds = fair_use.split(counts)
+    rate *= (1 - temperature) ** 2 if of_kinds.size else 1
     before, kept = fair_use.split(np.zeros(fair_use.wanted.size, np.float32) if before is None else before)
     kept = kept + _changes(of_kinds, fair_use, temperature) if before.size else kept
     places, total = prod(fair_use.shape), int(counts.sum())
