@@ -14,7 +14,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from io import BufferedReader, BytesIO
 from math import isnan, prod
 from operator import index
@@ -81,7 +81,7 @@ class HardData(Brief):
     names: tuple[str, ...]
     lines: tuple[int, ...] | None = None
     from_top: bool = False
-    name: str = "the hard data"
+    name: str = field(default="the hard data", repr=False)
 
     def __len__(self) -> int:
         return len(self.points)

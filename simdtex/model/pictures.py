@@ -86,18 +86,25 @@ class Pictures:
         names = self.categories(0)
         if names is not None:
             return names
-        every = np.concatenate([self.values(0, picture) for picture in range(len(self.pixels))])
+        every = np.concatenate([image[..., 0][taken] for image, taken in zip(self.pixels, self.taken, strict=True)])
         values, counts = np.unique(every, return_counts=True)
         ends = np.searchsorted(counts.cumsum(), every.size * np.array(PARTS))
         alone = np.flatnonzero(counts >= SPIKE * every.size)
         return np.asarray(values[np.unique(np.concatenate([ends, alone, alone[alone > 0] - 1]))])
 
     def proportions(self) -> NDArray[np.number[Any]]:
-        """Return the proportions of the classes of the first variable, by the shares of the pictures."""
-        of = [np.searchsorted(self.classes, self.values(0, n)) for n in range(len(self.pixels))]
+        """Return the proportions of the classes of the first variable in what may be taken, by the pictures' shares."""
+        pairs = zip(self.pixels, self.taken, strict=True)
+        of = [np.searchsorted(self.classes, image[..., 0][taken]) for image, taken in pairs]
         counts = np.array([np.bincount(each, minlength=len(self.classes)) for each in of])
-        each = counts / counts.sum(1, keepdims=True)
+        each = counts / np.maximum(counts.sum(1, keepdims=True), 1)
         return np.asarray(counts.sum(0) if self.shares is None else self.shares @ each)
+
+    @property
+    def taken(self) -> tuple[Mask, ...]:
+        """Where pixels may be taken: they are known and usable."""
+        every = [np.ones(image.shape[:-1], bool) for image in self.pixels]
+        return tuple(map(np.logical_and, self.known or every, self.usable or every))
 
     def values(self, variable: int, picture: int) -> NDArray[Any]:
         """Return the known values of a variable in one of the pictures, (n,)."""

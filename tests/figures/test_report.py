@@ -328,7 +328,7 @@ def test_the_index_map_shows_each_copied_pixel_where_it_is_from():
 def test_reports_of_continuous_values_and_of_a_single_realisation_of_many_categories(tmp_path, monkeypatch):
     images = np.random.default_rng(1).normal(size=(2, 20, 24))
     write_ensemble(tmp_path / "r", images[0], images, data=[(3, 4, 0), (9, 1, 0)])
-    assert set(os.listdir(tmp_path / "r")) == ALWAYS | {"copies.png", "error.png"}
+    assert set(os.listdir(tmp_path / "r")) == ALWAYS | {"copies.png", "error.png", "histograms.png"}
     text = read_page(tmp_path / "r" / "index.html").text
     assert "continuous values" in text and "standard deviation of the realisations" in text
     assert "Not every realisation keeps the 2 hard data" in text

@@ -219,7 +219,9 @@ def plan_simulation(
     asked = probabilities is None or (chosen.soft_weight and not np.isnan(probabilities).all())
     if (categories is not None or chosen.scores) and alone and asked and not (chosen.proportions or guide):
         images = replace(kinds, shares=soft.shares) if copies else kinds
-        spread = shares.spread(images, pictures, probabilities, size, inputs.given, chosen.share_spread)
+        of = [copy.image for copy in copies.copies] if copies else range(len(pictures.pixels))
+        distinct = [of.index(image) for image in sorted(set(of))]
+        spread = shares.spread(images, distinct, probabilities, size, inputs.given, chosen.share_spread)
     shas = digests(pictures, inputs.given)
     if inputs.guide:
         shas["guide"] = digest(*inputs.guide[0], inputs.guide[1])

@@ -117,7 +117,7 @@ def _sums(array: NDArray[Any], sides: Sequence[int]) -> Floats:
 
 def spread(
     images: Pictures,
-    pictures: Pictures,
+    distinct: Sequence[int],
     soft: Floats | None,
     shape: tuple[int, ...],
     given: Given | None,
@@ -125,9 +125,9 @@ def spread(
 ) -> Spread:
     """Return the distribution of the shares of classes in an output, given data.
 
-    ``images`` are those of the candidates, whose classes and shares count, and ``pictures`` the training images, of
-    which they may be copies; ``soft`` (categories, *shape) are probabilities instead of the shares, ``given`` the data
-    and the cells that take no part, and ``factor`` is that of the deviation of all shares.
+    ``images`` are those of the candidates, and ``distinct`` the numbers of one copy of each training image; ``soft``
+    (categories, *shape) are probabilities instead of the images' shares, ``given`` the data and the cells that take no
+    part, and ``factor`` is that of the deviation of all shares.
     """
     from scipy.spatial.distance import cdist
     from scipy.special import ndtri
@@ -136,9 +136,8 @@ def spread(
     shares = shares / shares.sum()
     below = shares.cumsum()
     codes = np.eye(len(classes)) if named else ndtri(below - shares / 2)[:, None]
-    of = [np.searchsorted(classes, image[..., 0]) for image in pictures.pixels]
-    if pictures.known:
-        of = [np.where(known, numbers, -1) for known, numbers in zip(pictures.known, of, strict=True)]
+    pairs = [(images.pixels[k][..., 0], images.taken[k]) for k in distinct]
+    of = [np.where(taken, np.searchsorted(classes, image), -1) for image, taken in pairs]
     reach, axes = integral_range(of, shares, codes), len(shape)
     scale = (reach / (2 * pi if axes == 2 else 8 * pi)) ** (1 / axes)
     unsure = reach / sum(int((image >= 0).sum()) for image in of)  # of the images' shares

@@ -49,7 +49,7 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN, FINER, FINER_OF_VALUES = STEPS // 16, 8, 2
+GAIN, FINER, FINER_OF_VALUES = STEPS // 16, 12, 2
 """The most steps by which the penalty of a category, or of another class, changes after a sweep of the coarsest level;
 and the factors of those at finer levels, of categories and of other classes."""
 

@@ -26,7 +26,7 @@ def of_data(data, shape=(96, 96), soft=None, factor=1.0, image=None):
     for place, category in data.items():
         values[place], known[place] = category, True
     pictures = Pictures((image[..., None],), categorical=(True,))
-    return spread(pictures, pictures, soft, shape, Given(values, known) if data else None, factor)
+    return spread(pictures, [0], soft, shape, Given(values, known) if data else None, factor)
 
 
 def test_integral_range_of_squares_is_their_area():
@@ -66,7 +66,7 @@ def test_values_draw_a_mean_score_and_keep_the_histogram_of_the_image():
     field = np.kron(np.random.default_rng(1).gamma(1, 1, (40, 40)), np.ones((BLOCK, BLOCK)))
     pictures = Pictures((field[..., None],), scores=True)
     shares = pictures.proportions() / field.size
-    found = spread(pictures, pictures, None, (96, 96), None, 1.0)
+    found = spread(pictures, [0], None, (96, 96), None, 1.0)
     draws = np.stack([found.draw(seed) for seed in range(1000)])
     assert draws.mean(0) == pytest.approx(shares, abs=0.003)
     score = draws @ ndtri(shares.cumsum() - shares / 2)  # of squares of 6 pixels
@@ -85,12 +85,17 @@ def test_a_map_of_probabilities_keeps_its_pattern_with_other_shares():
 
 
 def test_realisations_reach_the_shares_that_they_aim_at():
-    training, wells = blocks((96, 96)), np.ma.masked_all((64, 64), np.uint8)
+    training, wells = blocks((96, 96)), np.ma.masked_all((96, 96), np.uint8)
     wells[4::12, 4::12] = 1  # where the image has 0.3
-    made = simdtex.simulate(training, 6, shape=(64, 64), categorical=True, rng=1)
-    told = simdtex.simulate(training, 6, shape=(64, 64), known=wells, categorical=True, rng=1)
-    soft = np.stack([np.full((64, 64), 0.4), np.full((64, 64), 0.6)])
-    mapped = simdtex.simulate(training, 6, shape=(64, 64), probabilities=soft, categorical=True, rng=1)
-    for found, least, most in ((made, 0.2, 0.4), (told, 0.4, 0.7), (mapped, 0.5, 0.7)):
+    soft = np.stack([np.full((96, 96), 0.4), np.full((96, 96), 0.6)])
+    for how, least, most in (({}, 0.2, 0.4), ({"known": wells}, 0.4, 0.7), ({"probabilities": soft}, 0.5, 0.7)):
+        found = simdtex.simulate(training, 3, shape=(96, 96), categorical=True, rng=1, **how)
         assert least < found.share_1.mean() < most
-        assert found.mean(("y", "x")).values == pytest.approx(found.share_1.values, abs=0.04)
+        assert found.mean(("y", "x")).values == pytest.approx(found.share_1.values, abs=0.05)
+
+
+def test_pixels_that_are_not_taken_do_not_count():
+    training, mask = blocks((96, 96)), np.ones((96, 96), bool)
+    mask[:, :48], training[:, :48] = False, 1
+    made = simdtex.simulate(training, 2, shape=(48, 48), mask=mask, categorical=True, rng=1, share_spread=0)
+    assert made.share_1[0] == pytest.approx(training[mask].mean(), abs=1e-6)

@@ -52,13 +52,13 @@ def test_a_realisation_depends_on_its_number_alone():
 
 def test_a_realisation_is_what_synthesize_gives_with_its_seed():
     training, data = texture((16, 20), dtype=np.float32), holed()
-    found = simulate(training, known=data)
+    found = simulate(training, known=data, scores=False)  # else with drawn shares of classes
     for seed, values in zip(found.seed.values, found.values, strict=True):
         own = simdtex.synthesize(training, SHAPE, rng=int(seed), known=data, device="reference", **ran(found))
         assert_same_bits(values, own)
         assert_same_bits(values[~np.isnan(data)], data[~np.isnan(data)])
     how = {"known": np.where(np.isnan(data), np.nan, CATEGORIES[:12, :14]), "categorical": True} | QUICK
-    found = simdtex.simulate(CATEGORIES, 1, **how)
+    found = simdtex.simulate(CATEGORIES, 1, proportions=np.unique(CATEGORIES, return_counts=True)[1].tolist(), **how)
     del how["jobs"]
     own = simdtex.synthesize(CATEGORIES, SHAPE, **how | {"rng": int(found.seed[0])})
     assert_same_bits(found.values[0], own)  # which has the defaults of a simulation then
@@ -136,7 +136,8 @@ def test_dimensions_coordinates_type_and_attributes_are_written_by_xarray_itself
         assert found.dims == ("realisation", "y", "x") and found.realisation.values.tolist() == [4, 5]
         assert np.array_equal(found.y, np.arange(12)) and np.array_equal(found.x, np.arange(14))
         assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
-    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
+    shares = {"shares_asked", "shares_reached"}
+    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"} | shares
     assert (found.attrs["seed"], found.attrs["version"]) == (2**64 - 1, simdtex.__version__)
     assert found.attrs["device"].startswith("reference") and len(found.attrs["training_image"]) == 64
     options = json.loads(found.attrs["options"])
