@@ -14,19 +14,19 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # A room imports from itself and from rooms above it. The number is its budget of lines; a larger one is a commit of its
 # own, with a reason. Tiles stand above synthesis, since they are a way to run `synthesize`.
 ROOMS = {
-    ("random", "options", "machine"): 1799,
+    ("random", "options", "machine"): 1801,
     ("io",): 3654,
-    ("model",): 3600,
+    ("model",): 3652,
     ("run", "checkpoint", "driver"): 752,
     ("schedules",): 1009,
-    ("methods.mrf",): 3930,
+    ("methods.mrf",): 3949,
     ("methods.pyramid",): 2053,
     ("methods.multires",): 809,
     ("inputs",): 300,
     ("figures",): 850,
-    ("cli",): 1630,
+    ("cli",): 1632,
     ("maspar",): 1801,
-    ("jobs.tiles",): 1560,
+    ("jobs.tiles",): 1561,
     ("jobs.synthesis",): 650,
     ("jobs.filling",): 805,
     ("jobs.why",): 444,
@@ -34,11 +34,11 @@ ROOMS = {
     ("jobs.mixes",): 365,
     ("jobs.classification",): 1635,
     ("jobs.studies",): 2181,
-    ("jobs.simulation",): 2488,
+    ("jobs.simulation",): 2786,
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35098, 20812
+LINES, CODE = 35530, 21080
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}

@@ -26,7 +26,7 @@ def test_a_skewed_variable_with_zeros_keeps_its_values_their_shares_and_its_vari
     known[::9, ::9] = np.float32(0.777)  # between values of the image
     found = simdtex.simulate(training, 6, shape=(64, 64), rng=1, share_spread=0).values
     assert np.isin(found, training).all()
-    assert abs((found == 0).mean() - 0.1) < 0.01
+    assert abs((found == 0).mean() - 0.1) < 0.02
     assert abs(found.mean() / training.mean() - 1) < 0.06 and abs(found.std() / training.std() - 1) < 0.1
     for lag in (1, 2, 4, 8):
         of = [variogram(field, axis, lag)[lag] for field in found for axis in (0, 1)]
