@@ -433,25 +433,28 @@ def diagram(curves):
 
 
 def likeness(images, _data, number, side, options, _out, truths, snesim, walker):
-    """Rows of the likeness of windows and of realisations without data, of maps."""
+    """Rows of the likeness of windows and of realisations without data, each with its own training image; of maps."""
     for name, pairs in cases(images or ",".join([*IMAGES, *(["walker"] if walker else [])]), side, truths, walker):
-        training, those = pairs[0]
-        yield [name, "windows", *_like(np.stack([one for _, some in pairs for one in some]), training), ""]
+        each = -(-number // len(pairs))
+        yield [name, "windows", *_like([(np.stack(those), training) for training, those in pairs]), ""]
         for program, make in programs(options, snesim).items():
             began = seconds()
-            made = make(training, number, those[0].shape, None, 1)
-            yield [name, program, *_like(made, training), f"{(seconds() - began) / number:.2f}"]
+            made = [(make(one, each, those[0].shape, None, k), one) for k, (one, those) in enumerate(pairs, 1)]
+            yield [name, program, *_like(made), f"{(seconds() - began) / each / len(pairs):.2f}"]
 
 
-def _like(made, training):
-    found = summary(made, training)
-    theirs, own = found.variograms[:, 1, :-1].mean((0, 1)), found.variograms[:, 1, -1].mean(0)
-    joined, of = found.connectivity[:, 1, :-1], found.connectivity[:, 1, -1:]
-    return [
-        *(f"{theirs[lag] / own[lag]:.2f}" for lag in LAGS),
-        *(f"{np.nanmean(joined - of):+.3f}", f"{found.dead_ends[1, :-1].mean():.2f}", f"{found.dead_ends[1, -1]:.2f}"),
-        *(f"{found.anodi.by_level[0, 1]:.3f}", f"{np.nanmean(found.copied):.2f}"),
-    ]
+def _like(pairs):
+    """Figures of ensembles, each beside its training image, as means."""
+    rows = []
+    for made, training in pairs:
+        found = summary(made, training)
+        at_lags = found.variograms[:, 1][..., list(LAGS)]
+        variograms = at_lags[:, :-1].mean((0, 1)) / at_lags[:, -1].mean(0)
+        off = np.nanmean(found.connectivity[:, 1, :-1] - found.connectivity[:, 1, -1:])
+        ends = found.dead_ends[1, :-1].mean(), found.dead_ends[1, -1]
+        rows.append([*variograms, off, *ends, found.anodi.by_level[0, 1], np.nanmean(found.copied)])
+    *middle, js, copied = np.mean(rows, 0)
+    return [*(f"{one:.2f}" for one in middle), f"{js:.3f}", f"{copied:.2f}"]
 
 
 OF_MAPS = "share|dead ends|in the image|bodies|specks|misses|right|js 4x4|copied|variety|likeness|ratio"
