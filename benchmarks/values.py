@@ -4,7 +4,8 @@
     python benchmarks/values.py [--parts continuous,joint] [--walker CSV] [--number 20] [--side 128]
                                 [--options NAME=VALUE,...] [--out DIR] [--device TEXT]
 
-``--walker`` is a table of Walker Lake with the columns U, V, X and Y; all others are as in ``simulation.py``.
+``--walker`` is a table of Walker Lake with the columns U, V, X and Y; all others are as in ``simulation.py``. All
+realisations aim at the histogram of the training image (``share_spread=0``).
 
 continuous  realisations of 128 x 128: the mean and the standard deviation over those of the training image, by how much
          P1 to P99 are off in shares, the variograms at lags 1 to 16 over the image's, and the copied windows.
@@ -153,7 +154,7 @@ PARTS = {
 
 @common.command
 def main(parts="", images="", number=20, side=int, options="", walker=Path, out=Path, device=None):
-    given = {"rng": 1, "device": common.opened(device)} | common.parsed(options)
+    given = {"rng": 1, "share_spread": 0.0, "device": common.opened(device)} | common.parsed(options)
     if out:
         out.mkdir(parents=True, exist_ok=True)
     for part, (rows, header) in common.chosen(PARTS, parts).items():

@@ -49,9 +49,9 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN, FINER, FINER_OF_VALUES = STEPS // 16, 12, 2
-"""The most steps by which the penalty of a category, or of another class, changes after a sweep of the coarsest level;
-and the factors of those at finer levels, of categories and of other classes."""
+GAIN, FINER = (STEPS // 16, STEPS // 20), (12, 2)
+"""The most steps by which the penalty of a category, or of a class of values, changes after a sweep of the coarsest
+level; and the factors of those at finer levels."""
 
 ALL = 2**12
 """The most candidates of the coarsest level, which evaluates all, for more than one decimation of the sample."""
@@ -348,10 +348,11 @@ class Lattices:
         places = self.places(level)
         around = int(self.offsets[:, 1].max()) * (places.spacing // places.step)
         fair, listed = self.sample.fair(places), not self.exhaustive(level)
-        finer = FINER if self.sample.pictures.categories(0) is not None else FINER_OF_VALUES
-        gain = GAIN if level == self.levels - 1 else finer * GAIN
-        asked: dict[str, Any] = {"wanted": self.regions.wanted(self.grid(level)), "gain": gain} if self.regions else {}
-        return FairUse(places.shape, around, fair, listed, **asked)
+        if not self.regions:
+            return FairUse(places.shape, around, fair, listed)
+        values = self.sample.pictures.categories(0) is None
+        gain = GAIN[values] * (1 if level == self.levels - 1 else FINER[values])
+        return FairUse(places.shape, around, fair, listed, self.regions.wanted(self.grid(level)), gain, not values)
 
     def places(self, level: int) -> Places:
         """Return the places of the candidates of a level: all of a regular sample, since few are of a site's phase."""

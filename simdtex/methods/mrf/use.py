@@ -38,7 +38,8 @@ class FairUse:
     of its neighbourhood; ``fair`` (places,) int64, the weight of each, 0 if it is no candidate, or None if all are
     equal; ``listed``, whether numbers count the candidates only, or all places; ``wanted`` (regions, kinds) float64,
     the share that is asked of each kind in each region of the output (`Regions`), if any; ``gain``, the most steps that
-    the penalty of a kind changes by after a sweep at the temperature 0.
+    the penalty of a kind changes by after a sweep at the temperature 0; ``cold``, whether penalties are multiplied by
+    (1 - t)^2, as distances are.
     """
 
     shape: tuple[int, ...]
@@ -47,6 +48,7 @@ class FairUse:
     listed: bool = False
     wanted: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     gain: int = 0
+    cold: bool = False
 
     @cached_property
     def due(self) -> tuple[NDArray[np.int64], int]:
@@ -145,7 +147,7 @@ def use_penalty(
     penalties during the last sweep, at the beginning of a level those of the kinds; and ``temperature`` is the mean of
     t over the lattice. The penalty of a candidate is lambda N C sigma^2 min(4, max(0, u - 1)), where u is the use of
     the square around it over its fair share, and the mean with that ``before``, so that penalties converge. It is
-    infinite at a place without a candidate. If shares of kinds are asked, it is multiplied by (1 - t)^2.
+    infinite at a place without a candidate. If shares of categories are asked, it is multiplied by (1 - t)^2.
 
     The penalty of a kind, in whole steps, adds up: after a sweep it rises by gain (1 - t)^2 (n - d) / max(n, d, 1)
     M / (M + `FEW`), where n is the number of its sites in the region, d the number that is asked, and M that of all
@@ -156,9 +158,9 @@ def use_penalty(
     optimal transport, whose dual raises the penalty of candidates that are used too often.
     """
     counts, of_kinds = fair_use.split(counts)
-    rate *= (1 - temperature) ** 2 if of_kinds.size else 1
+    factor = (1 - temperature) ** 2 if fair_use.cold else 1.0
     before, kept = fair_use.split(np.zeros(fair_use.wanted.size, np.float32) if before is None else before)
-    kept = kept + _changes(of_kinds, fair_use, temperature) if before.size else kept
+    kept = kept + _changes(of_kinds, fair_use, factor) if before.size else kept
     places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     price = np.zeros(places, np.float32)
@@ -167,17 +169,17 @@ def use_penalty(
         used[there if fair_use.listed else slice(None)] = counts
         around, (due, whole) = sums_around(used.reshape(fair_use.shape), fair_use.around), fair_use.due
         excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
-        price = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
+        price = (rate * factor * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
     if fair_use.fair is not None:
         price = price[there] if fair_use.listed else np.where(there, price, np.float32(np.inf))
     return np.append((price + before[: price.size]) / np.float32(2) if before.size else price, kept)
 
 
-def _changes(counts: NDArray[np.integer], fair_use: FairUse, temperature: float) -> NDArray[np.float32]:
+def _changes(counts: NDArray[np.integer], fair_use: FairUse, factor: float) -> NDArray[np.float32]:
     """Return the changes of the penalties of kinds in regions, whole steps, (regions x kinds,)."""
     counts = counts.reshape(fair_use.wanted.shape)
     total = counts.sum(1, keepdims=True)
     due = fair_use.wanted * total
     excess = (counts - due) / np.maximum(np.maximum(counts, due), 1) * total / (total + FEW)
-    changes: NDArray[np.float32] = np.rint(fair_use.gain * (1 - temperature) ** 2 * excess).astype(np.float32).ravel()
+    changes: NDArray[np.float32] = np.rint(fair_use.gain * factor * excess).astype(np.float32).ravel()
     return changes

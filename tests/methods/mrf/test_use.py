@@ -72,13 +72,14 @@ def test_what_is_fair_counts_in_the_square_around():
 
 def test_the_penalty_of_a_kind_adds_up_where_it_is_not_as_often_as_asked():
     """Of two regions, from the sweep before or from the level above, beside the penalties of candidates."""
-    fair_use = FairUse((2, 2), 0, wanted=np.array([[0.25, 0.75, 0.0], [1.0, 0.0, 0.0]]), gain=100)
+    fair_use = FairUse((2, 2), 0, wanted=np.array([[0.25, 0.75, 0.0], [1.0, 0.0, 0.0]]), gain=100, cold=True)
     used, kinds = np.array([8, 0, 0, 0]), np.array([2, 9, 1, 0, 0, 0])  # of 12: 3, 9 and 0 are due
     kept, before = np.float32([7, 0, 0, 5, 0, 0]), np.array([2, 4, 0, 6], np.float32)
     found = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept))
     assert found[:4].tolist() == [2.5, 2, 0, 3]
     assert found[4:].tolist() == [7 + round(-100 / 3 * 12 / 16), 0, 100 * 12 / 16, 5, 0, 0]
     warm = use_penalty(np.append(used, kinds), fair_use, 1.0, np.append(before, kept), 0.5)
+    assert warm[:4].tolist() == [1.375, 2, 0, 3]
     assert warm[4:].tolist() == [7 + round(-100 / 12 * 12 / 16), 0, 25 * 12 / 16 // 1 + 1, 5, 0, 0], "as distances are"
     begun = use_penalty(np.append(used, kinds), fair_use, 1.0, kept)
     assert begun.tolist() == [3, 0, 0, 0, *kept], "a level begins with those of the level above"
