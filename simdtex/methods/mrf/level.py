@@ -49,7 +49,7 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """The fewest candidates of the coarsest level of a small sample, up to a spacing of ``WIDE`` pixels."""
 
-GAIN, FINER = (STEPS // 16, STEPS // 20), (12, 2)
+GAIN, FINER = (STEPS // 16, STEPS // 20), (8, 2)
 """The most steps by which the penalty of a category, or of a class of values, changes after a sweep of the coarsest
 level; and the factors of those at finer levels."""
 
@@ -206,8 +206,9 @@ class Lattices:
             confidences=self.conditions.confidences,
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, level)
-        unit = np.float32(self.typical_distance * self.change(level) / STEPS)
-        regions = self.regions and replace(self.regions, unit=unit)
+        regions = self.regions
+        if regions and sample.pictures.categories(0) is None:
+            regions = replace(regions, unit=np.float32(self.typical_distance * self.change(level) / STEPS))
         return Level(setting, self.plan.schedule, relaxation, self.rate(level), self.fair_use(level), regions)
 
     def choice(self, level: int) -> SiteChoice:

@@ -136,7 +136,7 @@ CHANNELS, _ = channels()
 def of_channels(p, n, **options):
     """How often each cell is of a channel."""
     given = {} if p is None else {"probabilities": np.stack([1 - p, p]), "shape": p.shape}
-    return simdtex.simulate(CHANNELS, n, categorical=True, rng=1, **given, **options).values.mean(0)
+    return simdtex.simulate(CHANNELS, n, categorical=True, rng=1, share_spread=0, **given, **options).values.mean(0)
 
 
 @pytest.mark.slow
