@@ -333,7 +333,12 @@ class Sample:
         categories = self.pictures.categories(0)
         return len(categories) if categories is not None and len(categories) > 2 else 0
 
-    def change(self, spacing: int) -> float:
+    @cached_property
+    def changes(self) -> tuple[float, ...]:
+        """The `_change` of pixels 1, 2, 4, ... apart, up to the spacing of the coarsest level."""
+        return tuple(self._change(1 << k) for k in range(int(self.layout["step"]).bit_length()))
+
+    def _change(self, spacing: int) -> float:
         """Return the mean squared difference of pixels so far apart, in units of the pixels' variance, at most 1."""
         squares = pairs = 0
         for levels in self.levels:

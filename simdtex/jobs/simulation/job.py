@@ -299,9 +299,9 @@ class Simulation:
         if not (self.spread or (kinds and kinds.categories is not None)):
             return {}
         classes = self.options.of(self.training).classes
-        p = np.ones((len(classes), *self.shape))
-        if kinds and kinds.categories is not None:
-            p *= kinds.categories
+        p = np.broadcast_to(
+            1.0 if kinds is None or kinds.categories is None else kinds.categories, (len(classes), *self.shape)
+        )
         there = ~np.isnan(p[0])
         if self.outside is not None:
             there &= ~self.outside

@@ -141,17 +141,17 @@ def spread(
     reach, axes = integral_range(of, shares, codes), len(shape)
     scale = (reach / (2 * pi if axes == 2 else 8 * pi)) ** (1 / axes)
     unsure = reach / sum(int((image >= 0).sum()) for image in of)  # of the images' shares
-    expected = np.broadcast_to(shares.reshape(-1, *[1] * axes) if soft is None else soft, (len(shares), *shape))
-    cells = ~np.isnan(expected[0])
+    cells = np.ones(shape, bool) if soft is None else ~np.isnan(soft[0])
     if given and given.outside is not None:
         cells &= ~given.outside
-    p, data = expected[:, cells], np.zeros(len(shares))
-    ratio, mean = reach / max(1, p.shape[1]) + unsure, codes.T @ p.mean(1)
+    size, p = max(1, int(cells.sum())), shares[:, None] if soft is None else soft[:, cells]
+    ratio, mean, data = reach / size + unsure, codes.T @ p.mean(1), np.zeros(len(shares))
     within = 1 - min(factor**2 * ratio, WIDEST)
     if given and (told := np.argwhere(given.data & cells)).size:
         its = np.minimum(np.searchsorted(classes, given.values[tuple(told.T)][:, 0]), len(classes) - 1)
-        data, few = np.bincount(its, minlength=len(classes)) / p.shape[1], _some(np.arange(len(told)), MOST_DATA)
-        excess, near = (codes[its] - expected[(slice(None), *told.T)].T @ codes)[few], told[few]
+        data, few = np.bincount(its, minlength=len(classes)) / size, _some(np.arange(len(told)), MOST_DATA)
+        near, expected = told[few], shares if soft is None else soft[(slice(None), *told[few].T)].T
+        excess = codes[its[few]] - expected @ codes
         to_cells = np.exp(-cdist(near, _some(np.argwhere(cells), MOST_CELLS)) / scale).mean(1) + unsure
         weights = np.linalg.solve(np.exp(-cdist(near, near) / scale) + unsure, to_cells)
         mean, ratio = mean + weights @ excess, max(0.0, ratio - float(weights @ to_cells))

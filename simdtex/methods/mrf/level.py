@@ -207,7 +207,7 @@ class Lattices:
         )
         setting = Setting(machine, grid, offsets, options.neighbourhood, self.seed, level)
         regions = self.regions
-        if regions and sample.pictures.categories(0) is None:
+        if regions and self.of_values:
             regions = replace(regions, unit=np.float32(self.typical_distance * self.change(level) / STEPS))
         return Level(setting, self.plan.schedule, relaxation, self.rate(level), self.fair_use(level), regions)
 
@@ -326,7 +326,17 @@ class Lattices:
 
     def change(self, level: int) -> float:
         """Return the factor of penalties: of a simulation less at fine levels, where neighbours differ less, else 1."""
-        return self.sample.change(self.spacing(level)) if self.regions or self.sample.pictures.scores else 1.0
+        return (
+            self.sample.changes[self.spacing(level).bit_length() - 1]
+            if self.regions or self.sample.pictures.scores
+            else 1.0
+        )
+
+    @property
+    def of_values(self) -> bool:
+        """Whether the first variable has values that are no categories."""
+        kinds = self.sample.pictures.categorical
+        return not (kinds and kinds[0])
 
     def free_sweeps(self, level: int) -> int:
         """Return the number of free sweeps of a level."""
@@ -351,7 +361,7 @@ class Lattices:
         fair, listed = self.sample.fair(places), not self.exhaustive(level)
         if not self.regions:
             return FairUse(places.shape, around, fair, listed)
-        values = self.sample.pictures.categories(0) is None
+        values = self.of_values
         gain = GAIN[values] * (1 if level == self.levels - 1 else FINER[values])
         return FairUse(places.shape, around, fair, listed, self.regions.wanted(self.grid(level)), gain, not values)
 
