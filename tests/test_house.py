@@ -16,10 +16,10 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 ROOMS = {
     ("random", "options", "machine"): 1801,
     ("io",): 3654,
-    ("model",): 3652,
+    ("model",): 3657,
     ("run", "checkpoint", "driver"): 752,
     ("schedules",): 1009,
-    ("methods.mrf",): 3953,
+    ("methods.mrf",): 3963,
     ("methods.pyramid",): 2053,
     ("methods.multires",): 809,
     ("inputs",): 300,
@@ -38,7 +38,7 @@ ROOMS = {
     ("live",): 1870,
     ("__init__", "__main__", "commands", "general", "methods", "jobs"): 400,
 }
-LINES, CODE = 35534, 21083
+LINES, CODE = 35549, 21094
 """The budgets of the whole package: all lines, and those with code that is no import."""
 
 NAMES = {name: number for number, names in enumerate(ROOMS) for name in names}
